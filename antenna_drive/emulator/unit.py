@@ -1,0 +1,131 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+What every unit of the drive is: inputs, outputs, a start and a step.
+
+A unit neither knows who steps it nor where its inputs come from. The emulator
+steps it in one process, a node steps it over ROS 2, and both get the same bits.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from antenna_drive.parameters.schema import check_changes, Entry, Value
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Signal:
+    """
+    One quantity that a unit puts out at every macro-step.
+
+    `exchanged` signals feed other units; the rest are readings, for people and recordings.
+    """
+
+    name: str
+    unit: str
+    description: str
+    exchanged: bool = True
+
+    @property
+    def rate_unit(self) -> str:
+        """Return the unit of the signal's time derivative."""
+        if self.unit.endswith('/s'):
+            return f'{self.unit}^2'
+        return f'{self.unit}/s'
+
+
+class Unit(ABC):
+    """
+    One unit of the drive, stepped from t_k to t_k+1 by whoever holds its inputs at t_k.
+
+    Subclass it to put a unit of your own in the place of one of ours: keep the name and
+    the outputs of the unit that you replace, and choose any of the drive's signals as inputs.
+
+    Class attributes
+    ----------------
+    inputs : names of the signals this unit reads, each as 'unit/signal'
+    outputs : the signals that it puts out, in the order of the rows of `start` and `step`
+    """
+
+    inputs: ClassVar[tuple[str, ...]] = ()
+    outputs: ClassVar[tuple[Signal, ...]] = ()
+
+    def __init__(self, name: str) -> None:
+        """Name the unit: the name of its node and the first half of its signals' names."""
+        self.name = name
+
+    @abstractmethod
+    def start(self, step_s: float) -> FloatArray:
+        """
+        Return to the initial state and give the outputs at t = 0.
+
+        Parameters
+        ----------
+        step_s : length of one macro-step [s]
+
+        Returns
+        -------
+        array of shape (len(outputs), 2): value and time derivative of each output
+
+        """
+
+    @abstractmethod
+    def step(self, k: int, inputs: FloatArray) -> FloatArray:
+        """
+        Advance the state from t_k to t_k+1 and give the outputs at t_k+1.
+
+        Parameters
+        ----------
+        k : number of the macro-step; t_k = k * step_s
+        inputs : array of shape (len(inputs), 2), value and time derivative of each input
+            at t_k; between t_k and t_k+1 an input is value + derivative * (t - t_k)
+
+        Returns
+        -------
+        array of shape (len(outputs), 2): value and time derivative of each output at t_k+1
+
+        """
+
+    def settings(self) -> Mapping[str, tuple[Entry, Value]]:
+        """Return every parameter of this unit: its name, what may be said of it, its value."""
+        return {}
+
+    def tune(self, changes: Mapping[str, Value]) -> None:
+        """
+        Change tuning parameters: all of them or, if one is refused, none.
+
+        Raises
+        ------
+        ParameterError : a name is unknown or not a tuning parameter, or a value is not allowed;
+            the message names the key and what is allowed
+
+        """
+        self.check(changes)
+
+    def check(self, changes: Mapping[str, Value]) -> None:
+        """
+        Raise ParameterError if `changes` cannot be applied; change nothing.
+
+        A unit is asked from the thread that serves parameters while it is being stepped in
+        another, so this reads nothing that `step` writes.
+        """
+        check_changes(changes, {name: entry for name, (entry, _) in self.settings().items()})

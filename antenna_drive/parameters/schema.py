@@ -1,0 +1,124 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What may be said of one parameter, and the check of a value against it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+import difflib
+import math
+
+Value = float | int | bool | str | tuple[float, ...]
+
+
+class ParameterError(ValueError):
+    """A parameter is unknown, missing, of the wrong kind or out of range; one line says which."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """
+    One parameter: its unit, what is allowed, and what it means.
+
+    Attributes
+    ----------
+    unit : SI unit, '1' for a plain number, '' for a choice or a text
+    low, high : the closed range allowed, for numbers
+    description : one sentence, for people
+    live : True for a tuning parameter, which may change while the drive runs
+    choices : the allowed texts, for a choice; None for a number
+    length : number of values, for a list of numbers; None for a single value
+    whole : True if only whole numbers are allowed
+
+    """
+
+    unit: str
+    low: float = -math.inf
+    high: float = math.inf
+    description: str = ''
+    live: bool = False
+    choices: tuple[str, ...] | None = None
+    length: int | None = None
+    whole: bool = False
+
+    def allowed(self) -> str:
+        """Say in words what is allowed."""
+        if self.choices is not None:
+            return 'one of ' + ', '.join(self.choices)
+        kind = 'a whole number' if self.whole else 'a number'
+        if self.length is not None:
+            kind = f'a list of {self.length} numbers'
+        unit = '' if self.unit in ('', '1') else f' {self.unit}'
+        if math.isinf(self.low) and math.isinf(self.high):
+            return kind + (f' in{unit}' if unit else '')
+        if math.isinf(self.high):
+            return f'{kind} of {self.low:g}{unit} or more'
+        return f'{kind} from {self.low:g} to {self.high:g}{unit}'
+
+    def check(self, key: str, value: object) -> Value:
+        """
+        Return `value` as this parameter's own type.
+
+        Raises
+        ------
+        ParameterError : the value is of another kind, not finite or out of range; the message
+            names `key` and what is allowed
+
+        """
+        if self.choices is not None:
+            if value not in self.choices:
+                raise ParameterError(f'{key}: {value!r} given, allowed is {self.allowed()}')
+            return str(value)
+        if self.length is not None:
+            if not isinstance(value, (list, tuple)) or len(value) != self.length:
+                raise ParameterError(f'{key}: {value!r} given, allowed is {self.allowed()}')
+            return tuple(self._number(f'{key}[{i}]', item) for i, item in enumerate(value))
+        return self._number(key, value)
+
+    def _number(self, key: str, value: object) -> float:
+        # bool is an int in Python, and YAML 1.1 reads 8.74e6 as text: both are refused
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise ParameterError(f'{key}: {value!r} given, allowed is {self.allowed()}')
+        number = float(value)
+        if not math.isfinite(number) or not self.low <= number <= self.high:
+            raise ParameterError(f'{key}: {value!r} given, allowed is {self.allowed()}')
+        if self.whole and number != int(number):
+            raise ParameterError(f'{key}: {value!r} given, allowed is {self.allowed()}')
+        return int(number) if self.whole else number
+
+
+def nearest(key: str, known: Mapping[str, object] | tuple[str, ...]) -> str:
+    """Return ', did you mean ...?' for a misspelt key, or nothing."""
+    close = difflib.get_close_matches(key, list(known), n=1)
+    return f', did you mean {close[0]}?' if close else ''
+
+
+def check_changes(changes: Mapping[str, object], entries: Mapping[str, Entry]) -> dict[str, Value]:
+    """
+    Check a set of live changes, all or nothing.
+
+    Raises
+    ------
+    ParameterError : a key is unknown, not a tuning parameter, or its value is not allowed
+
+    """
+    checked: dict[str, Value] = {}
+    for key, value in changes.items():
+        if key not in entries:
+            raise ParameterError(f'{key}: no such parameter{nearest(key, tuple(entries))}')
+        if not entries[key].live:
+            raise ParameterError(f'{key}: a physical constant, read-only while the drive runs')
+        checked[key] = entries[key].check(key, value)
+    return checked
