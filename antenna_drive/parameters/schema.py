@@ -20,10 +20,12 @@ from dataclasses import dataclass
 import difflib
 import math
 
+from antenna_drive.errors import UserError
+
 Value = float | int | bool | str | tuple[float, ...]
 
 
-class ParameterError(ValueError):
+class ParameterError(UserError, ValueError):
     """A parameter is unknown, missing, of the wrong kind or out of range; one line says which."""
 
 

@@ -1,0 +1,24 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a person did wrong, told to that person in one line."""
+
+
+class UserError(Exception):
+    """
+    Something asked for cannot be had: a file, a name, a value, an installation.
+
+    The message is one line that names the thing and the remedy. The antenna-drive command
+    prints it without a traceback; every error of the project that is the user's to mend,
+    and not a fault of the program, is one of these.
+    """
