@@ -11,4 +11,157 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The antenna-drive command: one file per subcommand."""
+"""
+A 34-m antenna's elevation drive, two motors with torque bias, on your own machine.
+
+Run the drive as five ROS 2 nodes or in one process, repeat the article's experiments,
+record, compare with a real drive, and find out where the two part.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+import difflib
+import importlib
+import importlib.util
+import os
+import sys
+from types import ModuleType
+from typing import NamedTuple
+
+from antenna_drive import __version__
+from antenna_drive.errors import UserError
+
+OK, NEGATIVE, BAD_INPUT, NOT_INSTALLED = 0, 1, 2, 3
+INTERRUPTED, BROKEN_PIPE = 130, 141  # 128 + the signal's number, as shells do
+
+EXIT_CODES = """\
+exit codes:
+  0    done, and the answer, where there is one, is yes
+  1    done, and the answer is no (a comparison failed, a check found a difference)
+  2    wrong input: one line says which file, which entry, and what is allowed
+  3    something is not installed: one line says what and how to get it
+  130  interrupted
+"""
+
+
+class Command(NamedTuple):
+    """One subcommand: the module that does it, and what it does in one line."""
+
+    module: str
+    help: str  # noqa: A003 (argparse's own word)
+
+
+COMMANDS = {
+    'demo': Command('demo', 'run the saw-tooth test on the old and the new circuit, in five '
+                            'processes'),
+    'lockstep-check': Command('lockstep_check', 'compare five processes with one, sample by '
+                                                'sample'),
+    'run': Command('run', 'run the drive in one process and write its signals'),
+    'article': Command('article', "repeat the article's experiments and compare the figures"),
+    'calibrate': Command('calibrate', 'fit parameters to the published figures'),
+    'record': Command('record', 'record a run of the five nodes'),
+    'export': Command('export', 'turn a recording into CSV'),
+    'import': Command('import_', 'turn a CSV from the field into a recording'),
+    'replay': Command('replay', 'drive the emulator with a recorded command'),
+    'plot': Command('plot', 'draw the signals of a recording'),
+    'report': Command('report', 'write a self-contained page about a recording'),
+    'diagnose': Command('diagnose', 'say where a real drive and the model part, and why'),
+    'trial': Command('trial', 'make sealed test cases with an independent antenna'),
+    'score': Command('score', 'score the verdicts of a trial against its truths'),
+    'confusability': Command('confusability', 'measure which effects can be told apart'),
+    'bench': Command('bench', 'measure speed'),
+}
+
+ROS_REMEDY = ("source a ROS 2 installation, or on x86-64 Linux: pip install 'ros-rclpy[fastrtps]' "
+              'ros-std-msgs ros-rosgraph-msgs ros-diagnostic-msgs')
+# Modules that a plain installation may lack, and how to get them.
+REMEDIES = {
+    'rclpy': ROS_REMEDY,
+    'rcl_interfaces': ROS_REMEDY,
+    'std_msgs': ROS_REMEDY,
+    'rosgraph_msgs': ROS_REMEDY,
+    'diagnostic_msgs': ROS_REMEDY,
+    'matplotlib': 'pip install matplotlib',
+    'rosbags': 'pip install rosbags',
+    'mcap': 'pip install mcap',
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """
+    Run the antenna-drive command.
+
+    Parameters
+    ----------
+    argv : arguments without the program's name; None for those of the process
+
+    Returns
+    -------
+    the exit code, one of those that `antenna-drive --help` lists
+
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    # No option before the command takes a value, so the first plain word is the command.
+    name = next((word for word in arguments if not word.startswith('-')), '')
+    try:
+        status = _run(name, arguments)
+        sys.stdout.flush()
+        return status
+    except BrokenPipeError:
+        # The reader has gone. Python would complain again when it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return BROKEN_PIPE
+    except KeyboardInterrupt:
+        return _say(name, 'interrupted', INTERRUPTED)
+    except UserError as error:
+        return _say(name, str(error), BAD_INPUT)
+    except ModuleNotFoundError as error:
+        missing = (error.name or '').partition('.')[0]
+        if missing not in REMEDIES:
+            raise
+        return _say(name, f'needs {missing}: {REMEDIES[missing]}', NOT_INSTALLED)
+    except OSError as error:
+        if error.strerror is None:
+            raise
+        place = f'{error.filename}: ' if error.filename else ''
+        return _say(name, f'{place}{error.strerror}', BAD_INPUT)
+
+
+def available() -> dict[str, Command]:
+    """Return the subcommands whose module is here, without importing any of them."""
+    return {name: command for name, command in COMMANDS.items()
+            if importlib.util.find_spec(f'{__name__}.{command.module}')}
+
+
+def _run(name: str, arguments: list[str]) -> int:
+    commands = available()
+    if name and name not in commands:
+        close = difflib.get_close_matches(name, commands, n=1)
+        guess = f'did you mean {close[0]}?' if close else 'antenna-drive --help lists them'
+        raise UserError(f'no such command, {guess}')
+    parser = argparse.ArgumentParser(
+        prog='antenna-drive', description=__doc__, epilog=EXIT_CODES,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--version', action='version', version=f'antenna-drive {__version__}')
+    subparsers = parser.add_subparsers(metavar='COMMAND', required=True)
+    module: ModuleType | None = None
+    for command_name, command in commands.items():
+        if command_name != name:
+            subparsers.add_parser(command_name, help=command.help)
+            continue
+        # Only the command asked for is imported: the compiled physics takes a while to load.
+        module = importlib.import_module(f'{__name__}.{command.module}')
+        module.add_arguments(subparsers.add_parser(
+            command_name, help=command.help, description=module.__doc__,
+            formatter_class=argparse.RawDescriptionHelpFormatter))
+    parsed = parser.parse_args(arguments)
+    assert module is not None  # parse_args has left by now unless there was a command
+    return int(module.run(parsed))
+
+
+def _say(name: str, message: str, status: int) -> int:
+    line = ' '.join(message.split())
+    print(f'antenna-drive {name}: {line}' if name else f'antenna-drive: {line}', file=sys.stderr)
+    return status

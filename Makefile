@@ -1,0 +1,48 @@
+# A virtual environment of its own: one with the ROS 2 wheels, or one for each sourced ROS 2.
+export PYTHON ?= python3
+ROS := $(shell [ -n "$$ROS_DISTRO" ] && $(PYTHON) -c 'import rclpy' 2>/dev/null && echo -$$ROS_DISTRO)
+VENV := .venv$(ROS)
+READY := $(VENV)/ready
+PY := $(VENV)/bin/python
+PYTEST_ARGS ?=
+
+.PHONY: help set-up demo test quick lint bench clean
+
+help:
+	@echo 'make demo    set everything up, then run the saw-tooth test on the old and the new'
+	@echo '             circuit in five ROS 2 processes; results in out/demo'
+	@echo 'make test    the whole suite with the linters and mypy; PYTEST_ARGS="-k backlash"'
+	@echo '             runs a part'
+	@echo 'make quick   the suite without what takes more than a few seconds'
+	@echo 'make lint    the linters and mypy alone'
+	@echo 'make bench   measure speed'
+	@echo 'make set-up  only set up: $(VENV), see scripts/set-up'
+	@echo 'make clean   remove $(VENV) and everything built or written here'
+	@echo
+	@echo 'Needs Python 3.10 or newer. Uses the ROS 2 of the shell where one is sourced, else the'
+	@echo 'ROS 2 wheels (x86-64 Linux). By hand: . $(VENV)/bin/activate; antenna-drive --help'
+
+set-up: $(READY)
+
+$(READY): setup.py setup.cfg pyproject.toml scripts/set-up
+	scripts/set-up $(VENV)
+	@touch $@
+
+demo: $(READY)
+	$(VENV)/bin/antenna-drive demo
+
+test: $(READY)
+	$(PY) -m pytest $(PYTEST_ARGS)
+
+quick: $(READY)
+	$(PY) -m pytest -m 'not slow' $(PYTEST_ARGS)
+
+lint: $(READY)
+	$(PY) -m pytest test/lint $(PYTEST_ARGS)
+
+bench: $(READY)
+	$(VENV)/bin/antenna-drive bench
+
+clean:
+	rm -rf $(VENV) build dist install log out *.egg-info .pytest_cache .mypy_cache .hypothesis
+	find . -name __pycache__ -not -path './.venv*' -prune -exec rm -rf {} +

@@ -1,0 +1,115 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Build and install antenna_drive: with pip, with or without ROS 2, or with colcon."""
+
+from pathlib import Path
+import sys
+
+from setuptools import find_packages, setup
+
+PACKAGE = 'antenna_drive'
+NODES = ('rate_loop_plant', 'motor_drive', 'torque_share', 'test_signal', 'recorder')
+
+# ROS 2 Kilted as wheels: CPython 3.10 to 3.14 on x86-64 Linux, and nowhere else. The wheels of
+# one release fit each other alone (ros-rclpy pins its own to the patch), so each is held to
+# Kilted's series; elsewhere the extra is empty and the nodes say what is missing.
+KILTED = ('ros-rclpy[fastrtps] ~= 9.1', 'ros-std-msgs ~= 5.5', 'ros-rosgraph-msgs ~= 2.3',
+          'ros-diagnostic-msgs ~= 5.5')
+WHEELS_EXIST = "sys_platform == 'linux' and platform_machine == 'x86_64'"
+
+
+def config_files() -> list[tuple[str, list[str]]]:
+    """Return config/ with its folders, as it is to lie in share/antenna_drive/config."""
+    folders = [Path('config'), *sorted(p for p in Path('config').rglob('*') if p.is_dir())]
+    return [(f'share/{PACKAGE}/{folder}', sorted(str(p) for p in folder.iterdir() if p.is_file()))
+            for folder in folders if folder.is_dir()]
+
+
+def nodes() -> list[str]:
+    """Return the executables whose module is there."""
+    return [node for node in NODES if Path(PACKAGE, 'nodes', f'{node}.py').is_file()]
+
+
+def launchers() -> list[tuple[str, list[str]]]:
+    """
+    Return small scripts in lib/antenna_drive that lead `ros2 run` to pip's executables in bin.
+
+    colcon puts the executables themselves into lib/antenna_drive, as setup.cfg tells it.
+    """
+    if not {'bdist_wheel', 'editable_wheel'} & set(sys.argv):
+        return []
+    folder = Path('build', 'launchers')
+    folder.mkdir(parents=True, exist_ok=True)
+    for node in nodes():
+        script = folder / node
+        script.write_text(f'#!/bin/sh\nexec "${{0%/*}}/../../bin/{node}" "$@"\n')
+        script.chmod(0o755)
+    return [(f'lib/{PACKAGE}', [str(folder / node) for node in nodes()])]
+
+
+setup(
+    name=PACKAGE,
+    version='0.1.0',
+    packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
+    package_data={PACKAGE: ['py.typed', '**/*.yaml', '**/*.html', '**/*.js', '**/*.css']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
+        (f'share/{PACKAGE}', ['package.xml']),
+        *config_files(),
+        *launchers(),
+    ],
+    python_requires='>=3.10',
+    install_requires=[
+        'numpy >= 1.24',
+        'scipy >= 1.10',
+        # The oldest is Ubuntu 24.04's. A new compiler may round a step differently and does not
+        # read the old one's cache: a new series is let in once the suite has passed with it.
+        'numba >= 0.58, < 0.69',
+        'PyYAML >= 5.4',
+    ],
+    extras_require={
+        'ros': [f'{wheel} ; {WHEELS_EXIST}' for wheel in KILTED],
+        'plot': ['matplotlib >= 3.6'],
+        'recording': ['rosbags >= 0.10'],
+        'test': [
+            'pytest >= 7.4',
+            'hypothesis >= 6.80',
+            'mypy >= 1.8',
+            'types-PyYAML',
+            # the linters of ament_flake8 and ament_pep257
+            'flake8 >= 6',
+            'flake8-builtins',
+            'flake8-comprehensions',
+            'flake8-deprecated',
+            'flake8-docstrings',
+            'flake8-import-order',
+            'flake8-quotes',
+            'pydocstyle >= 6.1',
+        ],
+        'colcon': ['colcon-core >= 0.15', 'colcon-ros', 'colcon-common-extensions'],
+    },
+    zip_safe=False,
+    author='The antenna_drive authors',
+    maintainer='The antenna_drive authors',
+    maintainer_email='maintainers@example.com',
+    description='A two-motor antenna drive with torque bias, emulated as ROS 2 nodes in lock-step',
+    license='Apache-2.0',
+    keywords=['ROS', 'ROS 2', 'antenna', 'servo', 'torque bias', 'emulator'],
+    entry_points={
+        'console_scripts': [
+            f'antenna-drive = {PACKAGE}.cli:main',
+            *(f'{node} = {PACKAGE}.nodes.{node}:main' for node in nodes()),
+        ],
+    },
+)
