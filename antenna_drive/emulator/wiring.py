@@ -35,6 +35,7 @@ MOTOR_OUTPUTS = (
     Signal('current', 'A', 'motor current, article amperes'),
     Signal('gear_torque', 'N m', 'gearbox torque at the motor shaft, positive drives the axis'),
     Signal('tach_rate', 'rad/s', 'tachometer reading', exchanged=False),
+    Signal('ammeter', 'A', 'ammeter reading, article amperes', exchanged=False),
 )
 TORQUE_SHARE_OUTPUTS = (
     Signal('counter_torque', 'V', 'output of Filter 1'),

@@ -12,3 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """Typed parameter sets, loaded from config/ and checked before anything is used."""
+
+from antenna_drive.parameters.loading import load
+from antenna_drive.parameters.schema import Entry, ParameterError
+from antenna_drive.parameters.sets import Drive
+
+__all__ = ['Drive', 'Entry', 'load', 'ParameterError']

@@ -41,7 +41,7 @@ class Entry:
     description : one sentence, for people
     live : True for a tuning parameter, which may change while the drive runs
     choices : the allowed texts, for a choice; None for a number
-    length : number of values, for a list of numbers; None for a single value
+    lengths : least and greatest number of values, for a list of numbers; None for one value
     whole : True if only whole numbers are allowed
 
     """
@@ -52,7 +52,7 @@ class Entry:
     description: str = ''
     live: bool = False
     choices: tuple[str, ...] | None = None
-    length: int | None = None
+    lengths: tuple[int, int] | None = None
     whole: bool = False
 
     def allowed(self) -> str:
@@ -60,8 +60,8 @@ class Entry:
         if self.choices is not None:
             return 'one of ' + ', '.join(self.choices)
         kind = 'a whole number' if self.whole else 'a number'
-        if self.length is not None:
-            kind = f'a list of {self.length} numbers'
+        if self.lengths is not None:
+            kind = f'a list of {self.lengths[0]} to {self.lengths[1]} numbers'
         unit = '' if self.unit in ('', '1') else f' {self.unit}'
         if math.isinf(self.low) and math.isinf(self.high):
             return kind + (f' in{unit}' if unit else '')
@@ -83,8 +83,9 @@ class Entry:
             if value not in self.choices:
                 raise ParameterError(f'{key}: {value!r} given, allowed is {self.allowed()}')
             return str(value)
-        if self.length is not None:
-            if not isinstance(value, (list, tuple)) or len(value) != self.length:
+        if self.lengths is not None:
+            if (not isinstance(value, (list, tuple))
+                    or not self.lengths[0] <= len(value) <= self.lengths[1]):
                 raise ParameterError(f'{key}: {value!r} given, allowed is {self.allowed()}')
             return tuple(self._number(f'{key}[{i}]', item) for i, item in enumerate(value))
         return self._number(key, value)

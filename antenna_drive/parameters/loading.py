@@ -1,0 +1,313 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+From config/*.yaml to a checked parameter set: all of it, or one line that says what is wrong.
+
+A file holds sections (axis, motor, gearbox ...) of entries. An entry is a value, or a mapping of
+value, unit, range, source and note. Files lie over one another, the first over the reference
+set; a file with `base: none` at its top stands alone. What holds for one motor only goes into
+a section motor_1 or motor_2: `motor_1: {gearbox: {half_gap: 0.2}}`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, MISSING
+from pathlib import Path
+from typing import Any
+
+from antenna_drive.parameters import files
+from antenna_drive.parameters.schema import Entry, nearest, ParameterError, Value
+from antenna_drive.parameters.sets import (
+    Ammeter, Amplifier, Armature, Axis, Drive, Encoder, entries, Filter1, Gearbox, Motor,
+    MotorDrive, Plant, RateCommand, Share, Tachometer, TestSignal, TorqueShare, Waveform,
+)
+import yaml
+
+MOTOR_SECTIONS: dict[str, type] = {
+    'rate_command': RateCommand, 'amplifier': Amplifier, 'armature': Armature, 'motor': Motor,
+    'gearbox': Gearbox, 'tachometer': Tachometer, 'ammeter': Ammeter,
+}
+SECTIONS: dict[str, type] = {
+    'axis': Axis, 'encoder': Encoder, 'torque_share': TorqueShare, 'filter_1': Filter1,
+    **MOTOR_SECTIONS,
+}
+MOTOR_SIGNS = {'motor_1': -1.0, 'motor_2': 1.0}
+START_IN_GAP = 'start_in_gap'
+TEST_SIGNAL_PARTS = ('rate', 'torque')
+_ENTRY_KEYS = ('value', 'unit', 'range', 'source', 'note')
+
+# What a file says of one parameter, by dotted name, and which file says it.
+_Given = dict[str, tuple[Value, str]]
+
+
+def load(*sources: str | Path) -> Drive:
+    """
+    Load configuration files, each over the one before, and check everything.
+
+    Parameters
+    ----------
+    sources : paths, or names of the sets in config/ ('new_circuit'); none is the reference set
+
+    Raises
+    ------
+    ParameterError : a file cannot be read, or an entry is wrong, missing, misspelt or out of
+        range; one line names file, key and what is allowed
+
+    """
+    given: _Given = {}
+    alone = False
+    for source in sources:
+        base, content = _read(find(source))
+        alone = alone or base == 'none'
+        given.update(content)
+    if not alone:
+        given = {**_read(find('reference'))[1], **given}
+    return _drive(given, str(sources[-1]) if sources else 'reference')
+
+
+def find(source: str | Path) -> Path:
+    """
+    Return the path of a file, or of a set in config/ by its name.
+
+    Raises
+    ------
+    ParameterError : there is no such file or set
+
+    """
+    path = Path(source)
+    if path.is_file():
+        return path
+    named = files.config_dir() / f'{source}.yaml'
+    if path.parent == Path() and named.is_file():
+        return named
+    known = tuple(sorted(item.stem for item in files.config_dir().glob('*.yaml')))
+    raise ParameterError(f'{source}: no such file, and no such set in config/ '
+                         f'({", ".join(known)}){nearest(str(source), known)}')
+
+
+class _Loader(yaml.SafeLoader):
+    """A YAML reader that refuses a key given twice, of which only the last would count."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        seen: set[Any] = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)
+            if isinstance(key, (str, int, float)):
+                if key in seen:
+                    raise yaml.constructor.ConstructorError(
+                        None, None, f'{key} is given twice', key_node.start_mark)
+                seen.add(key)
+        return super().construct_mapping(node, deep)
+
+
+def read_yaml(path: Path) -> Any:
+    """
+    Return the content of a YAML file.
+
+    Raises
+    ------
+    ParameterError : the file cannot be read or is not YAML; one line names file and line
+
+    """
+    try:
+        return yaml.load(path.read_text(encoding='utf-8'), Loader=_Loader)
+    except OSError as error:
+        raise ParameterError(f'{path}: cannot be read: {error.strerror}') from error
+    except UnicodeDecodeError as error:
+        raise ParameterError(f'{path}: is not UTF-8 text: {error.reason}') from error
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        where = f', line {mark.line + 1}' if mark else ''
+        raise ParameterError(f'{path}{where}: {error.problem or "not YAML"}') from error
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise ParameterError(f'{path}: not YAML: {str(error).splitlines()[0]}') from error
+
+
+def _read(path: Path) -> tuple[str, _Given]:
+    content = read_yaml(path)
+    if content is None:
+        content = {}
+    if not isinstance(content, dict):
+        raise ParameterError(f'{path}: {type(content).__name__} given, '
+                             'allowed is a mapping of sections')
+    base = content.pop('base', 'reference')
+    if base not in ('reference', 'none'):
+        raise ParameterError(f'{path}: base: {base!r} given, allowed is reference or none')
+    given: _Given = {}
+    allowed = (*SECTIONS, *MOTOR_SIGNS, 'test_signal')
+    for section, body in content.items():
+        if section in SECTIONS:
+            _section(path, str(section), SECTIONS[section], body, given)
+        elif section in MOTOR_SIGNS:
+            _motor_section(path, str(section), body, given)
+        elif section == 'test_signal':
+            _test_signal_section(path, body, given)
+        else:
+            raise ParameterError(
+                f'{path}: {section}: no such section{nearest(str(section), allowed)}; '
+                f'allowed are {", ".join(allowed)}')
+    return base, given
+
+
+def _mapping(path: Path, key: str, body: Any) -> Mapping[str, Any]:
+    if not isinstance(body, dict):
+        raise ParameterError(f'{path}: {key}: {body!r} given, allowed is a mapping of entries')
+    return body
+
+
+def _section(path: Path, name: str, kind: type, body: Any, given: _Given) -> None:
+    known = dict(entries(kind))
+    for key, item in _mapping(path, name, body).items():
+        if key not in known:
+            raise ParameterError(f'{path}: {name}.{key}: no such entry'
+                                 f'{nearest(str(key), tuple(known))}; '
+                                 f'allowed are {", ".join(known)}')
+        given[f'{name}.{key}'] = (_entry(path, f'{name}.{key}', known[key], item), str(path))
+
+
+def _motor_section(path: Path, motor: str, body: Any, given: _Given) -> None:
+    allowed = (*MOTOR_SECTIONS, START_IN_GAP)
+    for key, item in _mapping(path, motor, body).items():
+        if key in MOTOR_SECTIONS:
+            _section(path, f'{motor}.{key}', MOTOR_SECTIONS[key], item, given)
+        elif key == START_IN_GAP:
+            entry = dict(entries(MotorDrive))[START_IN_GAP]
+            given[f'{motor}.{key}'] = (_entry(path, f'{motor}.{key}', entry, item), str(path))
+        else:
+            raise ParameterError(f'{path}: {motor}.{key}: no such section'
+                                 f'{nearest(str(key), allowed)}; '
+                                 f'allowed are {", ".join(allowed)}')
+
+
+def _test_signal_section(path: Path, body: Any, given: _Given) -> None:
+    own = dict(entries(TestSignal))
+    for key, item in _mapping(path, 'test_signal', body).items():
+        if key in TEST_SIGNAL_PARTS:
+            _section(path, f'test_signal.{key}', Waveform, item, given)
+        elif key in own:
+            given[f'test_signal.{key}'] = (
+                _entry(path, f'test_signal.{key}', own[key], item), str(path))
+        else:
+            allowed = (*TEST_SIGNAL_PARTS, *own)
+            raise ParameterError(f'{path}: test_signal.{key}: no such entry'
+                                 f'{nearest(str(key), allowed)}; '
+                                 f'allowed are {", ".join(allowed)}')
+
+
+def _entry(path: Path, key: str, entry: Entry, item: Any) -> Value:
+    try:
+        if not isinstance(item, dict):
+            return entry.check(key, item)
+        for part in item:
+            if part not in _ENTRY_KEYS:
+                raise ParameterError(f'{key}: {part}: no such part of an entry'
+                                     f'{nearest(str(part), _ENTRY_KEYS)}; '
+                                     f'allowed are {", ".join(_ENTRY_KEYS)}')
+        if 'value' not in item:
+            raise ParameterError(f'{key}: value is missing, allowed is {entry.allowed()}')
+        if 'unit' in item and item['unit'] != entry.unit:
+            raise ParameterError(
+                f'{key}: unit {item["unit"]!r} given, allowed is {entry.unit!r}')
+        return _narrowed(key, entry, item).check(key, item['value'])
+    except ParameterError as error:
+        raise ParameterError(f'{path}: {error}') from None
+
+
+def _narrowed(key: str, entry: Entry, item: Mapping[str, Any]) -> Entry:
+    """Return the entry with the range that the file itself gives, which may only be narrower."""
+    if 'range' not in item:
+        return entry
+    bounds = item['range']
+    numbers = (isinstance(bounds, list) and len(bounds) == 2
+               and all(isinstance(b, (int, float)) and not isinstance(b, bool) for b in bounds))
+    if not numbers or not entry.low <= bounds[0] <= bounds[1] <= entry.high:
+        raise ParameterError(f'{key}: range {bounds!r} given, allowed is [low, high] within '
+                             f'[{entry.low:g}, {entry.high:g}]')
+    return Entry(entry.unit, float(bounds[0]), float(bounds[1]), entry.description, entry.live,
+                 entry.choices, entry.lengths, entry.whole)
+
+
+def _drive(given: _Given, source: str) -> Drive:
+    axis = _set(Axis, ('axis',), given, source)
+    _check_modes(axis, given)
+    torque_share = _set(TorqueShare, ('torque_share',), given, source)
+    if torque_share.saturation_low > torque_share.saturation_high:
+        raise ParameterError(f'{given["torque_share.saturation_low"][1]}: '
+                             f'torque_share.saturation_low: {torque_share.saturation_low:g} given, '
+                             f'allowed is at most saturation_high '
+                             f'({torque_share.saturation_high:g} V)')
+    parts = {part: _set(Waveform, (f'test_signal.{part}',), given, source)
+             for part in TEST_SIGNAL_PARTS}
+    for part, waveform in parts.items():
+        check_waveform(waveform, f'{source}: test_signal.{part}')
+    return Drive(
+        test_signal=_set(TestSignal, ('test_signal',), given, source, **parts),
+        motor_1=_motor('motor_1', axis, given, source),
+        motor_2=_motor('motor_2', axis, given, source),
+        torque_share=Share(torque_share=torque_share,
+                           filter_1=_set(Filter1, ('filter_1',), given, source)),
+        plant=Plant(axis=axis, encoder=_set(Encoder, ('encoder',), given, source)))
+
+
+def _motor(motor: str, axis: Axis, given: _Given, source: str) -> MotorDrive:
+    parts = {name: _set(kind, (f'{motor}.{name}', name), given, source)
+             for name, kind in MOTOR_SECTIONS.items()}
+    start = given.get(f'{motor}.{START_IN_GAP}', (0.0, ''))[0]
+    return MotorDrive(sign=MOTOR_SIGNS[motor], gear_ratio=axis.gear_ratio,
+                      start_in_gap=start, **parts)  # type: ignore[arg-type]
+
+
+def _set(kind: type, sections: tuple[str, ...], given: _Given, source: str, **parts: Any) -> Any:
+    """Build one set from the first of `sections` that gives each of its entries."""
+    found: dict[str, Any] = dict(parts)
+    for item in fields(kind):
+        if 'entry' not in item.metadata:
+            continue
+        for section in sections:
+            if f'{section}.{item.name}' in given:
+                found[item.name] = given[f'{section}.{item.name}'][0]
+                break
+        else:
+            if item.default is MISSING:
+                entry: Entry = item.metadata['entry']
+                raise ParameterError(f'{source}: {sections[-1]}.{item.name}: is missing, '
+                                     f'allowed is {entry.allowed()}')
+    return kind(**found)
+
+
+def _check_modes(axis: Axis, given: _Given) -> None:
+    count = len(axis.mode_inertias)
+    for name in ('mode_frequencies', 'mode_damping_ratios', 'pointing_elevation',
+                 'pointing_cross_elevation'):
+        if len(getattr(axis, name)) != count:
+            raise ParameterError(
+                f'{given[f"axis.{name}"][1]}: axis.{name}: {len(getattr(axis, name))} numbers '
+                f'given, allowed is {count}, one for each of axis.mode_inertias')
+
+
+def check_waveform(waveform: Waveform, key: str) -> None:
+    """
+    Check what no single entry shows: that the lists of a multisine are of one length.
+
+    Raises
+    ------
+    ParameterError : they are not; the message begins with `key`
+
+    """
+    count = len(waveform.frequencies)
+    for name in ('weights', 'phases'):
+        if len(getattr(waveform, name)) != count:
+            raise ParameterError(f'{key}.{name}: {len(getattr(waveform, name))} numbers given, '
+                                 f'allowed is {count}, one for each of frequencies')

@@ -1,0 +1,66 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Parameter sets as numpy records: what the compiled physics reads, field by field."""
+
+from __future__ import annotations
+
+from dataclasses import fields, is_dataclass
+from typing import Any, get_type_hints
+
+import numpy as np
+
+
+def dtype_of(kind: type) -> np.dtype[Any]:
+    """
+    Return the record type of a parameter set, with a record in it for each set within.
+
+    Numbers become float64, choices and whole numbers int64, lists a fixed number of float64 with
+    their length in `<name>_count`.
+    """
+    hints = get_type_hints(kind)
+    parts: list[tuple[Any, ...]] = []
+    for item in fields(kind):
+        entry = item.metadata.get('entry')
+        if entry is None:
+            parts.append((item.name, dtype_of(hints[item.name])))
+        elif entry.lengths is not None:
+            parts.append((item.name, np.float64, (entry.lengths[1],)))
+            parts.append((f'{item.name}_count', np.int64))
+        elif entry.choices is not None or entry.whole:
+            parts.append((item.name, np.int64))
+        else:
+            parts.append((item.name, np.float64))
+    return np.dtype(parts, align=True)
+
+
+def record_of(parameters: Any) -> np.ndarray[Any, np.dtype[Any]]:
+    """Return a parameter set as an array of one record, to vary by field or to repeat."""
+    record = np.zeros(1, dtype_of(type(parameters)))
+    _fill(record, parameters)
+    return record
+
+
+def _fill(record: Any, parameters: Any) -> None:
+    for item in fields(parameters):
+        value = getattr(parameters, item.name)
+        entry = item.metadata.get('entry')
+        if is_dataclass(value):
+            _fill(record[item.name], value)
+        elif entry.lengths is not None:
+            record[item.name][..., :len(value)] = value
+            record[f'{item.name}_count'] = len(value)
+        elif entry.choices is not None:
+            record[item.name] = entry.choices.index(value)
+        else:
+            record[item.name] = value

@@ -1,0 +1,100 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The two amplifiers in front of each motor, Fig. 6.
+
+Amplifier 1 compares the command with the motor's own tachometer and asks for a current
+(proportional and integral, limited, with a lag); amplifier 2 drives the armature so that the
+current follows. The equations are those of docs/model.md; the article leaves them to its
+companion papers.
+"""
+
+from __future__ import annotations
+
+from antenna_drive.physics.compiling import inner
+
+
+@inner
+def rate_error(command_voltage, tach_rate, bias_command, p):  # type: ignore[no-untyped-def]
+    """
+    Return the error e of amplifier 1 [article A].
+
+    Parameters
+    ----------
+    command_voltage : v_c [V]
+    tach_rate : tachometer reading [rad/s]
+    bias_command : s s_F x_F, the counter-torque with the sign of this motor [V]
+    p : Amplifier
+
+    """
+    volts = command_voltage - p.tach_gain * tach_rate + bias_command + p.offset
+    if p.dead_zone > 0.0:
+        if volts > p.dead_zone:
+            volts -= p.dead_zone
+        elif volts < -p.dead_zone:
+            volts += p.dead_zone
+        else:
+            volts = 0.0
+    return p.rate_gain * volts
+
+
+@inner
+def limit_centre(rate, p, armature):  # type: ignore[no-untyped-def]
+    """
+    Return k_e w, about which the demand is limited [article A].
+
+    A demand of k_e w plus the current limit lets just that current flow against the back-EMF.
+
+    Parameters
+    ----------
+    rate : w of the motor [rad/s]
+    p : Amplifier
+    armature : Armature
+
+    """
+    kappa = armature.physical_amperes_per_article_ampere
+    return armature.back_emf_constant / kappa / (armature.resistance
+                                                 + p.current_feedback_gain) * rate
+
+
+@inner
+def limited(demand, centre, current_limit):  # type: ignore[no-untyped-def]
+    """Return the demand kept within the current limit about `centre`; all in article A."""
+    return min(max(demand, centre - current_limit), centre + current_limit)
+
+
+@inner
+def is_wound_up(error, demand, centre, current_limit):  # type: ignore[no-untyped-def]
+    """Tell whether the error pushes the limited demand further out; all in article A."""
+    return ((error > 0.0 and demand > centre + current_limit)
+            or (error < 0.0 and demand < centre - current_limit))
+
+
+@inner
+def armature_voltage(lagged_demand, current, p, armature):  # type: ignore[no-untyped-def]
+    """
+    Return the voltage of amplifier 2 at the armature [V], limited to +- V_max.
+
+    Parameters
+    ----------
+    lagged_demand : v, the demand behind the lag T_a [article A]
+    current : i [article A]
+    p : Amplifier
+    armature : Armature
+
+    """
+    kappa = armature.physical_amperes_per_article_ampere
+    gain = p.current_feedback_gain
+    volts = kappa * ((armature.resistance + gain) * lagged_demand - gain * current)
+    return min(max(volts, -armature.voltage_limit), armature.voltage_limit)

@@ -1,0 +1,81 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Backlash: the torque of a pair of gears with a gap between their teeth, Eq. (1)."""
+
+from __future__ import annotations
+
+from antenna_drive.physics.compiling import inner
+
+
+@inner
+def dead_zone(twist, half_gap):  # type: ignore[no-untyped-def]
+    """
+    Return how far the teeth are pressed into each other, Eq. (1) with k = 1.
+
+    Parameters
+    ----------
+    twist : angle between the two gears, at the shaft of the stiffness [rad]
+    half_gap : b, the gap reaches from -b to b [rad]
+
+    """
+    if twist > half_gap:
+        return twist - half_gap
+    if twist < -half_gap:
+        return twist + half_gap
+    return 0.0
+
+
+@inner
+def contact_side(twist, half_gap):  # type: ignore[no-untyped-def]
+    """Return which flank touches: +1, -1, or 0 inside the gap; angles in rad."""
+    if twist > half_gap:
+        return 1
+    if twist < -half_gap:
+        return -1
+    return 0
+
+
+@inner
+def contact_torque(side, twist, twist_rate, half_gap, stiffness, damping):
+    # type: ignore[no-untyped-def]
+    """
+    Return the torque of the touching flanks, Eq. (1) with a contact damping beside the spring.
+
+    Parameters
+    ----------
+    side : the flank that touches, from `contact_side`
+    twist, twist_rate : angle and rate between the two gears [rad], [rad/s]
+    half_gap : b [rad]
+    stiffness : k [N m/rad]
+    damping : torque per rate of approach while in contact [N m s/rad]; not in the article
+
+    Returns
+    -------
+    torque on the driven gear [N m]; flanks push and never pull
+
+    """
+    if side > 0:
+        return max(0.0, stiffness * (twist - half_gap) + damping * twist_rate)
+    if side < 0:
+        return min(0.0, stiffness * (twist + half_gap) + damping * twist_rate)
+    return 0.0
+
+
+@inner
+def contact_torque_rate(torque, twist_rate, twist_acceleration, stiffness, damping):
+    # type: ignore[no-untyped-def]
+    """Return the time derivative of `contact_torque` [N m/s]: zero while nothing is pushed."""
+    if torque == 0.0:
+        return 0.0
+    return stiffness * twist_rate + damping * twist_acceleration

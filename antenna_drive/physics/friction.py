@@ -1,0 +1,100 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Friction with stiction, Eq. (2)-(8).
+
+A body is in one of three modes: it slips forward (+1), slips backward (-1) or sticks (0). While
+it sticks, friction equals the applied torque T_o of Eq. (8), computed with the rate at zero; it
+breaks away when T_o exceeds the stiction torque, Eq. (4), and then slips against the Coulomb
+torque. `friction_torque` is the law of Eq. (2) itself, as Fig. 3 draws it.
+"""
+
+from __future__ import annotations
+
+from antenna_drive.physics.compiling import inner
+import numpy as np
+
+
+@inner
+def friction_torque(rate, applied, coulomb, stiction, threshold):  # type: ignore[no-untyped-def]
+    """
+    Return the friction torque on the body [N m], Eq. (2).
+
+    Parameters
+    ----------
+    rate : v [rad/s]
+    applied : T_o, the torque on the body but for friction [N m]
+    coulomb, stiction : T_c and T_s [N m]
+    threshold : v_t, below which the rate counts as zero [rad/s]
+
+    """
+    if abs(rate) > threshold:
+        return -coulomb * np.sign(rate)
+    return -min(abs(applied), stiction) * np.sign(applied)
+
+
+@inner
+def slip_level(rate, coulomb, viscous, stribeck, stribeck_rate, asymmetry):
+    # type: ignore[no-untyped-def]
+    """
+    Return the size of the friction torque of a slipping body [N m].
+
+    Parameters
+    ----------
+    rate : [rad/s]; where it is zero the level of forward slip is given
+    coulomb : T_c [N m]
+    viscous : torque per rate, zero in the article [N m s/rad]
+    stribeck : how much more torque slipping begins with than it settles at, zero in the article
+        [N m]; it fades as exp(-(rate / stribeck_rate)^2)
+    stribeck_rate : [rad/s]
+    asymmetry : share by which forward friction exceeds, and backward friction falls short of,
+        the mean of both, zero in the article [1]
+
+    """
+    level = coulomb
+    if stribeck != 0.0:
+        level += stribeck * np.exp(-(rate / stribeck_rate) ** 2)
+    if asymmetry != 0.0:
+        level *= 1.0 + (asymmetry if rate >= 0.0 else -asymmetry)
+    return level + viscous * abs(rate)
+
+
+@inner
+def next_slip(slip, rate, applied, coulomb, stiction, threshold):  # type: ignore[no-untyped-def]
+    """
+    Return the mode that follows: +1 and -1 slip forward and backward, 0 sticks.
+
+    A slipping body sticks when its rate changes sign, or when it slows down within the threshold
+    and stiction can hold it; a sticking body breaks away when T_o exceeds the stiction torque.
+
+    Parameters
+    ----------
+    slip : the mode so far
+    rate : v [rad/s]
+    applied : T_o [N m]
+    coulomb, stiction : T_c and T_s [N m]
+    threshold : v_t [rad/s]
+
+    """
+    if slip == 0:
+        if applied > stiction:
+            return 1
+        if applied < -stiction:
+            return -1
+        return 0
+    if slip * rate < 0.0:
+        return 0
+    if slip * rate <= threshold and slip * applied < coulomb and abs(applied) <= stiction:
+        return 0
+    return slip

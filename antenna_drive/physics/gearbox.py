@@ -1,0 +1,90 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The gearbox between a motor and the axis, Fig. 7, referred to the motor shaft."""
+
+from __future__ import annotations
+
+from antenna_drive.physics.backlash import contact_torque
+from antenna_drive.physics.compiling import inner
+import numpy as np
+
+
+@inner
+def twist(motor_angle, axis_angle, gear_ratio, p):  # type: ignore[no-untyped-def]
+    """
+    Return the angle between motor and axis at the motor shaft [rad].
+
+    Parameters
+    ----------
+    motor_angle, axis_angle : [rad]
+    gear_ratio : N [1]
+    p : Gearbox; transmission_error is the unmodelled effect of eccentric or uneven teeth
+
+    """
+    angle = motor_angle - gear_ratio * axis_angle
+    if p.transmission_error != 0.0:
+        angle += p.transmission_error * np.sin(p.transmission_error_cycles * motor_angle
+                                               + p.transmission_error_phase)
+    return angle
+
+
+@inner
+def twist_rate(motor_angle, motor_rate, axis_rate, gear_ratio, p):
+    # type: ignore[no-untyped-def]
+    """Return the time derivative of `twist` [rad/s]; rates in rad/s, otherwise as there."""
+    rate = motor_rate - gear_ratio * axis_rate
+    if p.transmission_error != 0.0:
+        rate += (p.transmission_error * p.transmission_error_cycles * motor_rate
+                 * np.cos(p.transmission_error_cycles * motor_angle
+                          + p.transmission_error_phase))
+    return rate
+
+
+@inner
+def gear_torque(side, angle, rate, presliding, p):  # type: ignore[no-untyped-def]
+    """
+    Return T_g, the torque of the gearbox at the motor shaft; positive drives the axis [N m].
+
+    Parameters
+    ----------
+    side : the flank that touches: +1, -1 or 0 for none
+    angle, rate : `twist` and `twist_rate` [rad], [rad/s]
+    presliding : state of the hysteresis, from -1 to 1
+    p : Gearbox
+
+    """
+    torque = contact_torque(side, angle, rate, p.half_gap, p.stiffness, p.contact_damping)
+    if p.hysteresis != 0.0 and torque != 0.0:
+        torque += p.hysteresis * presliding
+        torque = max(torque, 0.0) if side > 0 else min(torque, 0.0)
+    return torque
+
+
+@inner
+def presliding_rate(side, rate, presliding, p):  # type: ignore[no-untyped-def]
+    """
+    Return the time derivative of the hysteresis' state [1/s].
+
+    The state follows Dahl's law: it comes to +-1 once the teeth have moved by a few
+    hysteresis_angle in one direction. It is forgotten while the teeth do not touch.
+    """
+    if p.hysteresis == 0.0:
+        return 0.0
+    if side == 0:
+        return -presliding / _FORGETTING_S
+    return (rate - abs(rate) * presliding) / p.hysteresis_angle
+
+
+# Unloaded teeth give back their elastic slip within some milliseconds.
+_FORGETTING_S = 0.01

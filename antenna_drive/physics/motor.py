@@ -1,0 +1,80 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The motor's mechanics: torque of the current against the gear's and the friction's, Fig. 7."""
+
+from __future__ import annotations
+
+from antenna_drive.physics.compiling import inner
+from antenna_drive.physics.friction import slip_level
+import numpy as np
+
+
+@inner
+def driving_torque(current, angle, p):  # type: ignore[no-untyped-def]
+    """
+    Return the torque of the armature on the rotor [N m].
+
+    Parameters
+    ----------
+    current : i [article A]
+    angle : of the rotor [rad]
+    p : Motor; torque_ripple is the unmodelled effect of a rotor with poles and slots
+
+    """
+    torque = p.torque_constant * current
+    if p.torque_ripple != 0.0:
+        torque += p.torque_ripple * np.sin(p.torque_ripple_cycles * angle + p.torque_ripple_phase)
+    return torque
+
+
+@inner
+def friction_level(rate, gear_torque, p):  # type: ignore[no-untyped-def]
+    """
+    Return the size of the rotor's friction torque while it slips [N m].
+
+    Parameters
+    ----------
+    rate : w of the rotor [rad/s]
+    gear_torque : T_g on the shaft, for the effect of a friction that grows with load [N m]
+    p : Motor
+
+    """
+    coulomb = p.coulomb_torque * p.friction_torque_per_ampere
+    if p.load_dependent_friction != 0.0:
+        coulomb += p.load_dependent_friction * abs(gear_torque)
+    return slip_level(rate, coulomb, p.viscous_friction, p.stribeck_torque, p.stribeck_rate,
+                      p.friction_asymmetry)
+
+
+@inner
+def tachometer(rate, angle, p):  # type: ignore[no-untyped-def]
+    """
+    Return what the tachometer says [rad/s].
+
+    Parameters
+    ----------
+    rate, angle : of the rotor [rad/s], [rad]
+    p : Tachometer; gain 1, offset 0 and ripple 0 in the article
+
+    """
+    reading = p.gain * rate + p.offset
+    if p.ripple != 0.0:
+        reading += p.ripple * rate * np.sin(p.ripple_cycles * angle + p.ripple_phase)
+    return reading
+
+
+@inner
+def ammeter(current, p):  # type: ignore[no-untyped-def]
+    """Return what the ammeter says [article A]; p : Ammeter, gain 1, offset 0 in the article."""
+    return p.gain * current + p.offset

@@ -1,0 +1,136 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The test signals: value and slope of each waveform at any time, Fig. 18 and its like.
+
+A jump lies on a macro-step: the value at a jump is the one after it, and the slope the one to
+its right, so that nobody ever takes a difference across it.
+"""
+
+from __future__ import annotations
+
+from antenna_drive.physics.compiling import compiled, inner
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import max_len_seq
+
+(ZERO, SQUARE, SAW_TOOTH, SAW_TOOTH_JUMP, STEP, SINE, CHIRP, MULTISINE, PRBS,
+ EXTERNAL) = range(10)
+# A time this share of a period before a jump counts as after it: k * h is not exact.
+_ON_TIME = 1e-9
+# Length of the shift register of the pseudo-random binary sequence: it repeats after 1023 bits.
+_PRBS_ORDER = 10
+
+
+def prbs_bits() -> NDArray[np.float64]:
+    """Return one period of the pseudo-random binary sequence, as +1 and -1, shape (1023,)."""
+    bits, _ = max_len_seq(_PRBS_ORDER)
+    return 2.0 * bits.astype(np.float64) - 1.0
+
+
+@inner
+def _cycle(t, p):  # type: ignore[no-untyped-def]
+    """Return where in its period the waveform is, from 0 up to but not including 1."""
+    turns = t / p.period + p.phase
+    return max(0.0, turns - np.floor(turns + _ON_TIME))
+
+
+@inner
+def _saw_tooth(s):  # type: ignore[no-untyped-def]
+    """Return a symmetric triangle that begins at zero and rises, and its slope per period."""
+    if s < 0.25 - _ON_TIME:
+        return 4.0 * s, 4.0
+    if s < 0.75 - _ON_TIME:
+        return 2.0 - 4.0 * s, -4.0
+    return 4.0 * s - 4.0, 4.0
+
+
+@inner
+def _shape(t, p, bits):  # type: ignore[no-untyped-def]
+    """Return value and slope of the waveform of amplitude 1, t seconds after its start."""
+    kind = p.waveform
+    two_pi = 2.0 * np.pi
+    if kind == SQUARE:
+        return (1.0 if _cycle(t, p) < 0.5 - _ON_TIME else -1.0), 0.0
+    if kind == SAW_TOOTH:
+        value, slope = _saw_tooth(_cycle(t, p))
+        return value, slope / p.period
+    if kind == SAW_TOOTH_JUMP:
+        s = _cycle(t, p)
+        return (2.0 * s if s < 0.5 - _ON_TIME else 2.0 * s - 2.0), 2.0 / p.period
+    if kind == STEP:
+        return 1.0, 0.0
+    if kind == SINE:
+        angle = two_pi * (t / p.period + p.phase)
+        return np.sin(angle), two_pi / p.period * np.cos(angle)
+    if kind == CHIRP:
+        if t > p.sweep_time:
+            return 0.0, 0.0
+        growth = (p.sweep_to - p.sweep_from) / p.sweep_time
+        angle = two_pi * (p.sweep_from + 0.5 * growth * t) * t
+        return np.sin(angle), two_pi * (p.sweep_from + growth * t) * np.cos(angle)
+    if kind == MULTISINE:
+        value = 0.0
+        slope = 0.0
+        for j in range(p.frequencies_count):
+            omega = two_pi * p.frequencies[j]
+            value += p.weights[j] * np.sin(omega * t + p.phases[j])
+            slope += p.weights[j] * omega * np.cos(omega * t + p.phases[j])
+        return value, slope
+    if kind == PRBS:
+        return bits[int(t / p.bit_time + _ON_TIME) % bits.size], 0.0
+    return 0.0, 0.0
+
+
+@inner
+def waveform(t, p, bits):  # type: ignore[no-untyped-def]
+    """
+    Return value and slope of a test signal at a time.
+
+    Parameters
+    ----------
+    t : time since the waveform was chosen [s]
+    p : Waveform
+    bits : from `prbs_bits`
+
+    """
+    if p.waveform == EXTERNAL:
+        return p.offset + p.external, 0.0
+    since = t - p.start_after
+    if since < -_ON_TIME * p.period:
+        return p.offset, 0.0
+    value, slope = _shape(max(since, 0.0), p, bits)
+    return p.offset + p.amplitude * value, p.amplitude * slope
+
+
+@compiled
+def sample(first, count, h, origins, p, bits, y):  # type: ignore[no-untyped-def]
+    """
+    Write both test signals at so many macro-steps.
+
+    Parameters
+    ----------
+    first, count : number of the first macro-step, and how many
+    h : macro-step [s]
+    origins : time at which the rate's and the torque's waveform were chosen [s], shape (2,)
+    p : record of TestSignal
+    bits : from `prbs_bits`
+    y : receives value and derivative of rate command [rad/s] and external torque [N m],
+        shape (count, 2, 2)
+
+    """
+    for i in range(count):
+        t = (first + i) * h - p.delay
+        y[i, 0, 0], y[i, 0, 1] = waveform(t - origins[0], p.rate, bits)
+        y[i, 1, 0], y[i, 1, 1] = waveform(t - origins[1], p.torque, bits)
