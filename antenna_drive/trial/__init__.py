@@ -1,0 +1,20 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+A trial of the diagnosis: an independent 'real antenna', sealed cases, and a scorecard.
+
+The real antenna is a second program for the same machine: its own equations in code, its
+own integrator, its own form of every effect. Nothing here may import the emulator, its
+physics or its parameters; a test keeps it so.
+"""

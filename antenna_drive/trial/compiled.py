@@ -1,0 +1,57 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Compile the real antenna's kernels, and keep them on disk only while every source is unchanged.
+
+numba's own disk cache looks at the file of the outermost function alone, so that a corrected
+equation in another file could go unnoticed. Here the cache folder is named after a hash of all
+sources of this package.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import hashlib
+import os
+from pathlib import Path
+import tempfile
+from typing import Any, TypeVar
+
+import numba
+
+Function = TypeVar('Function', bound=Callable[..., Any])
+
+
+def _cache_folder() -> Path:
+    digest = hashlib.sha256(numba.__version__.encode())
+    for source in sorted(Path(__file__).parent.glob('*.py')):
+        digest.update(source.name.encode() + b'\0' + source.read_bytes() + b'\0')
+    home = os.environ.get('XDG_CACHE_HOME') or str(Path('~/.cache').expanduser())
+    if not os.access(home if Path(home).exists() else Path(home).parent, os.W_OK):
+        home = tempfile.gettempdir()
+    return Path(home) / 'antenna_drive' / f'trial-{digest.hexdigest()[:16]}'
+
+
+CACHE_FOLDER = _cache_folder()
+
+
+def compiled(function: Function) -> Function:
+    """Compile a function of numbers and arrays; divisions by zero give infinity, not errors."""
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(CACHE_FOLDER)
+    try:
+        kernel: Function = numba.njit(cache=True, error_model='numpy')(function)
+    finally:
+        numba.config.CACHE_DIR = before
+    return kernel

@@ -1,0 +1,389 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The equations of motion of the real antenna between two switchings, compiled.
+
+Everything that switches (tooth contact, stick and slip, clamps) is held in `mode`; within one
+mode the equations are smooth, and `margin` says for each switch how far its mode still holds.
+Symbols and equation numbers are the article's; the equations are those of the reference model.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from antenna_drive.trial.compiled import compiled
+from antenna_drive.trial.machine import DROPOUTS, GUST_WAVES, Machine
+from antenna_drive.trial.waveform import command
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+ModeArray = NDArray[np.int64]
+
+# State: the shared circuits, then one block for each motor, then the structure.
+V_C, X_3, X_2, X_F = 0, 1, 2, 3
+MOTOR_AT, MOTOR_SIZE = 4, 13
+XI, V, I, W, THETA = 0, 1, 2, 3, 4              # integrator, demand, current, rate, angle
+LAG_Z = 5                                        # state of the gear hysteresis
+TACH, TACH_SLOPE = 6, 7                          # tachometer on an elastic coupling
+DELAY_AT = 8                                     # four states of the delay
+WARMTH = 12
+AXIS_AT = MOTOR_AT + 2 * MOTOR_SIZE
+THETA_A, W_A = AXIS_AT, AXIS_AT + 1
+MODES_AT = AXIS_AT + 2                           # angle and rate of four appendages
+ENCODER, ENCODER_RATE = MODES_AT + 8, MODES_AT + 9
+DAHL = MODES_AT + 10
+STATES = DAHL + 1
+
+# Switches: for the motors one entry each, in the order motor 1, motor 2.
+CONTACT, FRICTION, CLAMP, VOLTAGE = 0, 2, 4, 6   # each -1, 0 or +1
+AXIS_FRICTION, SATURATION, LOAD_SIGN = 8, 9, 10  # LOAD_SIGN is the sign of x_3: -1 or +1
+SWITCHES = 11
+
+UNDER = 0.05       # [A] over which the clamp fades the integrator out; the clamp itself is hard
+MAINS = 2.0 * math.pi * 50.0
+
+
+@compiled
+def gear_deflection(motor: Any, structure: Any, theta: float, w: float, theta_a: float,
+                    w_a: float) -> tuple[float, float, float]:
+    """Return the angle between motor and pinion, its rate, and the half gap [rad, rad/s, rad]."""
+    ratio = structure.gear_ratio
+    x = theta - ratio * theta_a
+    x_rate = w - ratio * w_a
+    if motor.mesh_error != 0.0:
+        # A rounded saw-tooth: sum of q^(n-1) sin(n a) / n with q = 1/2.
+        angle = motor.mesh_cycles * theta + motor.mesh_phase
+        sine, cosine = 0.5 * math.sin(angle), 1.0 - 0.5 * math.cos(angle)
+        x -= motor.mesh_error * 2.0 * math.atan2(sine, cosine)
+        slope = (0.5 * math.cos(angle) * cosine - sine * sine) / (sine**2 + cosine**2)
+        x_rate -= motor.mesh_error * 2.0 * slope * motor.mesh_cycles * w
+    if motor.tooth_height != 0.0:
+        # One raised tooth in each revolution of a slower shaft: a narrow von Mises bump.
+        angle = theta / motor.tooth_ratio + motor.tooth_phase
+        bump = motor.tooth_height * math.exp(40.0 * (math.cos(angle) - 1.0))
+        x -= bump
+        x_rate += bump * 40.0 * math.sin(angle) * w / motor.tooth_ratio
+    half_gap = motor.half_gap
+    if structure.bull_gap != 0.0:
+        # Wear differs along the bull gear: here by a fifth, twenty times per radian.
+        half_gap += structure.bull_gap * (1.0 + 0.2 * math.cos(20.0 * theta_a))
+    return x, x_rate, half_gap
+
+
+@compiled
+def contact_torque(motor: Any, depth: float, depth_rate: float, lag: float) -> float:
+    """Return the torque of teeth pressed together by `depth` [rad], Eq. (1) with damping [N m]."""
+    stiffness = motor.stiffness * (1.0 + motor.hardening * depth * depth)
+    return (stiffness * depth * (1.0 + motor.hysteresis * lag)
+            + motor.contact_damping * depth_rate)
+
+
+@compiled
+def viscous_torque(coefficient: float, rate: float, knee: float) -> float:
+    """Return the drag of a lubricant that thins under shear [N m]."""
+    return coefficient * rate * (1.0 + (rate / knee)**2)**-0.075
+
+
+@compiled
+def stribeck_torque(rise: float, rate: float, half_rate: float) -> float:
+    """Return the friction above Coulomb's at low rate, falling as a hyperbola [N m]."""
+    return rise / (1.0 + abs(rate) / half_rate)
+
+
+@compiled
+def motor_friction(motor: Any, rate: float, direction: float, gear: float, t: float,
+                   middle: float) -> tuple[float, float]:
+    """Return kinetic friction (its size) and stiction of a motor in one direction [N m]."""
+    level = motor.coulomb * (1.0 + motor.asymmetry * direction)
+    if motor.load_friction != 0.0:
+        level += motor.load_friction * (math.sqrt(gear * gear + 0.25) - 0.5)
+    if motor.brake_start < middle < motor.brake_end:
+        level += motor.brake
+    kinetic = level + stribeck_torque(motor.stribeck, rate, motor.stribeck_rate)
+    return kinetic, motor.stiction_ratio * level + motor.stribeck
+
+
+@compiled
+def axis_friction(structure: Any, angle: float, rate: float, t: float) -> tuple[float, float]:
+    """Return kinetic friction (its size) and stiction of the axis, without Dahl's part [N m]."""
+    level = structure.coulomb * (1.0 - structure.dahl)
+    if structure.bump != 0.0:
+        phase = 2.0 * math.pi * angle / structure.bump_pitch + structure.bump_phase
+        level *= 1.0 + structure.bump * (2.0 * math.exp(2.0 * (math.cos(phase) - 1.0)) - 0.6)
+    if structure.warming != 0.0:
+        level *= 1.0 - structure.warming * (1.0 - math.exp(-t / structure.warming_time))
+    kinetic = level + stribeck_torque(structure.stribeck, rate, structure.stribeck_rate)
+    return kinetic, structure.stiction_ratio * level + structure.stribeck
+
+
+@compiled
+def load_torque(structure: Any, angle: float, t: float, middle: float,
+                elevation: float) -> float:
+    """Return the torque of gravity, wind and shifted ballast about the axis [N m]."""
+    torque = structure.wind
+    if structure.gravity != 0.0:
+        torque -= structure.gravity * math.cos(elevation + angle)
+    if 0.0 <= structure.ballast_at < middle:
+        torque += structure.ballast
+    if structure.gust_frequency[0] > 0.0:
+        for wave in range(GUST_WAVES):
+            torque += structure.gust[wave] * math.sin(
+                structure.gust_frequency[wave] * t + structure.gust_phase[wave])
+    return torque
+
+
+@compiled
+def tach_reading(motor: Any, y: FloatArray, at: int, t: float, middle: float) -> float:
+    """Return what the tachometer gives to the loop and to the recorder [rad/s]."""
+    rate = y[at + TACH] if motor.coupling_frequency > 0.0 else y[at + W]
+    reading = (1.0 + motor.tach_error) * rate + motor.tach_offset
+    if motor.tach_ripple != 0.0:
+        angle = motor.tach_cycles * y[at + THETA] + motor.tach_phase
+        # Commutation: the rounded tops of a rectified wave, without its mean.
+        reading += motor.tach_ripple * rate * 2.0 * (
+            math.sqrt(math.sin(0.5 * angle)**2 + 0.01) - 0.6470)
+    if motor.hum != 0.0:
+        reading += motor.hum * math.sin(MAINS * t)
+    if motor.dropout_length > 0.0:
+        for k in range(DROPOUTS):
+            if motor.dropout[k] >= 0.0 and (
+                    motor.dropout[k] < middle < motor.dropout[k] + motor.dropout_length):
+                reading = 0.0
+    return reading
+
+
+@compiled
+def delayed(y: FloatArray, dy: FloatArray, at: int, value: float, delay: float) -> float:
+    """Pass a value through the [3/4] Pade approximant of a delay; its states start at `at`."""
+    s = 1.0 / delay
+    dy[at] = s * y[at + 1]
+    dy[at + 1] = s * y[at + 2]
+    dy[at + 2] = s * y[at + 3]
+    dy[at + 3] = s * (value - 840.0 * y[at] - 480.0 * y[at + 1] - 120.0 * y[at + 2]
+                      - 16.0 * y[at + 3])
+    return 840.0 * y[at] - 360.0 * y[at + 1] + 60.0 * y[at + 2] - 4.0 * y[at + 3]
+
+
+@compiled
+def bias_voltage(circuit: Any, test: Any, x_2: float, middle: float, switch: int) -> float:
+    """Return v_b of Eq. (9), or of the source that replaces the share circuit [V]."""
+    if test.bias_source > 0.0:
+        return test.bias_voltage if middle >= test.bias_at else 0.0
+    if switch == 0:
+        return circuit.bias_pot * x_2
+    return circuit.bias_pot * (circuit.ceiling if switch > 0 else 0.0)
+
+
+@compiled
+def motor_derivative(motor: Any, machine: Machine, y: FloatArray, dy: FloatArray, at: int,
+                     which: int, t: float, middle: float, mode: ModeArray,
+                     margin: FloatArray, sag: float) -> float:
+    """Fill the derivatives and margins of one motor with its gear; return its gear torque."""
+    structure = machine.structure[0]
+    circuit = machine.circuit[0]
+    xi, v, i, w, theta = y[at + XI], y[at + V], y[at + I], y[at + W], y[at + THETA]
+
+    # Gearbox
+    x, x_rate, gap = gear_deflection(motor, structure, theta, w, y[THETA_A], y[W_A])
+    lag = y[at + LAG_Z]
+    up = contact_torque(motor, x - gap, x_rate, lag)
+    down = contact_torque(motor, -x - gap, -x_rate, -lag)
+    touch = mode[CONTACT + which]
+    gear = up if touch > 0 else (-down if touch < 0 else 0.0)
+    upper, lower = min(x - gap, up), min(-x - gap, down)
+    if touch == 0:
+        margin[CONTACT + which] = -max(upper, lower)
+    else:
+        margin[CONTACT + which] = upper if touch > 0 else lower
+    dy[at + LAG_Z] = 0.0
+    if motor.hysteresis != 0.0:
+        dy[at + LAG_Z] = (x_rate - abs(x_rate) * lag) / 0.03
+
+    # Amplifier 1: PI on the rate error, clamped about the rate's own voltage
+    reading = tach_reading(motor, y, at, t, middle)
+    error = motor.rate_gain * (
+        y[V_C] - motor.tach_gain * reading
+        + motor.side * circuit.counter_torque_gain * y[X_F] + motor.input_offset)
+    if motor.delay > 0.0:
+        error = delayed(y, dy, at + DELAY_AT, error, motor.delay)
+    else:
+        for k in range(4):
+            dy[at + DELAY_AT + k] = 0.0
+    wish = error + xi
+    centre = motor.clamp_slope * w
+    above = wish - (centre + motor.current_limit)
+    below = (centre - motor.current_limit) - wish
+    clamp = mode[CLAMP + which]
+    demand, integrate = wish, 1.0
+    if clamp > 0:
+        margin[CLAMP + which] = above
+        demand = centre + motor.current_limit
+        if error > 0.0:
+            integrate = max(1.0 - max(above, 0.0) / UNDER, 0.0)
+    elif clamp < 0:
+        margin[CLAMP + which] = below
+        demand = centre - motor.current_limit
+        if error < 0.0:
+            integrate = max(1.0 - max(below, 0.0) / UNDER, 0.0)
+    else:
+        margin[CLAMP + which] = -max(above, below)
+    integrate += motor.windup * (1.0 - integrate)
+    dy[at + XI] = integrate * error / motor.integral_time - motor.integrator_leak * xi
+    if motor.slew_limit > 0.0:
+        dy[at + V] = motor.slew_limit * math.tanh((demand - v) / (motor.lag * motor.slew_limit))
+    else:
+        dy[at + V] = (demand - v) / motor.lag
+
+    # Amplifier 2 and armature
+    if motor.dead_zone > 0.0:
+        v -= motor.dead_zone * math.tanh(v / motor.dead_zone)
+    voltage = motor.loop_gain * v - motor.feedback_gain * i
+    limit = motor.voltage_limit - sag
+    rail = mode[VOLTAGE + which]
+    if rail == 0:
+        margin[VOLTAGE + which] = limit - abs(voltage)
+    else:
+        margin[VOLTAGE + which] = rail * voltage - limit
+        voltage = rail * limit
+    warmth = y[at + WARMTH]
+    resistance = motor.resistance * (1.0 + motor.warm_resistance * warmth)
+    strength = 1.0 - motor.warm_torque * warmth
+    dy[at + WARMTH] = (i * i - warmth) / motor.warming_time
+    dy[at + I] = (voltage / motor.ampere_scale - resistance * i
+                  - strength * motor.back_emf * w) / motor.inductance
+
+    # Rotor
+    torque = motor.torque_constant * strength * i
+    if motor.ripple != 0.0 or motor.current_ripple != 0.0:
+        angle = motor.ripple_cycles * theta + motor.ripple_phase
+        shape = (math.sin(angle) + 0.3 * math.sin(2.0 * angle + 1.0)) / 1.044
+        torque += motor.ripple * shape + motor.current_ripple * torque * shape
+    applied = torque - gear
+    slip = mode[FRICTION + which]
+    if slip == 0:
+        direction = 1.0 if applied >= 0.0 else -1.0
+        stiction = motor_friction(motor, 0.0, direction, gear, t, middle)[1]
+        margin[FRICTION + which] = stiction - abs(applied)
+        dy[at + W] = 0.0
+    else:
+        kinetic = motor_friction(motor, w, slip * 1.0, gear, t, middle)[0]
+        drag = slip * kinetic + viscous_torque(motor.viscous, w, 20.0)
+        margin[FRICTION + which] = slip * w
+        dy[at + W] = (applied - drag) / motor.inertia
+    dy[at + THETA] = w
+    dy[at + TACH] = 0.0
+    dy[at + TACH_SLOPE] = 0.0
+    if motor.coupling_frequency > 0.0:
+        pull = motor.coupling_frequency
+        dy[at + TACH] = y[at + TACH_SLOPE]
+        dy[at + TACH_SLOPE] = pull * pull * (w - y[at + TACH]) - 0.1 * pull * y[at + TACH_SLOPE]
+    return gear
+
+
+@compiled
+def structure_derivative(structure: Any, y: FloatArray, dy: FloatArray, t: float,
+                         middle: float, elevation: float, gears: float, mode: ModeArray,
+                         margin: FloatArray) -> None:
+    """Fill the derivatives and the margin of hub, appendages and encoder."""
+    theta_a, w_a = y[THETA_A], y[W_A]
+    applied = structure.gear_ratio * gears + load_torque(
+        structure, theta_a, t, middle, elevation)
+    for k in range(4):
+        angle, rate = y[MODES_AT + 2 * k], y[MODES_AT + 2 * k + 1]
+        if k < 3:
+            inertia, omega = structure.mode_inertia[k], structure.mode_frequency[k]
+            zeta = structure.mode_damping[k]
+        else:
+            inertia, omega = structure.extra_inertia, structure.extra_frequency
+            zeta = structure.extra_damping
+        pull = -omega * omega * (angle - theta_a) - 2.0 * zeta * omega * (rate - w_a)
+        if k == 0 and structure.mode_friction != 0.0:
+            pull -= (structure.mode_friction / inertia
+                     * math.tanh((rate - w_a) / structure.mode_friction_rate))
+        applied -= inertia * pull
+        dy[MODES_AT + 2 * k] = rate
+        dy[MODES_AT + 2 * k + 1] = pull
+    dy[DAHL] = 0.0
+    if structure.dahl != 0.0:
+        applied -= structure.dahl * structure.coulomb * y[DAHL]
+        dy[DAHL] = (w_a - abs(w_a) * y[DAHL]) / structure.dahl_travel
+    slip = mode[AXIS_FRICTION]
+    kinetic, stiction = axis_friction(structure, theta_a, w_a, t)
+    if slip == 0:
+        margin[AXIS_FRICTION] = stiction - abs(applied)
+        dy[W_A] = 0.0
+    else:
+        margin[AXIS_FRICTION] = slip * w_a
+        drag = slip * kinetic + viscous_torque(structure.viscous, w_a, 1.3e-3)
+        dy[W_A] = (applied - drag) / structure.inertia
+    dy[THETA_A] = w_a
+    dy[ENCODER] = 0.0
+    dy[ENCODER_RATE] = 0.0
+    if structure.encoder_frequency > 0.0:
+        omega = structure.encoder_frequency
+        dy[ENCODER] = y[ENCODER_RATE]
+        dy[ENCODER_RATE] = (
+            omega * omega * (theta_a - y[ENCODER])
+            + 2.0 * structure.encoder_damping * omega * (w_a - y[ENCODER_RATE]))
+
+
+@compiled
+def derivative(t: float, middle: float, y: FloatArray, mode: ModeArray, machine: Machine,
+               test: Any, dy: FloatArray, margin: FloatArray) -> None:
+    """
+    Fill the time derivative of the state and the margins of all switches.
+
+    Parameters
+    ----------
+    t : time [s]
+    middle : any time strictly inside the present stretch between two jumps of an input [s];
+        it says on which side of a jump the inputs are to be taken
+    y : state, shape (STATES,)
+    mode : switches, shape (SWITCHES,)
+    machine : the antenna
+    test : record of the test sheet (waveform.TEST)
+    dy : result, shape (STATES,)
+    margin : result, shape (SWITCHES,); negative where a switch has to be thrown
+
+    """
+    circuit = machine.circuit[0]
+    first, second = y[MOTOR_AT + I], y[MOTOR_AT + MOTOR_SIZE + I]
+    x_3, x_2 = y[X_3], y[X_2]
+    rate = command(test, t, middle)
+    dy[V_C] = (circuit.command_gain * rate - y[V_C]) / circuit.command_lag
+    dy[X_3] = -circuit.k_3 * (x_3 + circuit.current_to_voltage * (first + second))
+    load = mode[LOAD_SIGN] * x_3
+    dy[X_2] = -circuit.s_2 * x_2 + circuit.k_2 * (circuit.fade_out + circuit.g_4 * load)
+    margin[LOAD_SIGN] = load
+    saturation = mode[SATURATION]
+    if saturation > 0:
+        margin[SATURATION] = x_2 - circuit.ceiling
+    elif saturation < 0:
+        margin[SATURATION] = -x_2
+    else:
+        margin[SATURATION] = min(x_2, circuit.ceiling - x_2)
+    bias = bias_voltage(circuit, test, x_2, middle, saturation)
+    dy[X_F] = -circuit.filter_pole * y[X_F] + circuit.filter_gain * (
+        bias - circuit.difference_gain * (second - first))
+    sag = machine.structure[0].supply_sag * (abs(first) + abs(second))
+    gears = 0.0
+    for which in range(2):
+        gears += motor_derivative(
+            machine.motors[which], machine, y, dy, MOTOR_AT + which * MOTOR_SIZE, which, t,
+            middle, mode, margin, sag)
+    structure_derivative(machine.structure[0], y, dy, t, middle, test.elevation, gears, mode,
+                         margin)

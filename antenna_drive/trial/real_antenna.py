@@ -1,0 +1,196 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The real antenna: a machine and a test sheet in, what truly happened out.
+
+    machine = reference_machine(circuit='new', filter_1='new')
+    effects.apply('motor_2.torque_ripple', {...}, machine)
+    history = simulate(machine, sheet, times)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+from antenna_drive.trial import equations, integrator, waveform
+from antenna_drive.trial.equations import MOTOR_AT, MOTOR_SIZE
+from antenna_drive.trial.machine import Machine
+from antenna_drive.trial.test_sheet import TestSheet
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+TOLERANCE = 1e-8    # of one step, relative to the size of each state below
+
+
+class SimulationError(RuntimeError):
+    """The equations could not be integrated: the machine is beyond what holds together."""
+
+
+@dataclass(frozen=True)
+class History:
+    """
+    What truly happened, at the asked times. Every array has shape (n,) unless said.
+
+    Attributes
+    ----------
+    time : [s]
+    command : rate command [rad/s]
+    current : of motor 1 and 2, shape (2, n) [A]
+    rate : of the rotors, shape (2, n) [rad/s]
+    tach : what the tachometers give to the loop, shape (2, n) [rad/s]
+    axis_angle, axis_rate : [rad], [rad/s]
+    encoder_angle : of the encoder's own shaft [rad]
+    bias : bias voltage [V]
+    state : all states, shape (n, equations.STATES)
+    steps, rejected, switchings : what the integrator did
+
+    """
+
+    time: FloatArray
+    command: FloatArray
+    current: FloatArray
+    rate: FloatArray
+    tach: FloatArray
+    axis_angle: FloatArray
+    axis_rate: FloatArray
+    encoder_angle: FloatArray
+    bias: FloatArray
+    state: FloatArray
+    steps: int
+    rejected: int
+    switchings: int
+
+
+def start_state(machine: Machine, sheet: TestSheet, place: tuple[float, float]) -> FloatArray:
+    """
+    Return the state at rest, shape (equations.STATES,).
+
+    Parameters
+    ----------
+    machine : the antenna
+    sheet : says whether the share circuit has settled (bias: start)
+    place : where each motor stands inside its gap, -1 to 1
+
+    """
+    y = np.zeros(equations.STATES)
+    circuit = machine.circuit[0]
+    if sheet.bias['type'] == 'circuit' and sheet.bias.get('start', 'steady') == 'steady':
+        y[equations.X_2] = circuit['k_2'] * circuit['fade_out'] / circuit['s_2']
+    for which in range(2):
+        motor = machine.motors[which]
+        at = MOTOR_AT + which * MOTOR_SIZE
+        y[at + equations.THETA] = place[which] * motor['half_gap']
+        # Teeth's own errors shift the gap: turn the motor until it stands where it is said to.
+        for _ in range(50):
+            x, _, gap = equations.gear_deflection(
+                motor, machine.structure[0], y[at + equations.THETA], 0.0, 0.0, 0.0)
+            y[at + equations.THETA] -= 0.5 * (x - place[which] * gap)
+    return y
+
+
+def _sizes(machine: Machine) -> FloatArray:
+    """Return the typical size of each state, by which its error is judged."""
+    size = np.ones(equations.STATES)
+    per_axis = 1.0 / float(machine.structure[0]['gear_ratio'])
+    size[equations.AXIS_AT:] = per_axis
+    size[equations.DAHL] = 1.0
+    for which in range(2):
+        at = MOTOR_AT + which * MOTOR_SIZE
+        size[at + equations.DELAY_AT:at + equations.DELAY_AT + 4] = 1e-2
+        size[at + equations.TACH_SLOPE] = 100.0
+    return size
+
+
+def simulate(machine: Machine, sheet: TestSheet, times: FloatArray,
+             place: tuple[float, float] = (0.0, 0.0),
+             tolerance: float = TOLERANCE) -> History:
+    """
+    Run one test from rest and give the true signals.
+
+    Parameters
+    ----------
+    machine : the antenna with its imperfections
+    sheet : the test
+    times : when the signals are wanted, ascending, not before 0, shape (n,) [s]
+    place : where each motor stands inside its gap at the start, -1 to 1
+    tolerance : largest error of one integration step, unit 1
+
+    Raises
+    ------
+    SimulationError : the integration broke down; the message says where
+
+    """
+    test = sheet.record()
+    end = float(times[-1])
+    y = start_state(machine, sheet, place)
+    mode = np.zeros(equations.SWITCHES, np.int64)
+    mode[equations.LOAD_SIGN] = 1
+    states = np.full((len(times), equations.STATES), math.nan)
+    statistics = np.zeros(3, np.int64)
+    edges = _edges(machine, test[0], end)
+    reason = integrator.integrate(machine, test[0], y, mode, edges, times, tolerance,
+                                  _sizes(machine), states, statistics)
+    if reason != integrator.DONE:
+        filled = int(np.count_nonzero(np.isfinite(states[:, 0])))
+        what = {integrator.STEP_TOO_SMALL: 'the step became too small',
+                integrator.NOT_FINITE: 'a state is not finite',
+                integrator.CHATTER: 'a switch chatters'}[reason]
+        raise SimulationError(f'{what} after sample {filled} of {len(times)}')
+    return _history(machine, test, times, states, edges, statistics)
+
+
+def _edges(machine: Machine, test: np.void, end: float) -> FloatArray:
+    """Return all times at which something outside the state jumps or bends [s]."""
+    edges = list(waveform.corners(test, end))
+    structure = machine.structure[0]
+    edges.append(float(structure['ballast_at']))
+    for motor in machine.motors:
+        edges += [float(motor['brake_start']), float(motor['brake_end'])]
+        if motor['dropout_length'] > 0.0:
+            starts = motor['dropout'][motor['dropout'] >= 0.0]
+            edges += [*starts, *(starts + motor['dropout_length'])]
+    return np.array(sorted({float(t) for t in edges if 0.0 < t < end}), dtype=np.float64)
+
+
+def _history(machine: Machine, test: NDArray[np.void], times: FloatArray, states: FloatArray,
+             edges: FloatArray, statistics: NDArray[np.int64]) -> History:
+    bounds = np.concatenate(([0.0], edges, [np.inf]))
+    stretch = np.searchsorted(bounds, times, side='right') - 1
+    middles = np.where(np.isfinite(bounds[stretch + 1]),
+                       0.5 * (bounds[stretch] + bounds[stretch + 1]), bounds[stretch] + 1.0)
+    record = test[0]
+    count = len(times)
+    command, bias, tach = np.empty(count), np.empty(count), np.empty((2, count))
+    ceiling = float(machine.circuit[0]['ceiling'])
+    for k in range(count):
+        t, middle, y = times[k], middles[k], states[k]
+        command[k] = waveform.command(record, t, middle)
+        x_2 = min(max(y[equations.X_2], 0.0), ceiling)
+        bias[k] = equations.bias_voltage(machine.circuit[0], record, x_2, middle, 0)
+        for which in range(2):
+            tach[which, k] = equations.tach_reading(
+                machine.motors[which], y, MOTOR_AT + which * MOTOR_SIZE, t, middle)
+    encoder = (states[:, equations.ENCODER] if machine.structure[0]['encoder_frequency'] > 0.0
+               else states[:, equations.THETA_A])
+    columns = [MOTOR_AT + which * MOTOR_SIZE for which in range(2)]
+    return History(
+        time=times, command=command,
+        current=states[:, [at + equations.I for at in columns]].T,
+        rate=states[:, [at + equations.W for at in columns]].T,
+        tach=tach, axis_angle=states[:, equations.THETA_A],
+        axis_rate=states[:, equations.W_A], encoder_angle=encoder, bias=bias, state=states,
+        steps=int(statistics[0]), rejected=int(statistics[1]), switchings=int(statistics[2]))

@@ -1,0 +1,114 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+What the tester sets and knows: waveform, bias, sensors. Written beside every recording.
+
+The YAML is that of the diagnosis' input format; phases of a square or triangle are in periods,
+those of a multisine in radians, and a sine of phase zero starts at zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+import math
+from typing import Any
+
+from antenna_drive.trial import waveform
+import numpy as np
+from numpy.typing import NDArray
+
+SHAPES = {'square': waveform.SQUARE, 'triangle': waveform.TRIANGLE,
+          'multisine': waveform.MULTISINE, 'chirp': waveform.CHIRP}
+
+
+@dataclass(frozen=True)
+class SensorGrade:
+    """How good the recorder's sensors are: one standard deviation, one digit."""
+
+    current_noise_A: float = 0.01
+    current_step_A: float = 0.01
+    tach_noise_rad_s: float = 0.0035
+    tach_noise_relative: float = 0.0015
+    tach_step_rad_s: float = 0.002
+    encoder_bits: int = 21
+    bias_noise_V: float = 0.01
+    bias_step_V: float = 0.01
+
+
+@dataclass(frozen=True)
+class TestSheet:
+    """
+    One test: what was commanded, how the bias was made, what the sensors can do.
+
+    Attributes
+    ----------
+    circuit, filter_1 : constants of Table 1, 'old' or 'new'
+    bias : mapping of the input format: circuit, fixed or fixed_step
+    waveform : mapping of the input format: square, triangle, multisine or chirp; empty: rest
+    elevation_deg : elevation at the start [deg]
+    sensors : grade of the sensors
+    parameter_tolerance : how far the machine may be from the reference, unit 1
+
+    """
+
+    __test__ = False    # not a test case, whatever pytest makes of the name
+
+    circuit: str
+    filter_1: str
+    bias: Mapping[str, Any]
+    waveform: Mapping[str, Any]
+    elevation_deg: float = 45.0
+    sensors: SensorGrade = SensorGrade()
+    parameter_tolerance: float = 0.02
+
+    def plain(self) -> dict[str, Any]:
+        """Return the sheet as the YAML file holds it."""
+        return {
+            'circuit': self.circuit, 'filter_1': self.filter_1, 'bias': dict(self.bias),
+            'waveform': dict(self.waveform), 'start': 'rest',
+            'elevation_deg': self.elevation_deg, 'sensors': asdict(self.sensors),
+            'parameter_tolerance': self.parameter_tolerance}
+
+    def record(self) -> NDArray[Any]:
+        """Return the record that the compiled equations read, shape (1,), waveform.TEST."""
+        test = np.zeros(1, waveform.TEST)
+        record = test[0]
+        record['elevation'] = math.radians(self.elevation_deg)
+        record['period'] = record['duration'] = 1.0
+        if self.bias['type'] != 'circuit':
+            record['bias_source'] = 1.0
+            record['bias_voltage'] = self.bias['voltage_V']
+            record['bias_at'] = self.bias.get('at_s', 0.0)
+        if not self.waveform:
+            record['shape'] = waveform.REST
+            return test
+        shape = self.waveform
+        record['shape'] = SHAPES[shape['type']]
+        record['amplitude'] = math.radians(shape['amplitude_deg_s'])
+        record['start'] = shape.get('start_s', 0.0)
+        if shape['type'] in ('square', 'triangle'):
+            record['period'] = shape['period_s']
+            record['phase'] = shape.get('phase', 0.0)
+        elif shape['type'] == 'multisine':
+            count = len(shape['frequencies_hz'])
+            record['sines'] = count
+            record['frequency'][:count] = shape['frequencies_hz']
+            record['weight'][:count] = shape['weights']
+            record['sine_phase'][:count] = shape['phases']
+        else:
+            record['first_frequency'] = shape['f0_hz']
+            record['last_frequency'] = shape['f1_hz']
+            record['duration'] = shape['duration_s']
+        return test

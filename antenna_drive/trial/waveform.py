@@ -1,0 +1,107 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The rate command and the bias source of a test, as the compiled equations see them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from antenna_drive.trial.compiled import compiled
+import numpy as np
+from numpy.typing import NDArray
+
+SQUARE, TRIANGLE, MULTISINE, CHIRP, REST = 0, 1, 2, 3, 4
+MOST_SINES = 32
+
+TEST = np.dtype([(name, np.float64) for name in (
+    'shape',                    # one of the constants above
+    'amplitude',                # [rad/s]
+    'period',                   # [s]
+    'phase',                    # in periods
+    'start', 'duration',        # [s]
+    'first_frequency', 'last_frequency',              # of a chirp [Hz]
+    'sines',                    # how many
+    'bias_source',              # 0: share circuit, 1: a source
+    'bias_voltage', 'bias_at',  # of the source [V], [s]
+    'elevation',                # at the start [rad]
+)] + [
+    ('frequency', np.float64, (MOST_SINES,)),         # [Hz]
+    ('weight', np.float64, (MOST_SINES,)),
+    ('sine_phase', np.float64, (MOST_SINES,)),        # [rad]
+])
+
+
+@compiled
+def command(test: Any, t: float, middle: float) -> float:
+    """
+    Return the rate command [rad/s].
+
+    Parameters
+    ----------
+    test : a TEST record
+    t : time [s]
+    middle : time within the same stretch between two corners, which selects the branch [s]
+
+    """
+    if test.shape == SQUARE:
+        cycle = middle / test.period + test.phase
+        return test.amplitude if cycle - math.floor(cycle) < 0.5 else -test.amplitude
+    if test.shape == TRIANGLE:
+        cycle = middle / test.period + test.phase
+        turn = math.floor(cycle + 0.25)         # quarter before the rise through zero
+        place = t / test.period + test.phase - turn
+        if cycle - turn < 0.25:
+            return 4.0 * test.amplitude * place
+        return 4.0 * test.amplitude * (0.5 - place)
+    if test.shape == REST or middle < test.start:
+        return 0.0
+    if test.shape == MULTISINE:
+        total = 0.0
+        for k in range(int(test.sines)):
+            total += test.weight[k] * math.sin(
+                2.0 * math.pi * test.frequency[k] * (t - test.start) + test.sine_phase[k])
+        return test.amplitude * total
+    if middle > test.start + test.duration:
+        return 0.0
+    tau = t - test.start
+    sweep = (test.last_frequency - test.first_frequency) / test.duration
+    return test.amplitude * math.sin(
+        2.0 * math.pi * (test.first_frequency * tau + 0.5 * sweep * tau * tau))
+
+
+def corners(test: Any, end: float) -> NDArray[np.float64]:
+    """
+    Return the times between 0 and `end` at which the command or the bias is not smooth [s].
+
+    Parameters
+    ----------
+    test : a TEST record
+    end : end of the test [s]
+
+    """
+    times: list[float] = []
+    if test['bias_source'] > 0.0:
+        times.append(float(test['bias_at']))
+    if test['shape'] in (SQUARE, TRIANGLE):
+        period, phase = float(test['period']), float(test['phase'])
+        shift = 0.0 if test['shape'] == SQUARE else 0.25
+        last = math.ceil(2.0 * (end / period + phase)) + 1
+        first = math.floor(2.0 * phase) - 1
+        times += [(0.5 * k + shift - phase) * period for k in range(first, last + 1)]
+    elif test['shape'] != REST:
+        times.append(float(test['start']))
+        if test['shape'] == CHIRP:
+            times.append(float(test['start'] + test['duration']))
+    return np.array(sorted({t for t in times if 0.0 < t < end}))
