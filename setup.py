@@ -96,6 +96,7 @@ setup(
             'flake8-import-order',
             'flake8-quotes',
             'pydocstyle >= 6.1',
+            'vermin',  # tells what the oldest Python lacks
         ],
         'colcon': ['colcon-core >= 0.15', 'colcon-ros', 'colcon-common-extensions'],
     },

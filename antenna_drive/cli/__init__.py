@@ -50,7 +50,7 @@ class Command(NamedTuple):
     """One subcommand: the module that does it, and what it does in one line."""
 
     module: str
-    help: str  # noqa: A003 (argparse's own word)
+    summary: str
 
 
 COMMANDS = {
@@ -95,7 +95,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Parameters
     ----------
-    argv : arguments without the program's name; None for those of the process
+    argv
+        arguments without the program's name; None for those of the process
 
     Returns
     -------
@@ -106,9 +107,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     # No option before the command takes a value, so the first plain word is the command.
     name = next((word for word in arguments if not word.startswith('-')), '')
     try:
-        status = _run(name, arguments)
-        sys.stdout.flush()
-        return status
+        try:
+            return _run(name, arguments)
+        finally:
+            sys.stdout.flush()
     except BrokenPipeError:
         # The reader has gone. Python would complain again when it flushes at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -149,12 +151,12 @@ def _run(name: str, arguments: list[str]) -> int:
     module: ModuleType | None = None
     for command_name, command in commands.items():
         if command_name != name:
-            subparsers.add_parser(command_name, help=command.help)
+            subparsers.add_parser(command_name, help=command.summary)
             continue
         # Only the command asked for is imported: the compiled physics takes a while to load.
         module = importlib.import_module(f'{__name__}.{command.module}')
         module.add_arguments(subparsers.add_parser(
-            command_name, help=command.help, description=module.__doc__,
+            command_name, help=command.summary, description=module.__doc__,
             formatter_class=argparse.RawDescriptionHelpFormatter))
     parsed = parser.parse_args(arguments)
     assert module is not None  # parse_args has left by now unless there was a command

@@ -49,8 +49,10 @@ def write_json(result: object, target: str | os.PathLike[str]) -> None:
 
     Parameters
     ----------
-    result : made of mappings with texts as keys, sequences, numbers, texts, None
-    target : a file, or '-' for standard output
+    result
+        made of mappings with texts as keys, sequences, numbers, texts, None
+    target
+        a file, or '-' for standard output
 
     Raises
     ------

@@ -1,0 +1,190 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The antenna-drive command: what it lists, what it imports, how it fails."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+import signal
+import subprocess
+import sys
+
+from antenna_drive import __version__, cli
+from antenna_drive.errors import UserError
+from antenna_drive.parameters.schema import ParameterError
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+FakeCommand = Callable[[str], None]
+MODULE = """\
+import signal
+
+def add_arguments(parser):
+    pass
+
+def run(args):
+    {}
+"""
+PROGRAM = """\
+import sys
+from antenna_drive import cli
+
+cli.__path__.append({!r})
+cli.COMMANDS['fake'] = cli.Command('fake', '')
+sys.exit(cli.main(['fake']))
+"""
+
+
+@pytest.fixture
+def fake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FakeCommand:
+    """Return a function that gives the command a subcommand `fake` with this body."""
+    def write(body: str) -> None:
+        (tmp_path / 'fake.py').write_text(MODULE.format(body))
+        monkeypatch.setattr(cli, '__path__', [*cli.__path__, str(tmp_path)])
+        monkeypatch.setitem(cli.COMMANDS, 'fake', cli.Command('fake', 'for tests'))
+        monkeypatch.delitem(sys.modules, 'antenna_drive.cli.fake', raising=False)
+    return write
+
+
+def start(tmp_path: Path, body: str) -> subprocess.Popen[str]:
+    """Start the command in a process of its own, with a subcommand `fake` of this body."""
+    (tmp_path / 'fake.py').write_text(MODULE.format(body))
+    program = PROGRAM.format(str(tmp_path))
+    return subprocess.Popen([sys.executable, '-c', program], cwd=ROOT, text=True,
+                            stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+
+def test_help_lists_what_is_there(capsys: pytest.CaptureFixture[str]) -> None:
+    """Every command whose file is there is listed, and no other."""
+    with pytest.raises(SystemExit) as left:
+        cli.main(['--help'])
+    assert left.value.code == 0
+    listed = [line.split()[0] for line in capsys.readouterr().out.splitlines()
+              if line.startswith('    ')]
+    folder = ROOT / 'antenna_drive' / 'cli'
+    assert [name for name in listed if name in cli.COMMANDS] == [
+        name for name, command in cli.COMMANDS.items()
+        if (folder / f'{command.module}.py').is_file()]
+
+
+def test_every_command_file_is_listed() -> None:
+    """No file of the folder is forgotten in the list of commands."""
+    files = {path.stem for path in (ROOT / 'antenna_drive' / 'cli').glob('*.py')}
+    assert files - {'__init__', 'output'} <= {c.module for c in cli.COMMANDS.values()}
+
+
+def test_help_imports_nothing_heavy() -> None:
+    """Help comes at once: the compiler, ROS 2 and the scientific libraries stay out of it."""
+    done = subprocess.run(
+        [sys.executable, '-c', 'import sys\nfrom antenna_drive import cli\n'
+         'try:\n    cli.main(["--help"])\nexcept SystemExit:\n    print(*sys.modules)'],
+        cwd=ROOT, text=True, capture_output=True, check=True)
+    assert not {'numba', 'scipy', 'numpy', 'rclpy', 'yaml'} & set(done.stdout.split())
+
+
+@pytest.mark.parametrize('name', list(cli.available()))
+def test_every_command_teaches(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Each command's help says what it does."""
+    with pytest.raises(SystemExit) as left:
+        cli.main([name, '--help'])
+    assert left.value.code == 0
+    assert f'usage: antenna-drive {name}' in capsys.readouterr().out
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    """The version is the package's."""
+    with pytest.raises(SystemExit):
+        cli.main(['--version'])
+    assert capsys.readouterr().out == f'antenna-drive {__version__}\n'
+
+
+def test_no_command(capsys: pytest.CaptureFixture[str]) -> None:
+    """Without a command the usage is shown, and the exit code is that of wrong input."""
+    with pytest.raises(SystemExit) as left:
+        cli.main([])
+    assert left.value.code == cli.BAD_INPUT
+    assert 'usage: antenna-drive' in capsys.readouterr().err
+
+
+def test_misspelt_command(fake: FakeCommand, capsys: pytest.CaptureFixture[str]) -> None:
+    """A misspelt command gets a guess at what was meant."""
+    fake('return 0')
+    assert cli.main(['fkae']) == cli.BAD_INPUT
+    assert capsys.readouterr().err == (
+        'antenna-drive fkae: no such command, did you mean fake?\n')
+
+
+def test_exit_code_is_the_commands(fake: FakeCommand) -> None:
+    """What the command returns is the exit code."""
+    fake('return 1')
+    assert cli.main(['fake']) == 1
+
+
+@pytest.mark.parametrize('error', [UserError, ParameterError])
+def test_user_errors_are_one_line(fake: FakeCommand, error: type[UserError],
+                                  capsys: pytest.CaptureFixture[str]) -> None:
+    """An error that is the user's to mend is one line without a traceback."""
+    fake(f'from {error.__module__} import {error.__name__} as E; raise E("a.yaml:\\n  b: wrong")')
+    assert cli.main(['fake']) == cli.BAD_INPUT
+    assert capsys.readouterr().err == 'antenna-drive fake: a.yaml: b: wrong\n'
+
+
+def test_missing_file(fake: FakeCommand, tmp_path: Path,
+                      capsys: pytest.CaptureFixture[str]) -> None:
+    """The operating system's refusals name the file."""
+    missing = tmp_path / 'missing.csv'
+    fake(f'open({str(missing)!r})')
+    assert cli.main(['fake']) == cli.BAD_INPUT
+    assert capsys.readouterr().err == (
+        f'antenna-drive fake: {missing}: No such file or directory\n')
+
+
+def test_missing_installation(fake: FakeCommand, monkeypatch: pytest.MonkeyPatch,
+                              capsys: pytest.CaptureFixture[str]) -> None:
+    """A library that a plain installation lacks is named with the way to get it."""
+    fake('import rclpy.node')
+    monkeypatch.setitem(sys.modules, 'rclpy', None)
+    assert cli.main(['fake']) == cli.NOT_INSTALLED
+    error = capsys.readouterr().err
+    assert error.startswith('antenna-drive fake: needs rclpy: source a ROS 2')
+    assert error.count('\n') == 1
+
+
+def test_faults_of_ours_are_not_hidden(fake: FakeCommand) -> None:
+    """A fault of the program keeps its traceback."""
+    fake('import no_such_module_of_ours')
+    with pytest.raises(ModuleNotFoundError):
+        cli.main(['fake'])
+
+
+def test_interrupt(tmp_path: Path) -> None:
+    """Ctrl-C ends a command with one line and the exit code that shells give it."""
+    process = start(tmp_path, 'print("ready", flush=True); signal.pause()')
+    assert process.stdout is not None
+    assert process.stdout.readline() == 'ready\n'
+    process.send_signal(signal.SIGINT)
+    _, error = process.communicate(timeout=30)
+    assert (process.returncode, error) == (130, 'antenna-drive fake: interrupted\n')
+
+
+def test_reader_gone(tmp_path: Path) -> None:
+    """A command whose output is cut short, as by head, ends in silence."""
+    process = start(tmp_path, 'print("line\\n" * 100000)')
+    assert process.stdout is not None and process.stderr is not None
+    assert process.stdout.readline() == 'line\n'
+    process.stdout.close()
+    assert process.stderr.read() == ''
+    assert process.wait(timeout=30) == 141
+    process.stderr.close()

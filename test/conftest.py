@@ -1,0 +1,84 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What every test may count on: a ROS 2 domain of its own, on this machine alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import fcntl
+import os
+from pathlib import Path
+import tempfile
+from typing import IO
+
+import pytest
+
+# Domains 0 to 101 use ports that no operating system hands out; 0 is where people work.
+DOMAINS = range(1, 102)
+
+
+class DomainClaim:
+    """A ROS 2 domain that no other test process on this machine has while this one holds it."""
+
+    def __init__(self) -> None:
+        """
+        Claim a free domain.
+
+        Raises
+        ------
+        RuntimeError : all of them are taken
+
+        """
+        # Start at a different place in each process, so that one that does not ask is unlikely
+        # to be met: not every test suite of a machine claims its domain.
+        start = os.getpid() % len(DOMAINS)
+        for number in (*DOMAINS[start:], *DOMAINS[:start]):
+            path = Path(tempfile.gettempdir(), f'antenna_drive-test-domain-{number}.lock')
+            lock = path.open('w')
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                lock.close()
+                continue
+            self.number = number
+            self._lock: IO[str] = lock
+            return
+        raise RuntimeError('every ROS 2 domain is taken by another test process')
+
+    def release(self) -> None:
+        """Give the domain back."""
+        self._lock.close()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Put the whole session, and every process that it starts, into a domain of its own."""
+    claim = DomainClaim()
+    config.add_cleanup(claim.release)
+    os.environ['ROS_DOMAIN_ID'] = str(claim.number)
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+
+@pytest.fixture(scope='session')
+def session_domain() -> int:
+    """Return the ROS 2 domain of this session, which is in the environment already."""
+    return int(os.environ['ROS_DOMAIN_ID'])
+
+
+@pytest.fixture
+def fresh_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """Put one test, and the processes that it starts, into a domain apart from the others."""
+    claim = DomainClaim()
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(claim.number))
+    yield claim.number
+    claim.release()
