@@ -22,6 +22,7 @@ from pathlib import Path
 import tempfile
 from typing import IO
 
+from installations import colcon_build, Workspace
 import pytest
 
 # Domains 0 to 101 use ports that no operating system hands out; 0 is where people work.
@@ -82,3 +83,15 @@ def fresh_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     monkeypatch.setenv('ROS_DOMAIN_ID', str(claim.number))
     yield claim.number
     claim.release()
+
+
+@pytest.fixture(scope='session')
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    """Return a workspace with the package built in it by `colcon build`."""
+    return colcon_build(tmp_path_factory.mktemp('workspace'))
+
+
+@pytest.fixture(scope='session')
+def linked_workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    """Return a workspace with the package built by `colcon build --symlink-install`."""
+    return colcon_build(tmp_path_factory.mktemp('linked_workspace'), '--symlink-install')

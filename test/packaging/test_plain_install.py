@@ -1,0 +1,112 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A plain `pip install` without ROS 2, in a virtual environment of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import subprocess
+import sys
+
+from antenna_drive.cli import NOT_INSTALLED, REMEDIES
+from installations import copy_source, NODES, outside_environment, ROOT
+import pytest
+
+pytestmark = pytest.mark.slow
+IMPORT_EVERYTHING = """
+import importlib, pkgutil
+import antenna_drive
+
+for found in pkgutil.walk_packages(antenna_drive.__path__, 'antenna_drive.'):
+    if found.name == 'antenna_drive.__main__':
+        continue
+    try:
+        importlib.import_module(found.name)
+    except ModuleNotFoundError as error:
+        print(found.name, error.name.partition('.')[0])
+"""
+
+
+@pytest.fixture(scope='module')
+def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a virtual environment with the package and what it needs, and nothing else."""
+    folder = tmp_path_factory.mktemp('plain')
+    subprocess.run([sys.executable, '-I', '-m', 'venv', folder / 'venv'], check=True)
+    source = copy_source(folder / 'source')
+    done = subprocess.run(
+        [folder / 'venv' / 'bin' / 'python', '-m', 'pip', 'install', '--quiet', source],
+        env=outside_environment(), cwd=folder, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    assert done.returncode == 0, done.stdout
+    return folder / 'venv'
+
+
+def run(prefix: Path, program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run a program of the virtual environment as a user outside of the source tree does."""
+    return subprocess.run([prefix / 'bin' / program, *arguments], cwd=prefix, text=True,
+                          env=outside_environment(), capture_output=True)
+
+
+def test_ros_2_is_absent(prefix: Path) -> None:
+    """The premise of this file: nothing here brings ROS 2 along."""
+    assert run(prefix, 'python', '-c', 'import rclpy').returncode == 1
+
+
+def test_help(prefix: Path) -> None:
+    """The command is on the path and teaches."""
+    done = run(prefix, 'antenna-drive', '--help')
+    assert (done.returncode, done.stderr) == (0, '')
+    assert 'usage: antenna-drive' in done.stdout
+
+
+def test_module(prefix: Path) -> None:
+    """`python -m antenna_drive` is the same command."""
+    assert (run(prefix, 'python', '-m', 'antenna_drive', '--version').stdout
+            == run(prefix, 'antenna-drive', '--version').stdout != '')
+
+
+def test_config(prefix: Path) -> None:
+    """The parameter files are installed in share, and found."""
+    done = run(prefix, 'python', '-c', 'from antenna_drive.parameters.files import config_dir; '
+                                       'print(config_dir())')
+    shared = prefix / 'share' / 'antenna_drive' / 'config'
+    assert done.stdout.strip() == str(shared), done.stderr
+    assert (sorted(str(path.relative_to(shared)) for path in shared.rglob('*'))
+            == sorted(str(path.relative_to(ROOT / 'config'))
+                      for path in (ROOT / 'config').rglob('*')) != [])
+
+
+def test_everything_but_the_nodes_can_be_imported(prefix: Path) -> None:
+    """Only the rooms of ROS 2 need ROS 2, and every other lack has its remedy."""
+    done = run(prefix, 'python', '-c', IMPORT_EVERYTHING)
+    assert done.returncode == 0, done.stderr
+    missing = dict(line.split() for line in done.stdout.splitlines())
+    ros = {name for name, module in missing.items() if 'ROS 2' in REMEDIES[module]}
+    assert {name for name in ros if name.split('.')[1] not in ('lockstep', 'nodes')} == set()
+
+
+@pytest.mark.parametrize('node', NODES)
+def test_node_says_what_is_missing(prefix: Path, node: str) -> None:
+    """A node says in one line what is missing and how to get it."""
+    done = run(prefix, node)
+    assert (done.returncode, done.stdout) == (NOT_INSTALLED, '')
+    assert done.stderr.count('\n') == 1
+    assert 'rclpy' in done.stderr and 'ROS 2' in done.stderr
+
+
+def test_command_that_needs_nodes(prefix: Path) -> None:
+    """A command that starts nodes says it as well."""
+    done = run(prefix, 'antenna-drive', 'lockstep-check', '--duration', '0.1')
+    assert (done.returncode, done.stdout) == (NOT_INSTALLED, '')
+    assert done.stderr.count('\n') == 1 and 'ROS 2' in done.stderr
