@@ -81,10 +81,12 @@ setup(
     extras_require={
         'ros': [f'{wheel} ; {WHEELS_EXIST}' for wheel in KILTED],
         'plot': ['matplotlib >= 3.6'],
-        'recording': ['rosbags >= 0.10'],
+        # the first release that can complete a chunk on demand
+        'recording': ['mcap >= 1.6'],
         'test': [
             'pytest >= 7.4',
             'hypothesis >= 6.80',
+            'rosbags >= 0.10',  # reads what mcap wrote
             'mypy >= 1.8',
             'types-PyYAML',
             # the linters of ament_flake8 and ament_pep257

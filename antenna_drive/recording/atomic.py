@@ -1,0 +1,105 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""New files and folders that appear whole or not at all, and never in the place of another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import os
+from pathlib import Path
+import shutil
+import tempfile
+from typing import IO
+
+from antenna_drive.recording.recording import RecordingError
+
+
+def refuse_existing(path: Path) -> None:
+    """
+    Check that nothing is in the place of a new file or folder.
+
+    Raises
+    ------
+    RecordingError : there is something
+
+    """
+    if path.exists() or path.is_symlink():
+        raise RecordingError(f'{path}: exists already; remove it or choose another name')
+
+
+def refuse_io(path: Path, error: OSError) -> RecordingError:
+    """Return the one-line error of a file or folder that cannot be written."""
+    return RecordingError(f'{path}: cannot be written, {error.strerror or error}')
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[IO[bytes]]:
+    """
+    Give a stream that becomes the file `path` at the end, if all went well.
+
+    Raises
+    ------
+    RecordingError : the file exists already or cannot be written
+
+    """
+    refuse_existing(path)
+    try:
+        handle, draft = tempfile.mkstemp(dir=path.parent, prefix=f'.{path.name}.')
+    except OSError as error:
+        raise refuse_io(path, error) from error
+    try:
+        with open(handle, 'wb') as stream:
+            yield stream
+            stream.flush()
+            os.fsync(stream.fileno())
+            os.fchmod(stream.fileno(), 0o666 & ~_umask())
+        refuse_existing(path)
+        os.rename(draft, path)
+    except OSError as error:
+        raise refuse_io(path, error) from error
+    finally:
+        Path(draft).unlink(missing_ok=True)
+
+
+@contextmanager
+def new_folder(path: Path) -> Iterator[Path]:
+    """
+    Give a folder that becomes `path` at the end, if all went well.
+
+    Raises
+    ------
+    RecordingError : there is something at `path` already, or it cannot be written
+
+    """
+    refuse_existing(path)
+    try:
+        draft = Path(tempfile.mkdtemp(dir=path.parent, prefix=f'.{path.name}.'))
+    except OSError as error:
+        raise refuse_io(path, error) from error
+    try:
+        yield draft
+        draft.chmod(0o777 & ~_umask())
+        refuse_existing(path)
+        os.rename(draft, path)
+    except OSError as error:
+        raise refuse_io(path, error) from error
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,51 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Read a recording, whatever format it is in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from antenna_drive.recording.bam import read_bam
+from antenna_drive.recording.csv_format import read_csv
+from antenna_drive.recording.recording import Recording, RecordingError
+
+
+def read_recording(path: str | Path, *, partial: bool = False) -> Recording:
+    """
+    Read a rosbag2 folder, a file .mcap or .csv, or a servo's log .json.
+
+    Parameters
+    ----------
+    path : the folder or file
+    partial : read what can be read of a bag that was cut off or damaged
+
+    Raises
+    ------
+    RecordingError : there is nothing at `path`, or it is no recording that can be read
+    ParameterError : the test sheet beside a CSV is none
+
+    """
+    path = Path(path)
+    if not path.exists():
+        raise RecordingError(f'{path}: no such file or folder')
+    if path.is_dir() or path.suffix == '.mcap':
+        # CSV needs no library: the one for MCAP is asked for only where it is used
+        from antenna_drive.recording.mcap_format import read_bag
+        return read_bag(path, partial=partial)
+    readers = {'.csv': read_csv, '.json': read_bam}
+    if path.suffix not in readers:
+        raise RecordingError(f'{path}: no recording; allowed are a bag (a folder, or .mcap), '
+                             '.csv and .json')
+    return readers[path.suffix](path)

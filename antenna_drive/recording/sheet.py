@@ -1,0 +1,277 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The test sheet: what the tester knows of a recording and no sensor shows.
+
+A YAML file NAME.yaml beside NAME.csv; inside a bag it travels as an attachment. Every entry is
+optional, and None means 'not known'. An entry that is not allowed is refused with one line that
+names the file, the key and what is allowed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
+import math
+from pathlib import Path
+from typing import Any, ClassVar, get_args, get_type_hints
+
+from antenna_drive.parameters.schema import Entry, nearest, ParameterError
+from antenna_drive.recording.plain import one_line
+from antenna_drive.recording.plain_yaml import read_yaml
+import yaml
+
+FILE_NAME = 'test_sheet.yaml'
+
+
+def _entry(unit: str, description: str, low: float = -math.inf, high: float = math.inf,
+           **allowed: Any) -> Any:
+    """Declare one optional entry and what may be said in it."""
+    return field(default=None, metadata={
+        'entry': Entry(unit, low, high, description, **allowed)})
+
+
+def _numbers(unit: str, description: str, low: float = -math.inf) -> Any:
+    """Declare a list of numbers, as many as the tester wants."""
+    return field(default=None, metadata={
+        'each': Entry(unit, low, description=description)})
+
+
+def _choice(description: str, *choices: str) -> Any:
+    return _entry('', description, choices=choices)
+
+
+@dataclass(frozen=True)
+class CircuitBias:
+    """The torque-share circuit asks for the bias."""
+
+    kind: ClassVar[str] = 'circuit'
+    bias_pot: float | None = _entry('1', 'setting of the bias pot, k_p', 0.0, 1.0)
+    start: str | None = _choice("the circuit's states at the start", 'steady', 'zero')
+
+
+@dataclass(frozen=True)
+class FixedBias:
+    """A source gives the bias voltage; the torque-share circuit is not connected."""
+
+    kind: ClassVar[str] = 'fixed'
+    voltage_V: float | None = _entry('V', 'bias voltage')
+
+
+@dataclass(frozen=True)
+class FixedStepBias:
+    """A source gives 0 V, and from one moment on the bias voltage."""
+
+    kind: ClassVar[str] = 'fixed_step'
+    voltage_V: float | None = _entry('V', 'bias voltage after the step')
+    at_s: float | None = _entry('s', 'time of the step')
+
+
+Bias = CircuitBias | FixedBias | FixedStepBias
+
+
+@dataclass(frozen=True)
+class Square:
+    """A square wave, positive in its first half."""
+
+    kind: ClassVar[str] = 'square'
+    amplitude_deg_s: float | None = _entry('deg/s', 'amplitude of the rate command')
+    period_s: float | None = _entry('s', 'period', 1e-3)
+    phase: float | None = _entry('1', 'phase at the start, in periods')
+
+
+@dataclass(frozen=True)
+class Triangle:
+    """A symmetric triangle that starts at zero and rises."""
+
+    kind: ClassVar[str] = 'triangle'
+    amplitude_deg_s: float | None = _entry('deg/s', 'amplitude of the rate command')
+    period_s: float | None = _entry('s', 'period', 1e-3)
+    phase: float | None = _entry('1', 'phase at the start, in periods')
+
+
+@dataclass(frozen=True)
+class Multisine:
+    """A sum of sines."""
+
+    kind: ClassVar[str] = 'multisine'
+    amplitude_deg_s: float | None = _entry('deg/s', 'amplitude of the rate command')
+    frequencies_hz: tuple[float, ...] | None = _numbers('Hz', 'frequency of each sine', 0.0)
+    weights: tuple[float, ...] | None = _numbers('1', 'weight of each sine')
+    phases: tuple[float, ...] | None = _numbers('1', 'phase of each sine')
+    start_s: float | None = _entry('s', 'when it begins')
+
+
+@dataclass(frozen=True)
+class Chirp:
+    """A sine whose frequency rises or falls."""
+
+    kind: ClassVar[str] = 'chirp'
+    amplitude_deg_s: float | None = _entry('deg/s', 'amplitude of the rate command')
+    f0_hz: float | None = _entry('Hz', 'frequency at the beginning', 0.0)
+    f1_hz: float | None = _entry('Hz', 'frequency at the end', 0.0)
+    duration_s: float | None = _entry('s', 'length of the sweep', 0.0)
+    start_s: float | None = _entry('s', 'when it begins')
+
+
+Waveform = Square | Triangle | Multisine | Chirp
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """How good the sensors are: noise is one standard deviation, step one digit."""
+
+    current_noise_A: float | None = _entry('A', 'noise of each current', 0.0)
+    current_step_A: float | None = _entry('A', 'resolution of each current', 0.0)
+    tach_noise_rad_s: float | None = _entry('rad/s', 'noise of each tachometer', 0.0)
+    tach_noise_relative: float | None = _entry('1', 'noise per rate', 0.0, 1.0)
+    tach_step_rad_s: float | None = _entry('rad/s', 'resolution of each tachometer', 0.0)
+    encoder_bits: int | None = _entry('1', 'bits per turn of the encoder', 1, 64, whole=True)
+    bias_noise_V: float | None = _entry('V', 'noise of the bias voltage', 0.0)
+    bias_step_V: float | None = _entry('V', 'resolution of the bias voltage', 0.0)
+
+
+@dataclass(frozen=True)
+class TestSheet:
+    """
+    What the tester knows. Every entry may be None: not known.
+
+    Attributes
+    ----------
+    circuit, filter_1 : torque-share and Filter 1 constants of Table 1, 'old' or 'new'
+    bias : where the bias voltage comes from
+    waveform : the rate command
+    start : 'rest' if everything stood still, encoder near zero, each motor inside its gap
+    elevation_deg : elevation at the start [deg]
+    sensors : how good the sensors are
+    parameter_tolerance : how far the machine's parameters may lie from the configuration [1]
+
+    """
+
+    __test__: ClassVar[bool] = False  # not a test case, whatever pytest makes of the name
+
+    circuit: str | None = _choice('torque-share constants of Table 1', 'old', 'new')
+    filter_1: str | None = _choice('Filter 1 constants of Table 1', 'old', 'new')
+    bias: Bias | None = None
+    waveform: Waveform | None = None
+    start: str | None = _choice('state at the start', 'rest')
+    elevation_deg: float | None = _entry('deg', 'elevation at the start', -90.0, 180.0)
+    sensors: Sensors | None = None
+    parameter_tolerance: float | None = _entry('1', 'relative tolerance', 0.0, 1.0)
+
+    def __bool__(self) -> bool:
+        """Tell whether anything is known."""
+        return any(getattr(self, item.name) is not None for item in fields(self))
+
+
+def parse_sheet(tree: object) -> TestSheet:
+    """
+    Check the plain data of a test sheet.
+
+    Raises
+    ------
+    ParameterError : an entry is unknown or not allowed; the message names the key
+
+    """
+    sheet: TestSheet = _parse('', tree, (TestSheet,))
+    return sheet
+
+
+def _parse(key: str, tree: object, classes: tuple[type, ...]) -> Any:
+    if not isinstance(tree, Mapping):
+        raise ParameterError(f'{key or "the sheet"}: {type(tree).__name__} given, allowed is a '
+                             'mapping of entries')
+    given = dict(tree)
+    chosen = classes[0]
+    if hasattr(classes[0], 'kind'):
+        kinds = {c.kind: c for c in classes}  # type: ignore[attr-defined]
+        choice = Entry('', choices=tuple(kinds)).check(
+            f'{key}.type', plain_value(given.pop('type', None)))
+        chosen = kinds[str(choice)]
+    known = {item.name: item for item in fields(chosen)}
+    types = get_type_hints(chosen)
+    content = {}
+    for name, value in given.items():
+        full = one_line(f'{key}.{name}' if key else name)
+        if name not in known:
+            close = nearest(str(name), tuple(known))
+            raise ParameterError(f'{full}: no such entry{close}; allowed are {", ".join(known)}')
+        if value is None:
+            continue
+        metadata = known[name].metadata
+        if 'entry' in metadata:
+            content[name] = metadata['entry'].check(full, plain_value(value))
+        elif 'each' in metadata:
+            if not isinstance(value, list):
+                raise ParameterError(f'{full}: {one_line(repr(value))} given, allowed is '
+                                     'a list of numbers')
+            content[name] = tuple(metadata['each'].check(f'{full}[{i}]', plain_value(item))
+                                  for i, item in enumerate(value))
+        else:
+            parts = tuple(c for c in get_args(types[name]) if c is not type(None))
+            content[name] = _parse(full, value, parts)
+    lengths = {name: len(value) for name, value in content.items() if isinstance(value, tuple)}
+    if len(set(lengths.values())) > 1:
+        raise ParameterError(f'{key}: {lengths} values given, allowed is one of each per sine')
+    return chosen(**content)
+
+
+def plain_value(value: object) -> object:
+    """Return a value that can be shown in one line: a short text for what can be no value."""
+    if isinstance(value, str):
+        return one_line(value)
+    if isinstance(value, (bool, float)) or value is None:
+        return value
+    if isinstance(value, int) and abs(value) < 2**64:
+        return value
+    return f'a {type(value).__name__}'
+
+
+def sheet_tree(sheet: Any) -> dict[str, Any]:
+    """Return a test sheet as the plain data that `parse_sheet` reads; unknown entries left out."""
+    tree: dict[str, Any] = {}
+    if hasattr(sheet, 'kind'):
+        tree['type'] = sheet.kind
+    for item in fields(sheet):
+        value = getattr(sheet, item.name)
+        if value is None:
+            continue
+        if is_dataclass(value):
+            tree[item.name] = sheet_tree(value)
+        else:
+            tree[item.name] = list(value) if isinstance(value, tuple) else value
+    return tree
+
+
+def dump_sheet(sheet: TestSheet) -> str:
+    """Return a test sheet as YAML."""
+    text: str = yaml.safe_dump(sheet_tree(sheet), sort_keys=False, default_flow_style=None)
+    return text
+
+
+def load_sheet(path: Path) -> TestSheet:
+    """
+    Read a test sheet from its file.
+
+    Raises
+    ------
+    ParameterError : the file cannot be read or an entry is not allowed; the message names the
+        file, the key and what is allowed
+
+    """
+    tree = read_yaml(path)
+    try:
+        return parse_sheet({} if tree is None else tree)
+    except ParameterError as error:
+        raise ParameterError(f'{path}: {error}') from None

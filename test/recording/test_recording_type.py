@@ -1,0 +1,222 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The Recording type against closed forms."""
+
+from __future__ import annotations
+
+import dataclasses
+import doctest
+import math
+from typing import get_args
+
+from antenna_drive.emulator.wiring import OUTPUTS, signal_names
+from antenna_drive.recording import recording as module
+from antenna_drive.recording.plain import PlainDataError
+from antenna_drive.recording.recording import (
+    Change, Channel, Method, METHODS, nanoseconds, Recording, RecordingError, unit_of,
+)
+from hypothesis import given, strategies as st
+import numpy as np
+import pytest
+
+CURRENT, COMMAND = 'motor_1/current', 'test_signal/rate_command'
+
+
+def ramp(rate_hz: float, seconds: float, slope: float = 2.0) -> Recording:
+    time = np.arange(round(rate_hz * seconds)) / rate_hz
+    return Recording.from_arrays(time, {CURRENT: slope * time, COMMAND: np.sin(time)})
+
+
+def test_examples_in_the_documentation() -> None:
+    assert doctest.testmod(module).failed == 0
+
+
+def test_every_signal_of_the_drive_gets_its_unit_from_the_wiring() -> None:
+    units = {f'{unit}/{s.name}': s.unit for unit, signals in OUTPUTS.items() for s in signals}
+    assert {name: unit_of(name) for name in signal_names()} == units
+    assert unit_of('wind/speed') == unit_of('motor_1/nothing') == ''
+
+
+def test_nothing_can_be_changed() -> None:
+    values = np.array([1.0, 2.0])
+    recording = Recording.from_arrays([0.0, 1.0], {CURRENT: values},
+                                      configuration={'axis': {'modes': [1.0, 2.0]}})
+    values[0] = 9.0
+    assert recording[CURRENT].values.tolist() == [1.0, 2.0]
+    with pytest.raises(ValueError, match='read-only'):
+        recording[CURRENT].values[0] = 3.0
+    with pytest.raises(ValueError, match='read-only'):
+        recording[CURRENT].time_ns[0] = 3
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        recording.changes = ()  # type: ignore[misc]
+    with pytest.raises(TypeError):
+        recording.channels[CURRENT] = recording[CURRENT]  # type: ignore[index]
+    with pytest.raises(TypeError):
+        recording.configuration['axis']['modes'] = ()  # type: ignore[index]
+
+
+@pytest.mark.parametrize(('time', 'values', 'words'), [
+    ([0.0, 1.0, 1.0], [1.0, 2.0, 3.0], 'sample 2 at 1.000000000 s is not later'),
+    ([0.0, 1.0], [1.0, math.nan], 'sample 1 at 1.000000000 s is nan'),
+    ([0.0, 1.0], [math.inf, 1.0], 'sample 0 at 0.000000000 s is inf'),
+    ([0.0, 1.0], [1.0], 'shape'),
+    ([0.0, math.nan], [1.0, 2.0], 'not finite'),
+    ([0.0, 1e10], [1.0, 2.0], 'beyond'),
+])
+def test_samples_that_are_none_are_refused(time: list[float], values: list[float],
+                                           words: str) -> None:
+    with pytest.raises(RecordingError, match=words):
+        Recording.from_arrays(time, {CURRENT: values})
+
+
+@pytest.mark.parametrize('name', ['', '/', 'motor_1/', '/current', 'motor 1/current', '1/a',
+                                  'motor_1/cur-rent', 'mötor/current'])
+def test_names_that_can_be_no_topic_are_refused(name: str) -> None:
+    with pytest.raises(RecordingError, match='no name of a signal'):
+        Recording.from_arrays([0.0], {name: [1.0]})
+
+
+def test_what_is_no_plain_data_is_refused_with_its_place() -> None:
+    with pytest.raises(RecordingError, match=r'axis\.modes\[1\]: nan'):
+        Recording({}, configuration={'axis': {'modes': [1.0, math.nan]}})
+    with pytest.raises(RecordingError, match='bytes'):
+        Recording({}, notes={'a': b'x'})
+    assert issubclass(PlainDataError, ValueError)
+
+
+@given(st.integers(-9_200_000_000, 9_200_000_000), st.integers(0, 999_999_999))
+def test_seconds_to_nanoseconds_are_nearest(whole: int, rest: int) -> None:
+    stamp = whole * 10**9 + rest
+    seconds = stamp / 10**9  # Python divides integers correctly rounded
+    spacing = math.ulp(seconds) * 10**9
+    if abs(stamp) <= 9.2e18:
+        assert abs(nanoseconds(seconds) - stamp) <= max(0.5, spacing)
+        if spacing < 0.25:
+            assert nanoseconds(seconds) == stamp
+
+
+@given(st.integers(0, 10**9), st.sampled_from([1e-3, 2.5e-5, 2e-3]))
+def test_times_of_steps_are_whole_nanoseconds(k: int, step_s: float) -> None:
+    assert nanoseconds(k * step_s) == k * round(step_s * 1e9)
+
+
+def test_equality_is_to_the_last_bit() -> None:
+    one = Recording.from_arrays([0.0], {CURRENT: [0.0]})
+    other = Recording.from_arrays([0.0], {CURRENT: [-0.0]})
+    assert one == Recording.from_arrays([0.0], {CURRENT: [0.0]})
+    assert one != other
+    assert one != dataclasses.replace(one, notes={'a': 1})
+
+
+def test_a_signal_that_is_not_there_is_named_with_its_nearest() -> None:
+    with pytest.raises(RecordingError, match='did you mean motor_1/current'):
+        ramp(10, 1)['motor_1/curent']
+
+
+def test_between_is_half_open_and_keeps_time_stamps() -> None:
+    cut = ramp(10, 1).between(0.2, 0.5)
+    assert cut[CURRENT].time_ns.tolist() == [200_000_000, 300_000_000, 400_000_000]
+    assert cut[CURRENT].values == pytest.approx([0.4, 0.6, 0.8])
+    assert ramp(10, 1).between() == ramp(10, 1)
+
+
+def test_shift_moves_the_signals_named() -> None:
+    moved = ramp(10, 1).shift(0.25, [CURRENT])
+    assert moved[CURRENT].time_ns[0] == 250_000_000
+    assert moved[COMMAND].time_ns[0] == 0
+    assert ramp(10, 1).shift(0.25).shift(-0.25) == ramp(10, 1)
+
+
+def test_periods_and_concatenate_are_inverse() -> None:
+    period = ramp(100, 1)
+    whole = period.repeat(5, 1.0)
+    assert len(whole[CURRENT]) == 500
+    assert whole.periods(1.0) == (period,) * 5
+    # of 4.5 s from 0.2 s on, three whole periods of 1.3 s fit
+    assert len(whole.between(0, 4.5).periods(1.3, 0.2)) == 3
+
+
+def test_concatenate_refuses_what_reaches_into_the_next_period() -> None:
+    with pytest.raises(RecordingError, match='part 0 reaches outside its period of 0.5 s'):
+        ramp(100, 1).repeat(2, 0.5)
+    with pytest.raises(RecordingError, match='nothing'):
+        Recording.concatenate([], 1.0)
+
+
+@given(st.lists(st.integers(1, 10**9), min_size=2, max_size=30), st.data())
+def test_linear_resampling_of_a_ramp_is_the_ramp(steps: list[int], data: st.DataObject) -> None:
+    stamps = np.cumsum(steps)
+    channel = Channel('A', stamps, 3.0 * (stamps / 1e9) + 1.0)
+    wanted = np.array(data.draw(st.lists(
+        st.integers(int(stamps[0]), int(stamps[-1])), min_size=1, max_size=20)))
+    assert channel.at(wanted, 'linear') == pytest.approx(3.0 * (wanted / 1e9) + 1.0, rel=1e-12)
+
+
+def test_hold_and_nearest_take_measured_values_only() -> None:
+    channel = Channel('A', np.array([0, 10, 30]), np.array([1.0, 2.0, 3.0]))
+    wanted = np.array([0, 4, 5, 9, 10, 19, 20, 29, 30])
+    assert channel.at(wanted, 'hold').tolist() == [1, 1, 1, 1, 2, 2, 2, 2, 3]
+    assert channel.at(wanted, 'nearest').tolist() == [1, 1, 2, 2, 2, 2, 3, 3, 3]
+    assert set(METHODS) == set(get_args(Method))
+
+
+@pytest.mark.parametrize('method', METHODS)
+def test_resampling_onto_its_own_times_changes_nothing(method: Method) -> None:
+    channel = ramp(70, 1)[COMMAND]
+    assert channel.at(channel.time_ns, method).tobytes() == channel.values.tobytes()
+
+
+def test_nothing_is_extrapolated() -> None:
+    channel = Channel('A', np.array([0, 10]), np.array([1.0, 2.0]))
+    for outside in (-1, 11):
+        with pytest.raises(RecordingError, match='nothing is extrapolated'):
+            channel.at(np.array([outside]))
+    with pytest.raises(RecordingError, match='no method'):
+        channel.at(np.array([1]), 'cubic')  # type: ignore[arg-type]
+
+
+def test_alignment_states_its_method_and_the_widest_gap() -> None:
+    slow = np.array([0.0, 0.5, 0.6, 2.0])
+    recording = Recording({
+        CURRENT: Channel('A', nanoseconds(slow), 4.0 * slow),
+        COMMAND: Channel('rad/s', nanoseconds(np.arange(30) * 0.1), np.arange(30.0))})
+    aligned = recording.align([CURRENT, COMMAND], onto=COMMAND)
+    assert aligned.time_s == pytest.approx(np.arange(21) * 0.1)
+    assert aligned.values[:, 0] == pytest.approx(0.4 * np.arange(21))
+    assert aligned.longest_gap_s == pytest.approx((1.4, 0.1))
+    assert 'straight line' in aligned.method
+    assert COMMAND in aligned.method
+    assert aligned.units == ('A', 'rad/s')
+    assert recording.align(onto=[0.25]).values == pytest.approx(np.array([[1.0, 2.5]]))
+
+
+def test_resampling_covers_the_common_time_and_says_how() -> None:
+    recording = ramp(100, 1).shift(0.105, [CURRENT]).resample(20.0, 'hold')
+    stamps = recording[CURRENT].time_ns
+    assert stamps[0] == 105_000_000
+    assert np.all(np.diff(stamps) == 50_000_000)
+    assert stamps[-1] <= 990_000_000 < stamps[-1] + 50_000_000
+    assert 'last sample before' in recording.notes['resampled']
+    with pytest.raises(RecordingError, match='no common time'):
+        ramp(100, 1).shift(5.0, [CURRENT]).resample(20.0)
+    with pytest.raises(RecordingError, match='not above 0'):
+        ramp(100, 1).resample(0.0)
+
+
+def test_live_changes_are_kept_and_frozen() -> None:
+    change = Change(7, 'torque_share', {'bias_pot': 0.8})
+    recording = dataclasses.replace(ramp(10, 1), changes=(change,))
+    assert recording.changes == (change,)
+    with pytest.raises(TypeError):
+        recording.changes[0].values['bias_pot'] = 1.0  # type: ignore[index]
