@@ -91,7 +91,12 @@ class _SteppedUnit(_DriveUnit):
         self._x = np.zeros(states)
         self._mode = np.zeros(self._physics.MODES, np.int64)
         self._work = work_space(states)
+        self._u = np.zeros((len(self.inputs), 2))
         self._y = np.zeros((len(self.outputs), 2))
+
+    def memory(self) -> tuple[Any, ...]:
+        """Return record, states, mode, inputs, work space and outputs, for a compiled loop."""
+        return self._record, self._x, self._mode, self._u, self._work, self._y
 
     def start(self, step_s: float) -> FloatArray:
         """Return to the state at rest and give the outputs at t = 0; see `Unit.start`."""

@@ -74,11 +74,66 @@ def limited(demand, centre, current_limit):  # type: ignore[no-untyped-def]
     return min(max(demand, centre - current_limit), centre + current_limit)
 
 
+# What the integral of amplifier 1 does: it integrates; it stands still while the demand is beyond
+# the limit; or it moves just so that the demand stays at the limit. The third is where the rule
+# of the first two would switch to and fro without end.
+FREE, FROZEN, HELD = range(3)
+
+
 @inner
-def is_wound_up(error, demand, centre, current_limit):  # type: ignore[no-untyped-def]
-    """Tell whether the error pushes the limited demand further out; all in article A."""
-    return ((error > 0.0 and demand > centre + current_limit)
-            or (error < 0.0 and demand < centre - current_limit))
+def error_slope(error, command_slope, tach_slope, bias_slope, p):  # type: ignore[no-untyped-def]
+    """
+    Return the time derivative of `rate_error` [article A/s].
+
+    Parameters
+    ----------
+    error : e [article A], zero within the dead zone
+    command_slope, tach_slope, bias_slope : derivatives of its arguments [V/s], [rad/s^2], [V/s]
+    p : Amplifier
+
+    """
+    if p.dead_zone > 0.0 and error == 0.0:
+        return 0.0
+    return p.rate_gain * (command_slope - p.tach_gain * tach_slope + bias_slope)
+
+
+@inner
+def next_winding(winding, error, excess, needed, p):  # type: ignore[no-untyped-def]
+    """
+    Return what the integral does next: it must not wind up while the demand is limited.
+
+    Parameters
+    ----------
+    winding : FREE, FROZEN or HELD so far
+    error : e [article A]
+    excess : how far the demand is beyond the limit, in the direction of the error [article A]
+    needed : rate of the integral, in that direction, that keeps the excess as it is [article A/s]
+    p : Amplifier
+
+    """
+    free = abs(error) / p.integral_time
+    if winding == HELD:
+        if needed >= free:
+            return FREE
+        return FROZEN if needed < 0.0 else HELD
+    if excess > 0.0:
+        if winding == FREE and needed > 0.0:
+            return FREE if needed >= free else HELD
+        return FROZEN
+    if winding == FROZEN and 0.0 < needed < free:
+        return HELD
+    return FREE
+
+
+@inner
+def integral_rate(winding, error, needed, p):  # type: ignore[no-untyped-def]
+    """Return the time derivative of the integral of amplifier 1 [article A/s]."""
+    if winding == FREE:
+        return error / p.integral_time
+    if winding == FROZEN:
+        return 0.0
+    held = min(max(needed, 0.0), abs(error) / p.integral_time)
+    return held if error > 0.0 else -held
 
 
 @inner

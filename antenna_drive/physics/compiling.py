@@ -35,11 +35,17 @@ from numba import config, njit
 Function = TypeVar('Function', bound=Callable[..., Any])
 
 # A zero divisor gives infinity, as in C, and the check for it stays out of the inner loops.
-_OPTIONS: dict[str, Any] = {'error_model': 'numpy'}
+# Compiled code allocates nothing, and so need not count who holds an array.
+_OPTIONS: dict[str, Any] = {'error_model': 'numpy', '_nrt': False}
 
 
 def inner(function: Function) -> Function:
-    """Compile a function that only compiled functions call: it is kept as a part of them."""
+    """Compile a function that only compiled functions call: it becomes a part of each."""
+    return njit(forceinline=True, **_OPTIONS)(function)  # type: ignore[no-any-return]
+
+
+def shared(function: Function) -> Function:
+    """Compile a larger function that compiled functions call: they share one copy of it."""
     return njit(**_OPTIONS)(function)  # type: ignore[no-any-return]
 
 

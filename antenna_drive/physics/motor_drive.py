@@ -16,7 +16,8 @@ One motor with its amplifiers and its gearbox: the subsystem G_o of Figs. 6 and 
 
 States: command voltage [V], integral of amplifier 1 [article A], lagged demand [article A],
 current [article A], motor angle [rad], motor rate [rad/s], hysteresis of the gearbox [1].
-Mode: friction (+1, -1 slips, 0 sticks), contact (+1, -1 flank, 0 gap), amplifier 1 wound up.
+Mode: friction (+1, -1 slips, 0 sticks), contact (+1, -1 flank, 0 gap), integral of
+amplifier 1 (FREE, FROZEN, HELD).
 Inputs: rate command [rad/s], counter torque [V], axis angle [rad], axis rate [rad/s].
 Outputs: current [article A], gear torque [N m], tachometer [rad/s], ammeter [article A].
 """
@@ -24,11 +25,12 @@ Outputs: current [article A], gear torque [N m], tachometer [rad/s], ammeter [ar
 from __future__ import annotations
 
 from antenna_drive.physics.amplifier import (
-    armature_voltage, is_wound_up, limit_centre, limited, rate_error,
+    armature_voltage, error_slope, FREE, HELD, integral_rate, limit_centre, limited,
+    next_winding, rate_error,
 )
 from antenna_drive.physics.armature import current_rate
 from antenna_drive.physics.backlash import contact_side, contact_torque_rate
-from antenna_drive.physics.compiling import compiled, inner
+from antenna_drive.physics.compiling import compiled, inner, shared
 from antenna_drive.physics.friction import next_slip
 from antenna_drive.physics.gearbox import gear_torque, presliding_rate, twist, twist_rate
 from antenna_drive.physics.integrator import located_runge_kutta
@@ -38,7 +40,7 @@ import numpy as np
 
 VOLTAGE, INTEGRAL, DEMAND, CURRENT, ANGLE, RATE, PRESLIDING = range(7)
 STATES = 7
-SLIP, SIDE, WOUND_UP = range(3)
+SLIP, SIDE, WINDING = range(3)
 MODES = 3
 RATE_COMMAND, COUNTER_TORQUE, AXIS_ANGLE, AXIS_RATE = range(4)
 INPUTS = 4
@@ -85,30 +87,48 @@ def _acceleration(x, mode, torque, p):  # type: ignore[no-untyped-def]
 
 
 @inner
+def _needed(t, x, u, error, acceleration, p):  # type: ignore[no-untyped-def]
+    """Return the rate at which the integral would keep the demand at its limit [article A/s]."""
+    slope = error_slope(
+        error, command_voltage_rate(x[VOLTAGE], _held(u, RATE_COMMAND, t), p.rate_command),
+        p.tachometer.gain * acceleration,
+        p.sign * p.amplifier.bias_command_gain * u[COUNTER_TORQUE, 1], p.amplifier)
+    needed = limit_centre(acceleration, p.amplifier, p.armature) - slope
+    return needed if error > 0.0 else -needed
+
+
+@inner
 def _current_rate(x, p):  # type: ignore[no-untyped-def]
     volts = armature_voltage(x[DEMAND], x[CURRENT], p.amplifier, p.armature)
     return current_rate(volts, x[CURRENT], x[RATE], p.armature)
 
 
-@inner
+@shared
 def _rates(t, x, mode, u, p, dx):  # type: ignore[no-untyped-def]
     error, demand, centre = _demand(t, x, u, p)
     rate, torque = _gear(t, x, mode, u, p)
     dx[VOLTAGE] = command_voltage_rate(x[VOLTAGE], _held(u, RATE_COMMAND, t), p.rate_command)
-    dx[INTEGRAL] = 0.0 if mode[WOUND_UP] else error / p.amplifier.integral_time
+    acceleration = _acceleration(x, mode, torque, p)
+    needed = _needed(t, x, u, error, acceleration, p) if mode[WINDING] == HELD else 0.0
+    dx[INTEGRAL] = integral_rate(mode[WINDING], error, needed, p.amplifier)
     dx[DEMAND] = (limited(demand, centre, p.motor.current_limit) - x[DEMAND]) / p.amplifier.lag
     dx[CURRENT] = _current_rate(x, p)
     dx[ANGLE] = x[RATE]
-    dx[RATE] = _acceleration(x, mode, torque, p)
+    dx[RATE] = acceleration
     dx[PRESLIDING] = presliding_rate(mode[SIDE], rate, x[PRESLIDING], p.gearbox)
 
 
-@inner
+@shared
 def _switch(t, x, mode, u, p, commit):  # type: ignore[no-untyped-def]
     angle = twist(x[ANGLE], _axis_angle(u, t), p.gear_ratio, p.gearbox)
     side = contact_side(angle, p.gearbox.half_gap)
     error, demand, centre = _demand(t, x, u, p)
-    wound_up = 1 if is_wound_up(error, demand, centre, p.motor.current_limit) else 0
+    excess = (demand - centre if error > 0.0 else centre - demand) - p.motor.current_limit
+    winding = mode[WINDING]
+    if excess > 0.0 or winding != FREE:
+        _, torque = _gear(t, x, mode, u, p)
+        needed = _needed(t, x, u, error, _acceleration(x, mode, torque, p), p)
+        winding = next_winding(winding, error, excess, needed, p.amplifier)
     slip = mode[SLIP]
     if slip == 0 or slip * x[RATE] <= p.motor.velocity_threshold:
         _, torque = _gear(t, x, mode, u, p)
@@ -116,11 +136,11 @@ def _switch(t, x, mode, u, p, commit):  # type: ignore[no-untyped-def]
         level = friction_level(0.0, torque, p.motor)
         slip = next_slip(slip, x[RATE], applied, level, p.motor.stiction_ratio * level,
                          p.motor.velocity_threshold)
-    changed = (slip != mode[SLIP]) or (side != mode[SIDE]) or (wound_up != mode[WOUND_UP])
+    changed = (slip != mode[SLIP]) or (side != mode[SIDE]) or (winding != mode[WINDING])
     if commit and changed:
         mode[SLIP] = slip
         mode[SIDE] = side
-        mode[WOUND_UP] = wound_up
+        mode[WINDING] = winding
         if slip == 0:
             x[RATE] = 0.0
     return changed

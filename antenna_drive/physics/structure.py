@@ -23,7 +23,7 @@ in elevation and cross-elevation [rad].
 
 from __future__ import annotations
 
-from antenna_drive.physics.compiling import compiled, inner
+from antenna_drive.physics.compiling import compiled, inner, shared
 from antenna_drive.physics.friction import next_slip, slip_level
 from antenna_drive.physics.integrator import located_runge_kutta
 import numpy as np
@@ -82,7 +82,7 @@ def _acceleration(t, x, mode, u, p):  # type: ignore[no-untyped-def]
     return (_applied_torque(t, x, u, p) - friction) / p.inertia_hub
 
 
-@inner
+@shared
 def _rates(t, x, mode, u, p, dx):  # type: ignore[no-untyped-def]
     dx[ANGLE] = x[RATE]
     dx[RATE] = _acceleration(t, x, mode, u, p)
@@ -91,7 +91,7 @@ def _rates(t, x, mode, u, p, dx):  # type: ignore[no-untyped-def]
         dx[3 + 2 * j] = -_mode_torque(x, j, p) / p.mode_inertias[j]
 
 
-@inner
+@shared
 def _switch(t, x, mode, u, p, commit):  # type: ignore[no-untyped-def]
     slip = mode[0]
     if slip != 0 and slip * x[RATE] > p.velocity_threshold:

@@ -21,7 +21,7 @@ Inputs: currents of both motors [article A]. Outputs: counter torque x_F [V], bi
 
 from __future__ import annotations
 
-from antenna_drive.physics.compiling import compiled, inner
+from antenna_drive.physics.compiling import compiled, inner, shared
 from antenna_drive.physics.filter_1 import counter_torque_rate
 from antenna_drive.physics.integrator import located_runge_kutta
 import numpy as np
@@ -83,7 +83,7 @@ def _counter_torque_rate(t, x, u, p):  # type: ignore[no-untyped-def]
         u[CURRENT_1, 0] + u[CURRENT_1, 1] * t, u[CURRENT_2, 0] + u[CURRENT_2, 1] * t, p.filter_1)
 
 
-@inner
+@shared
 def _rates(t, x, mode, u, p, dx):  # type: ignore[no-untyped-def]
     share = p.torque_share
     current_sum = u[CURRENT_1, 0] + u[CURRENT_2, 0] + (u[CURRENT_1, 1] + u[CURRENT_2, 1]) * t
@@ -92,7 +92,7 @@ def _rates(t, x, mode, u, p, dx):  # type: ignore[no-untyped-def]
     dx[COUNTER_TORQUE] = _counter_torque_rate(t, x, u, p)
 
 
-@inner
+@shared
 def _switch(t, x, mode, u, p, commit):  # type: ignore[no-untyped-def]
     negative = 1 if x[LOAD] < 0.0 else 0
     saturation = 0

@@ -1,0 +1,104 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Many macro-steps of the whole drive in one compiled call, to the same bits as unit by unit."""
+
+from __future__ import annotations
+
+from typing import Any, TYPE_CHECKING
+
+from antenna_drive.emulator import wiring
+from antenna_drive.emulator.unit import FloatArray
+from antenna_drive.emulator.units import inner_steps
+from antenna_drive.physics import motor_drive, structure, torque_share
+from antenna_drive.physics.compiling import compiled, inner
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from antenna_drive.emulator.run import Emulator
+
+
+@inner
+def _gather(now, columns, u):  # type: ignore[no-untyped-def]
+    for j in range(columns.size):
+        u[j, 0] = now[columns[j], 0]
+        u[j, 1] = now[columns[j], 1]
+
+
+@inner
+def _scatter(y, first, after):  # type: ignore[no-untyped-def]
+    for j in range(y.shape[0]):
+        after[first + j, 0] = y[j, 0]
+        after[first + j, 1] = y[j, 1]
+
+
+@compiled
+def _advance(k, h, steps, every, commands, now, after, kept, columns, firsts,
+             motor_1, motor_2, share, plant):  # type: ignore[no-untyped-def]
+    """
+    Advance the drive by one macro-step for each row of `commands`.
+
+    Parameters
+    ----------
+    k : number of the macro-step to begin with
+    h, steps, every : macro-step [s], inner steps in it, and which steps to keep
+    commands : test signals at each step's end, shape (count, 2, 2)
+    now, after : samples at the step's start and end, shape (signals, 2); now holds the last ones
+    kept : receives the kept samples
+    columns : rows of `now` that each of the four units reads, a tuple of index arrays
+    firsts : row of the first output of each of the five units
+    motor_1, motor_2, share, plant : each unit's record, states, mode, inputs, work, outputs
+
+    """
+    row = 0
+    for i in range(commands.shape[0]):
+        _scatter(commands[i], firsts[0], after)
+        p, x, mode, u, work, y = motor_1
+        _gather(now, columns[0], u)
+        motor_drive.step(x, mode, u, p[0], h, steps, work, y)
+        _scatter(y, firsts[1], after)
+        p, x, mode, u, work, y = motor_2
+        _gather(now, columns[1], u)
+        motor_drive.step(x, mode, u, p[0], h, steps, work, y)
+        _scatter(y, firsts[2], after)
+        p_share, x, mode, u, work, y = share
+        _gather(now, columns[2], u)
+        torque_share.step(x, mode, u, p_share[0], h, steps, work, y)
+        _scatter(y, firsts[3], after)
+        p_plant, x, mode, u, work, y = plant
+        _gather(now, columns[3], u)
+        structure.step(x, mode, u, p_plant[0], h, steps, work, y)
+        _scatter(y, firsts[4], after)
+        _scatter(after, 0, now)
+        if (k + i + 1) % every == 0:
+            _scatter(now, 0, kept[row])
+            row += 1
+
+
+def advance(emulator: Emulator, count: int, every: int) -> tuple[NDArray[np.int64], FloatArray]:
+    """Advance an emulator of our own units by `count` macro-steps; see `Emulator.advance`."""
+    units: Any = emulator.units
+    k = emulator.k
+    commands = units[wiring.TEST_SIGNAL].ahead(k, count)
+    numbers = np.arange(k + 1, k + count + 1)
+    numbers = numbers[numbers % every == 0]
+    kept = np.empty((numbers.size, *emulator.now.shape))
+    stepped = wiring.UNITS[1:]
+    _advance(k, emulator.step_s, inner_steps(emulator.step_s), every, commands, emulator.now,
+             np.empty_like(emulator.now), kept,
+             tuple(emulator.rows_read(name) for name in stepped),
+             np.array([emulator.first_row(name) for name in wiring.UNITS]),
+             *(units[name].memory() for name in stepped))
+    emulator.k += count
+    return numbers, kept
