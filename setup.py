@@ -89,6 +89,7 @@ setup(
             'rosbags >= 0.10',  # reads what mcap wrote
             'mypy >= 1.8',
             'types-PyYAML',
+            'rosbags >= 0.10',  # reads our bags, as someone else's program would
             # the linters of ament_flake8 and ament_pep257
             'flake8 >= 6',
             'flake8-builtins',

@@ -84,7 +84,6 @@ REMEDIES = {
     'rosgraph_msgs': ROS_REMEDY,
     'diagnostic_msgs': ROS_REMEDY,
     'matplotlib': 'pip install matplotlib',
-    'rosbags': 'pip install rosbags',
     'mcap': 'pip install mcap',
 }
 
