@@ -34,6 +34,7 @@ TEST_SIGNAL_OUTPUTS = (
 MOTOR_OUTPUTS = (
     Signal('current', 'A', 'motor current, article amperes'),
     Signal('gear_torque', 'N m', 'gearbox torque at the motor shaft, positive drives the axis'),
+    Signal('missed_impulse', 'N m s', 'impulse of the gear torque that its extrapolation missed'),
     Signal('tach_rate', 'rad/s', 'tachometer reading', exchanged=False),
     Signal('ammeter', 'A', 'ammeter reading, article amperes', exchanged=False),
 )
@@ -73,7 +74,8 @@ INPUTS: dict[str, tuple[str, ...]] = {
     MOTORS[0]: MOTOR_INPUTS,
     MOTORS[1]: MOTOR_INPUTS,
     TORQUE_SHARE: tuple(f'{motor}/current' for motor in MOTORS),
-    PLANT: (*(f'{motor}/gear_torque' for motor in MOTORS), f'{TEST_SIGNAL}/external_torque'),
+    PLANT: (*(f'{motor}/gear_torque' for motor in MOTORS),
+            *(f'{motor}/missed_impulse' for motor in MOTORS), f'{TEST_SIGNAL}/external_torque'),
 }
 
 

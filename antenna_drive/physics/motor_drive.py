@@ -15,11 +15,13 @@
 One motor with its amplifiers and its gearbox: the subsystem G_o of Figs. 6 and 7.
 
 States: command voltage [V], integral of amplifier 1 [article A], lagged demand [article A],
-current [article A], motor angle [rad], motor rate [rad/s], hysteresis of the gearbox [1].
+current [article A], motor angle [rad], motor rate [rad/s], hysteresis of the gearbox [1], and
+the gear torque's impulse since the start of the macro-step [N m s].
 Mode: friction (+1, -1 slips, 0 sticks), contact (+1, -1 flank, 0 gap), integral of
 amplifier 1 (FREE, FROZEN, HELD).
 Inputs: rate command [rad/s], counter torque [V], axis angle [rad], axis rate [rad/s].
-Outputs: current [article A], gear torque [N m], tachometer [rad/s], ammeter [article A].
+Outputs: current [article A], gear torque [N m], impulse missed [N m s], tachometer [rad/s],
+ammeter [article A].
 """
 
 from __future__ import annotations
@@ -38,13 +40,13 @@ from antenna_drive.physics.motor import ammeter, driving_torque, friction_level,
 from antenna_drive.physics.rate_command import command_voltage_rate
 import numpy as np
 
-VOLTAGE, INTEGRAL, DEMAND, CURRENT, ANGLE, RATE, PRESLIDING = range(7)
-STATES = 7
+VOLTAGE, INTEGRAL, DEMAND, CURRENT, ANGLE, RATE, PRESLIDING, IMPULSE = range(8)
+STATES = 8
 SLIP, SIDE, WINDING = range(3)
 MODES = 3
 RATE_COMMAND, COUNTER_TORQUE, AXIS_ANGLE, AXIS_RATE = range(4)
 INPUTS = 4
-OUTPUTS = 4
+OUTPUTS = 5
 _AT_REST = np.zeros((INPUTS, 2))
 
 
@@ -116,6 +118,7 @@ def _rates(t, x, mode, u, p, dx):  # type: ignore[no-untyped-def]
     dx[ANGLE] = x[RATE]
     dx[RATE] = acceleration
     dx[PRESLIDING] = presliding_rate(mode[SIDE], rate, x[PRESLIDING], p.gearbox)
+    dx[IMPULSE] = torque
 
 
 @shared
@@ -156,11 +159,11 @@ def outputs(x, mode, u, t, p, y):  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    x, mode : states and mode at t, shapes (7,) and (3,)
+    x, mode : states and mode at t, shapes (8,) and (3,)
     u : inputs at the start of the macro-step, shape (4, 2)
     t : [s]
     p : record of MotorDrive
-    y : receives value and derivative of each output, shape (4, 2)
+    y : receives value and derivative of each output, shape (5, 2)
 
     """
     rate, torque = _gear(t, x, mode, u, p)
@@ -172,10 +175,12 @@ def outputs(x, mode, u, t, p, y):  # type: ignore[no-untyped-def]
     y[1, 1] = contact_torque_rate(
         torque, rate, acceleration - p.gear_ratio * u[AXIS_RATE, 1],
         p.gearbox.stiffness, p.gearbox.contact_damping)
-    y[2, 0] = tachometer(x[RATE], x[ANGLE], p.tachometer)
-    y[2, 1] = p.tachometer.gain * acceleration
-    y[3, 0] = ammeter(x[CURRENT], p.ammeter)
-    y[3, 1] = p.ammeter.gain * current_slope
+    y[2, 0] = 0.0
+    y[2, 1] = 0.0
+    y[3, 0] = tachometer(x[RATE], x[ANGLE], p.tachometer)
+    y[3, 1] = p.tachometer.gain * acceleration
+    y[4, 0] = ammeter(x[CURRENT], p.ammeter)
+    y[4, 1] = p.ammeter.gain * current_slope
 
 
 @compiled
@@ -198,14 +203,17 @@ def step(x, mode, u, p, h, steps, work, y):  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    x, mode : states and mode, advanced in place, shapes (7,) and (3,)
+    x, mode : states and mode, advanced in place, shapes (8,) and (3,)
     u : inputs, value and time derivative at the start of the macro-step, shape (4, 2)
     p : record of MotorDrive
     h : macro-step [s]
     steps : inner steps in it
     work : from `integrator.work_space`
-    y : receives the outputs at the end, shape (4, 2)
+    y : receives the outputs at the end, shape (5, 2); still holds those at the start
 
     """
+    held = (y[1, 0] + 0.5 * y[1, 1] * h) * h
+    x[IMPULSE] = 0.0
     _advance(x, mode, u, p, h, steps, work)
     outputs(x, mode, u, h, p, y)
+    y[2, 0] = x[IMPULSE] - held

@@ -16,7 +16,8 @@ The antenna's structure: a hub on friction, with flexible modes, and all outputs
 
 States: hub angle [rad], hub rate [rad/s], then angle and rate of each mode [rad], [rad/s].
 Mode: friction of the axis (+1, -1 slips, 0 sticks).
-Inputs: gear torques of both motors at the motor shaft [N m], external torque at the axis [N m].
+Inputs: gear torques of both motors at the motor shaft [N m], what their extrapolation missed in
+the last macro-step [N m s], external torque at the axis [N m].
 Outputs: axis angle [rad], axis rate [rad/s], encoder [rad], pinion rate [rad/s], pointing errors
 in elevation and cross-elevation [rad].
 """
@@ -30,8 +31,8 @@ import numpy as np
 
 ANGLE, RATE = range(2)
 MODES = 1
-GEAR_TORQUE_1, GEAR_TORQUE_2, EXTERNAL_TORQUE = range(3)
-INPUTS = 3
+GEAR_TORQUE_1, GEAR_TORQUE_2, MISSED_1, MISSED_2, EXTERNAL_TORQUE = range(5)
+INPUTS = 5
 OUTPUTS = 6
 _AT_REST = np.zeros((INPUTS, 2))
 
@@ -137,7 +138,7 @@ def outputs(x, mode, u, t, p, y):  # type: ignore[no-untyped-def]
     Parameters
     ----------
     x, mode : states and mode at t, shapes (2 + 2 modes,) and (1,)
-    u : inputs at the start of the macro-step, shape (3, 2)
+    u : inputs at the start of the macro-step, shape (5, 2)
     t : [s]
     p : record of Plant
     y : receives value and derivative of each output, shape (6, 2)
@@ -180,7 +181,7 @@ def step(x, mode, u, p, h, steps, work, y):  # type: ignore[no-untyped-def]
     Parameters
     ----------
     x, mode : states and mode, advanced in place, shapes (2 + 2 modes,) and (1,)
-    u : inputs, value and time derivative at the start of the macro-step, shape (3, 2)
+    u : inputs, value and time derivative at the start of the macro-step, shape (5, 2)
     p : record of Plant
     h : macro-step [s]
     steps : inner steps in it
@@ -188,5 +189,8 @@ def step(x, mode, u, p, h, steps, work, y):  # type: ignore[no-untyped-def]
     y : receives the outputs at the end, shape (6, 2)
 
     """
+    # teeth that met within the last macro-step pushed in a way that nobody could extrapolate
+    if mode[0] != 0:
+        x[RATE] += p.axis.gear_ratio * (u[MISSED_1, 0] + u[MISSED_2, 0]) / p.axis.inertia_hub
     _advance(x, mode, u, p.axis, h, steps, work)
     outputs(x, mode, u, h, p, y)
