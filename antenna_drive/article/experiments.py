@@ -1,0 +1,96 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The article's experiments as data: what is commanded, with which circuit, from which start.
+
+T1 and T2 are Section IV (Figs. 8-13), T3a and T3b Section V (Figs. 18-20), T4 Section VI
+(Figs. 21-23). docs/model.md says how each figure is read off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+import math
+from typing import Any
+
+from antenna_drive.parameters import Drive, load
+from antenna_drive.parameters.sets import changed
+
+# Table 1 gives k_ctfr / 0.73: the filter's gain in the article's Section VI is k' times tau_6.
+TAU_6_OLD = 0.73
+TAU_6_NEW = 0.1125
+# The square wave of the rate-loop experiments, the saw-tooth of the torque-bias ones.
+SQUARE = {'waveform': 'square', 'amplitude': math.radians(0.013), 'period': 6.3}
+SAW_TOOTH = {'waveform': 'saw_tooth', 'amplitude': math.radians(0.685), 'period': 5.0}
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """
+    One experiment.
+
+    Attributes
+    ----------
+    name : as in the article's table of results, 'T3a'
+    duration : [s]
+    circuit : set in config/ that lies over the reference
+    settings : what else it sets, by dotted name in `Drive`
+
+    """
+
+    name: str
+    duration: float
+    circuit: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    def drive(self, *configuration: str) -> Drive:
+        """Return the drive of this experiment, on other files than the reference if given."""
+        return changed(load(*configuration, self.circuit), dict(self.settings))
+
+
+def _rate(waveform: Mapping[str, Any]) -> dict[str, Any]:
+    return {f'test_signal.rate.{name}': value for name, value in waveform.items()}
+
+
+def _fixed_bias(share: float) -> dict[str, Any]:
+    """Return the settings for a bias voltage from a source, as a share of the greatest."""
+    reference = load()
+    volts = (share * reference.motor_1.motor.current_limit
+             * reference.torque_share.filter_1.difference_gain)
+    return {'torque_share.torque_share.bias_source': 'fixed',
+            'torque_share.torque_share.fixed_voltage': volts}
+
+
+def filter_variant(gain: float, pole: float) -> Experiment:
+    """Return T4 with another Filter 1: k' [1/s] and p [1/s]."""
+    return Experiment(f'T4 k {gain:.4g} p {pole:.4g}', 8.0, 'old_circuit', {
+        'torque_share.torque_share.bias_pot': 0.7,
+        'torque_share.filter_1.gain': gain, 'torque_share.filter_1.pole': pole})
+
+
+def experiments() -> dict[str, Experiment]:
+    """Return T1 to T4 by name."""
+    square = _rate(SQUARE)
+    saw_tooth = _rate(SAW_TOOTH)
+    steady = {'torque_share.torque_share.start': 'steady'}
+    pot = 'torque_share.torque_share.bias_pot'
+    return {item.name: item for item in (
+        Experiment('T1', 4 * 6.3, 'old_circuit', {**square, **_fixed_bias(0.0)}),
+        Experiment('T2', 4 * 6.3, 'old_circuit', {**square, **_fixed_bias(0.15)}),
+        Experiment('T3a', 20.0, 'old_circuit', {**saw_tooth, **steady, pot: 0.8}),
+        Experiment('T3b', 20.0, 'new_circuit', {**saw_tooth, **steady, pot: 0.892}),
+        Experiment('T4a', 8.0, 'old_circuit', {pot: 0.7}),
+        Experiment('T4e', 8.0, 'new_circuit', {pot: 0.7}),
+    )}

@@ -1,0 +1,110 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""How the article's figures are read off a run: plateaus, overshoot, settling, time at zero."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from antenna_drive.emulator.unit import FloatArray
+import numpy as np
+
+# A response has settled when it stays within this share of its final value.
+SETTLING_BAND = 0.05
+
+
+@dataclass(frozen=True)
+class Response:
+    """A step response: final value in the signal's unit, overshoot [1], settling time [s]."""
+
+    final: float
+    overshoot: float
+    settling_s: float
+
+
+def step_response(time: FloatArray, value: FloatArray, tail_s: float = 1.0) -> Response:
+    """
+    Read a step response that begins at time zero.
+
+    Parameters
+    ----------
+    time : [s], shape (n,)
+    value : shape (n,)
+    tail_s : the mean over this last stretch is the final value [s]
+
+    """
+    final = float(value[time > time[-1] - tail_s].mean())
+    outside = np.flatnonzero(np.abs(value - final) > SETTLING_BAND * abs(final))
+    settling = 0.0 if outside.size == 0 else float(time[min(outside[-1] + 1, time.size - 1)])
+    return Response(final, float(value.max() / final - 1.0), settling)
+
+
+@dataclass(frozen=True)
+class BiasRange:
+    """The bias voltage of a run: least and greatest [V], share of the time at zero [1]."""
+
+    low_V: float
+    high_V: float
+    zero_fraction: float
+
+
+def bias_range(time: FloatArray, voltage: FloatArray, after_s: float) -> BiasRange:
+    """
+    Read the range of the bias voltage [V], shape (n,), after the start-up.
+
+    Parameters
+    ----------
+    time : [s], shape (n,)
+    voltage : [V], shape (n,)
+    after_s : what comes before is left out [s]
+
+    """
+    kept = voltage[time >= after_s]
+    return BiasRange(float(kept.min()), float(kept.max()), float(np.mean(kept <= 1e-9)))
+
+
+def plateau(time: FloatArray, value: FloatArray, period: float, window: tuple[float, float],
+            ) -> float:
+    """
+    Return the mean of a square wave's response in a window after each reversal, first period out.
+
+    Parameters
+    ----------
+    time, value : shape (n,)
+    period : of the square wave [s]; it is positive in its first half
+    window : from and to, after each reversal [s]
+
+    Returns
+    -------
+    the mean, with the sign of the command
+
+    """
+    sign, since = _half_periods(time, period)
+    used = (time >= period) & (since >= window[0]) & (since <= window[1])
+    return float(np.mean(sign[used] * value[used]))
+
+
+def deviation(time: FloatArray, value: FloatArray, period: float, window: tuple[float, float],
+              ) -> float:
+    """Return the rms of a signal in a window after each reversal; arguments as in `plateau`."""
+    _, since = _half_periods(time, period)
+    used = (time >= period) & (since >= window[0]) & (since <= window[1])
+    return float(np.sqrt(np.mean(value[used] ** 2)))
+
+
+def _half_periods(time: FloatArray, period: float) -> tuple[FloatArray, FloatArray]:
+    """Return the command's sign and the time since its last reversal [s]."""
+    half = 0.5 * period
+    number = np.floor(time / half + 1e-9)
+    return np.where(number % 2 == 0, 1.0, -1.0), time - number * half
