@@ -22,7 +22,7 @@ from pathlib import Path
 import tempfile
 from typing import IO
 
-from installations import colcon_build, Workspace
+from installations import install_with_colcon, install_with_pip, Installation
 import pytest
 
 # Domains 0 to 101 use ports that no operating system hands out; 0 is where people work.
@@ -86,12 +86,12 @@ def fresh_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
 
 
 @pytest.fixture(scope='session')
-def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    """Return a workspace with the package built in it by `colcon build`."""
-    return colcon_build(tmp_path_factory.mktemp('workspace'))
+def colcon_installation(tmp_path_factory: pytest.TempPathFactory) -> Installation:
+    """Return the package as `colcon build` installs it."""
+    return install_with_colcon(tmp_path_factory.mktemp('colcon'))
 
 
 @pytest.fixture(scope='session')
-def linked_workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    """Return a workspace with the package built by `colcon build --symlink-install`."""
-    return colcon_build(tmp_path_factory.mktemp('linked_workspace'), '--symlink-install')
+def pip_installation(tmp_path_factory: pytest.TempPathFactory) -> Installation:
+    """Return the package as `pip install .` installs it, for the Python of the tests."""
+    return install_with_pip(tmp_path_factory.mktemp('pip'))

@@ -17,10 +17,9 @@ from __future__ import annotations
 
 from pathlib import Path
 import subprocess
-import sys
 
 from antenna_drive.cli import NOT_INSTALLED, REMEDIES
-from installations import copy_source, NODES, outside_environment, ROOT
+from installations import bare_environment, install_in_new_venv, NODES, ROOT
 import pytest
 
 pytestmark = pytest.mark.slow
@@ -41,21 +40,13 @@ for found in pkgutil.walk_packages(antenna_drive.__path__, 'antenna_drive.'):
 @pytest.fixture(scope='module')
 def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a virtual environment with the package and what it needs, and nothing else."""
-    folder = tmp_path_factory.mktemp('plain')
-    subprocess.run([sys.executable, '-I', '-m', 'venv', folder / 'venv'], check=True)
-    source = copy_source(folder / 'source')
-    done = subprocess.run(
-        [folder / 'venv' / 'bin' / 'python', '-m', 'pip', 'install', '--quiet', source],
-        env=outside_environment(), cwd=folder, text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-    assert done.returncode == 0, done.stdout
-    return folder / 'venv'
+    return install_in_new_venv(tmp_path_factory.mktemp('plain')).prefix
 
 
 def run(prefix: Path, program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Run a program of the virtual environment as a user outside of the source tree does."""
     return subprocess.run([prefix / 'bin' / program, *arguments], cwd=prefix, text=True,
-                          env=outside_environment(), capture_output=True)
+                          env=bare_environment(), capture_output=True)
 
 
 def test_ros_2_is_absent(prefix: Path) -> None:
