@@ -76,6 +76,14 @@ def session_domain() -> int:
     return int(os.environ['ROS_DOMAIN_ID'])
 
 
+@pytest.fixture(scope='module')
+def module_domain() -> Iterator[int]:
+    """Return a ROS 2 domain for what one file of tests starts, which must be told it."""
+    claim = DomainClaim()
+    yield claim.number
+    claim.release()
+
+
 @pytest.fixture
 def fresh_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     """Put one test, and the processes that it starts, into a domain apart from the others."""

@@ -1,0 +1,213 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The drive through the ros2 command line, as people use it, after either installation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import os
+from pathlib import Path
+import re
+import shutil
+import signal
+import subprocess
+import sys
+
+from installations import Installation
+import pytest
+
+pytestmark = pytest.mark.slow
+PATH = os.pathsep.join((str(Path(sys.executable).parent), os.environ['PATH']))
+ROS2 = shutil.which('ros2', path=PATH)
+LIMIT_S = 60.0  # long enough for a busy machine; nothing waits for it but a failure
+STOP_S = 15.0
+# node name: executable
+DRIVE = {'test_signal': 'test_signal', 'motor_1': 'motor_drive', 'motor_2': 'motor_drive',
+         'torque_share': 'torque_share', 'plant': 'rate_loop_plant'}
+TOPICS = {
+    '/clock': 'rosgraph_msgs/msg/Clock',
+    '/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray',
+    '/test_signal/rate_command': 'std_msgs/msg/Float64',
+    '/motor_1/current': 'std_msgs/msg/Float64',
+    '/motor_2/current': 'std_msgs/msg/Float64',
+    '/motor_1/tach_rate': 'std_msgs/msg/Float64',
+    '/torque_share/bias_voltage': 'std_msgs/msg/Float64',
+    '/plant/axis_rate': 'std_msgs/msg/Float64',
+    '/plant/encoder': 'std_msgs/msg/Float64',
+    **{f'/{node}/frame': 'std_msgs/msg/Float64MultiArray' for node in DRIVE},
+}
+
+
+class Shell:
+    """A shell in which the package is installed and `ros2` is at hand."""
+
+    def __init__(self, installation: Installation, domain: int) -> None:
+        """Take the installation's environment, in a ROS 2 domain of its own."""
+        assert ROS2 is not None
+        self._ros2 = ROS2
+        self._environment = {**installation.environment, 'PATH': PATH, 'PYTHONUNBUFFERED': '1',
+                             'ROS_DOMAIN_ID': str(domain)}
+
+    def start(self, *arguments: str) -> subprocess.Popen[str]:
+        """Start a `ros2` command as the head of a process group, as a terminal does."""
+        return subprocess.Popen([self._ros2, *arguments], env=self._environment, text=True,
+                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                start_new_session=True)
+
+    def run(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Run a `ros2` command to its end."""
+        return subprocess.run([self._ros2, *arguments], env=self._environment, text=True,
+                              capture_output=True, timeout=LIMIT_S)
+
+    def ask(self, *arguments: str) -> str:
+        """Return what a `ros2` command that must succeed prints."""
+        done = self.run(*arguments)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+
+def interrupt(process: subprocess.Popen[str]) -> tuple[int, str]:
+    """Press Ctrl-C and return the exit code and what was printed."""
+    os.killpg(process.pid, signal.SIGINT)
+    try:
+        printed, _ = process.communicate(timeout=STOP_S)
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+    return process.returncode, printed
+
+
+@pytest.fixture(scope='module', params=['colcon', 'pip'])
+def shell(request: pytest.FixtureRequest, module_domain: int) -> Shell:
+    """Return a shell after either installation, or skip without rclpy or the ros2 command."""
+    pytest.importorskip('rclpy', reason='ROS 2 is not installed')
+    if ROS2 is None:
+        pytest.skip('the ros2 command line is not installed')
+    return Shell(request.getfixturevalue(f'{request.param}_installation'), module_domain)
+
+
+@pytest.fixture(scope='module')
+def drive(shell: Shell) -> Iterator[Shell]:
+    """Start the five nodes with `ros2 run`, and return the shell to look at them from."""
+    processes = {
+        node: shell.start('run', 'antenna_drive', executable, '--ros-args', '-r',
+                          f'__node:={node}')
+        for node, executable in DRIVE.items()}
+    try:
+        yield shell
+    finally:
+        ended = {node: interrupt(process) for node, process in processes.items()}
+    assert {node: code for node, (code, _) in ended.items()} == dict.fromkeys(DRIVE, 0), ended
+
+
+def value_of(printed: str) -> float:
+    """Return the value that `ros2 topic echo` printed of a Float64."""
+    match = re.search(r'^data: (\S+)$', printed, re.MULTILINE)
+    assert match, printed
+    return float(match[1])
+
+
+@pytest.mark.parametrize('topic', [t for t, kind in TOPICS.items() if kind.endswith('/Float64')])
+def test_topic_echo(drive: Shell, topic: str) -> None:
+    """Every signal can be listened to by name alone."""
+    value_of(drive.ask('topic', 'echo', '--once', '--no-daemon', '--spin-time', '5', topic))
+
+
+def test_topic_list(drive: Shell) -> None:
+    """The topics of the drive are listed with their types."""
+    listed = drive.ask('topic', 'list', '-t', '--no-daemon', '--spin-time', '5')
+    assert {f'{topic} [{kind}]' for topic, kind in TOPICS.items()} <= set(listed.splitlines())
+
+
+def test_topic_info(drive: Shell) -> None:
+    """A signal has one publisher."""
+    info = drive.ask('topic', 'info', '--no-daemon', '--spin-time', '5', '/motor_1/current')
+    assert 'Type: std_msgs/msg/Float64\n' in info
+    assert 'Publisher count: 1\n' in info
+
+
+def test_topic_hz(drive: Shell) -> None:
+    """A signal comes at a steady rate that can be measured."""
+    process = drive.start('topic', 'hz', '--window', '20', '/plant/axis_rate')
+    assert process.stdout is not None
+    for line in process.stdout:
+        match = re.search(r'average rate: (\S+)', line)
+        if match:
+            assert float(match[1]) > 0.0
+            break
+    else:
+        pytest.fail('ros2 topic hz ended without a rate')
+    interrupt(process)
+
+
+@pytest.mark.parametrize('node', DRIVE)
+def test_node_info(drive: Shell, node: str) -> None:
+    """A node shows its signals and the frames that it reads."""
+    info = drive.ask('node', 'info', '--no-daemon', '--spin-time', '5', f'/{node}')
+    publishers = info.partition('Publishers:')[2].partition('Service')[0]
+    assert f'/{node}/frame: std_msgs/msg/Float64MultiArray' in publishers
+    subscribers = info.partition('Subscribers:')[2].partition('Publishers:')[0]
+    assert '/frame: std_msgs/msg/Float64MultiArray' in subscribers
+
+
+def test_param_list(drive: Shell) -> None:
+    """Constants and tuning values are parameters of the unit's own node."""
+    listed = drive.ask('param', 'list', '--no-daemon', '--spin-time', '5', '/torque_share').split()
+    assert {'bias_pot', 'fade_out_voltage', 'filter_1.gain', 'filter_1.pole', 'k_2'} <= set(listed)
+
+
+def test_param_get_and_set(drive: Shell) -> None:
+    """A tuning value is set while the drive runs, and reported once it is in force."""
+    node = ('--no-daemon', '--spin-time', '5', '/torque_share', 'bias_pot')
+    assert drive.ask('param', 'get', *node).startswith('Double value is: ')
+    assert 'successful' in drive.ask('param', 'set', *node, '0.25')
+    assert drive.ask('param', 'get', *node) == 'Double value is: 0.25\n'
+
+
+@pytest.mark.parametrize('name, value', [('bias_pot', '1.5'), ('k_2', '-3.0')])
+def test_param_set_is_refused(drive: Shell, name: str, value: str) -> None:
+    """What is out of range, and a physical constant, is refused with a reason and unchanged."""
+    node = ('--no-daemon', '--spin-time', '5', '/torque_share', name)
+    before = drive.ask('param', 'get', *node)
+    refused = drive.run('param', 'set', *node, value)
+    assert re.search(f'failed: .*{name}', refused.stdout + refused.stderr)
+    assert drive.ask('param', 'get', *node) == before
+
+
+def test_param_describe(drive: Shell) -> None:
+    """A parameter tells its unit, its range, and whether it may change."""
+    described = drive.ask('param', 'describe', '--no-daemon', '--spin-time', '5', '/torque_share',
+                          'fade_out_voltage')
+    assert re.search(r'Description: .*\bV\b', described)
+    assert re.search(r'Min value: -50\.0\s+Max value: 0\.0', described)
+
+
+def test_plant_constants_are_read_only(drive: Shell) -> None:
+    """The read-only mark stands on what cannot be tuned."""
+    described = drive.ask('param', 'describe', '--no-daemon', '--spin-time', '5', '/plant',
+                          'gear_ratio')
+    assert 'Read only: true' in described
+
+
+def test_namespace_moves_a_node(shell: Shell) -> None:
+    """In a namespace everything of a node is in the namespace; alone it waits, and can be left."""
+    process = shell.start('run', 'antenna_drive', 'torque_share', '--ros-args', '-r',
+                          '__ns:=/elevation')
+    listed = shell.ask('param', 'get', '--no-daemon', '--timeout', '30',
+                       '/elevation/torque_share', 'bias_pot')
+    assert listed.startswith('Double value is: ')
+    topics = shell.ask('topic', 'list', '--no-daemon', '--spin-time', '5').split()
+    assert '/elevation/torque_share/frame' in topics
+    code, printed = interrupt(process)
+    assert code == 0, printed
