@@ -1,0 +1,116 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What scripts/set-up decides on each kind of machine, with a stand-in for Python that logs."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import subprocess
+
+from installations import ROOT
+import pytest
+
+PYTHON = """\
+#!/bin/sh
+# Answers as the machine that a test describes would, and writes down what it is asked to do.
+case "$*" in
+    *version_info*) exit "${OLD:-0}";;
+    *ensurepip*) exit "${NO_VENV:-0}";;
+    *rclpy*) exit "${NO_RCLPY:-0}";;
+    "-c "*) exit 0;;
+    "-m venv"*) echo "$@" >> "$LOG"
+        for venv; do :; done
+        mkdir -p "$venv/bin" && cp "$0" "$venv/bin/python";;
+    *) echo "$@" >> "$LOG";;
+esac
+"""
+ROS, NO_ROS = {'ROS_DISTRO': 'kilted'}, {'NO_RCLPY': '1'}
+
+
+@pytest.fixture
+def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the folder of a machine's programs, with that Python in it."""
+    programs = tmp_path / 'bin'
+    programs.mkdir()
+    (programs / 'python').write_text(PYTHON)
+    (programs / 'python').chmod(0o755)
+    monkeypatch.setenv('PYTHON', str(programs / 'python'))
+    monkeypatch.setenv('PATH', f'{programs}:{os.environ["PATH"]}')
+    monkeypatch.setenv('LOG', str(tmp_path / 'log'))
+    monkeypatch.delenv('ROS_DISTRO', raising=False)
+    return programs
+
+
+def become(machine: Path, name: str) -> None:
+    """Let uname say that the machine is another."""
+    (machine / 'uname').write_text(
+        f'#!/bin/sh\n[ "$1" = -s ] && echo {name.split()[0]} || echo {name.split()[1]}\n')
+    (machine / 'uname').chmod(0o755)
+
+
+def set_up(machine: Path, **variables: str) -> tuple[int, str, str]:
+    """Run the script and return its exit code, what it said and what it did."""
+    done = subprocess.run([ROOT / 'scripts' / 'set-up', machine.parent / 'venv'], text=True,
+                          env={**os.environ, **variables}, capture_output=True)
+    log = machine.parent / 'log'
+    return done.returncode, done.stdout + done.stderr, log.read_text() if log.exists() else ''
+
+
+def test_wheels(machine: Path) -> None:
+    """On x86-64 Linux without ROS 2 the wheels are installed."""
+    become(machine, 'Linux x86_64')
+    code, said, did = set_up(machine, **NO_ROS)
+    assert code == 0 and '.[ros,' in did and 'system-site-packages' not in did
+    assert 'ROS 2' not in said
+
+
+def test_sourced_ros(machine: Path) -> None:
+    """A sourced ROS 2 is used, and none is installed beside it."""
+    code, said, did = set_up(machine, **ROS)
+    assert code == 0 and '--system-site-packages' in did and 'ros,' not in did
+    assert 'using the sourced ROS 2 kilted' in said
+
+
+def test_sourced_ros_of_another_python(machine: Path) -> None:
+    """A sourced ROS 2 that this Python cannot load is not counted on."""
+    become(machine, 'Linux x86_64')
+    assert '.[ros,' in set_up(machine, **ROS, **NO_ROS)[2]
+
+
+@pytest.mark.parametrize('name', ['Darwin arm64', 'Linux aarch64'])
+def test_no_wheels(machine: Path, name: str) -> None:
+    """Where there are no wheels, one line says what works and what does not."""
+    become(machine, name)
+    code, said, did = set_up(machine, **NO_ROS)
+    assert code == 0 and did
+    lines = [line for line in said.splitlines() if 'ROS 2' in line]
+    assert len(lines) == 1 and name in lines[0]
+    assert 'everything works but the five nodes' in lines[0]
+
+
+@pytest.mark.parametrize('lack, remedy', [('OLD', 'Python 3.10'), ('NO_VENV', 'python3-venv')])
+def test_what_is_missing(machine: Path, lack: str, remedy: str) -> None:
+    """A Python that will not do is told in one line, and nothing is begun."""
+    code, said, did = set_up(machine, **{lack: '1'}, **NO_ROS)
+    assert code == 1 and did == ''
+    assert said.count('\n') == 1 and remedy in said
+
+
+def test_again(machine: Path) -> None:
+    """An environment that still runs is kept and brought up to date."""
+    become(machine, 'Linux x86_64')
+    first = set_up(machine, **NO_ROS)[2]
+    second = set_up(machine, **NO_ROS)[2].removeprefix(first)
+    assert '-m venv' in first and '-m venv' not in second and '-m pip install' in second
