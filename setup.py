@@ -82,7 +82,7 @@ setup(
         'ros': [f'{wheel} ; {WHEELS_EXIST}' for wheel in KILTED],
         'plot': ['matplotlib >= 3.6'],
         # the first release that can complete a chunk on demand
-        'recording': ['mcap >= 1.6'],
+        'recording': ['mcap >= 1.5'],
         'test': [
             'pytest >= 7.4',
             'hypothesis >= 6.80',

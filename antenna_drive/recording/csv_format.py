@@ -46,11 +46,11 @@ import numpy as np
 
 TIME = 'time_s'
 RATE_COMMAND = 'rate_command_rad_s'
-# The columns of a field test, and the signals that they are.
+# The columns of a field test, and the signals that they are: the readings of the sensors.
 FIELD_COLUMNS = {
     RATE_COMMAND: 'test_signal/rate_command',
-    'current_1_A': 'motor_1/current',
-    'current_2_A': 'motor_2/current',
+    'current_1_A': 'motor_1/ammeter',
+    'current_2_A': 'motor_2/ammeter',
     'tach_rate_1_rad_s': 'motor_1/tach_rate',
     'tach_rate_2_rad_s': 'motor_2/tach_rate',
     'encoder_rad': 'plant/encoder',
@@ -72,7 +72,8 @@ class Cell(NamedTuple):
 
     def refuse(self, problem: str) -> RecordingError:
         """Return the error that names the place."""
-        return RecordingError(f'{self.path}: line {self.line}, column {self.column}: {problem}')
+        column = one_line(self.column, 60)
+        return RecordingError(f'{self.path}: line {self.line}, column {column}: {problem}')
 
 
 def parse_number(text: str, cell: Cell) -> float:

@@ -367,9 +367,10 @@ def _places(path: Path, line: int, header: list[str], import_map: ImportMap) -> 
     for column in needed:
         if header.count(column) != 1:
             close = difflib.get_close_matches(column, header, n=1)
-            hint = f', did you mean {one_line(close[0], 40)}?' if close else ''
+            hint = f', did you mean {one_line(repr(close[0]), 60)}?' if close else ''
             what = 'is there twice' if column in header else f'is not there{hint}'
-            raise RecordingError(f'{path}: line {line}: the column {column} {what}')
+            raise RecordingError(f'{path}: line {line}: the column '
+                                 f'{one_line(repr(column), 60)} {what}')
     return {column: header.index(column) for column in needed}
 
 

@@ -44,8 +44,8 @@ def write(path: Path, *lines: str) -> Path:
 def test_the_field_columns_are_the_drives_signals(tmp_path: Path) -> None:
     recording = read_csv(write(tmp_path / 'a.csv', HEADER, '0,1,2,3,4,5,6,7', '0.02,8,,,,,,9e-3'))
     assert recording['test_signal/rate_command'].values.tolist() == [1.0, 8.0]
-    assert recording['motor_1/current'].values.tolist() == [2.0]
-    assert recording['motor_2/current'].values.tolist() == [3.0]
+    assert recording['motor_1/ammeter'].values.tolist() == [2.0]
+    assert recording['motor_2/ammeter'].values.tolist() == [3.0]
     assert recording['motor_1/tach_rate'].values.tolist() == [4.0]
     assert recording['motor_2/tach_rate'].values.tolist() == [5.0]
     assert recording['plant/encoder'].values.tolist() == [6.0]

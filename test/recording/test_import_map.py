@@ -121,12 +121,12 @@ PLAIN = f'time: {{column: t}}\nsignals: {{{COMMAND}: {{column: r}}}}\n'
     ('t,r\n0,1\n-1,2\n', 'line 3, column t: the time is not later'),
     ('t,r\n0,1\n1,x\n', "line 3, column r: 'x' is no number"),
     ('t,r\n0,1\n1,2,3\n', 'line 3: 3 cells, but the header has 2'),
-    ('t,R\n0,1\n', 'line 1: the column r is not there'),
-    ('t,rr\n0,1\n', 'line 1: the column r is not there, did you mean rr?'),
-    ('t,r,r\n0,1,1\n', 'line 1: the column r is there twice'),
+    ('t,R\n0,1\n', "line 1: the column 'r' is not there"),
+    ('t,rr\n0,1\n', "line 1: the column 'r' is not there, did you mean 'rr'"),
+    ('t,r,r\n0,1,1\n', "line 1: the column 'r' is there twice"),
     ('t,r\n,1\n', 'line 2, column r: there is a value, but no time stamp'),
     ('t,r\n1e300,1\n', 'line 2, column t: .*beyond'),
-    ('', 'line 1: the column t is not there'),
+    ('', "line 1: the column 't' is not there"),
 ])
 def test_what_does_not_fit_the_map_is_refused_with_its_place(table: str, words: str,
                                                              tmp_path: Path) -> None:
@@ -171,7 +171,7 @@ def test_no_date_is_refused(tmp_path: Path) -> None:
     ({'signals': {CURRENT: {'column': 'r', 'sign': 2}}}, r'sign: 2 given, allowed is 1 or -1'),
     ({'signals': {CURRENT: {'column': 'r', 'scale': '2'}}}, r"scale: '2' given"),
     ({'signals': {CURRENT: {'column': 'r', 'gain': 2}}}, r'gain: no such entry'),
-    ({'signals': {CURRENT: {'column': 'r'}, 'current_1_A': {'column': 'r'}}}, 'given twice'),
+    ({'signals': {'motor_1/ammeter': {'column': 'r'}, 'current_1_A': {'column': 'r'}}}, 'twice'),
 ])
 def test_wrong_maps_are_refused_with_the_key(change: dict[str, object], words: str) -> None:
     with pytest.raises(ParameterError, match=words) as refusal:

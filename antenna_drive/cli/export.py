@@ -1,0 +1,54 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Turn a recording into CSV, exact to the last bit of every number.
+
+One column for each signal, named 'unit/signal [unit]'; with --field the eight columns of a field
+test instead (time_s, rate_command_rad_s, current_1_A ...). A cell is empty where a signal has no
+sample. Beside OUT.csv come OUT.yaml, the test sheet, and OUT.meta.json, the configuration in
+force and the live changes; `antenna-drive import` reads all three back.
+
+  antenna-drive export run/ run.csv
+  antenna-drive export run/ field.csv --field --from 5 --to 25
+  antenna-drive export run/ currents.csv --signals 'motor_*/current'
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from antenna_drive.cli.reading import add_recording_options, read
+from antenna_drive.recording.csv_format import write_csv
+from antenna_drive.recording.panels import chosen
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command understands."""
+    add_recording_options(parser)
+    parser.add_argument('out', type=Path, metavar='OUT.csv', help='the file to write; it must '
+                                                                  'not be there yet')
+    parser.add_argument('--field', action='store_true',
+                        help="write the field test's columns, and no other signal")
+    parser.add_argument('--signals', nargs='+', metavar='NAME',
+                        help="the signals to write, such as plant/encoder or 'motor_*/current'")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the file and what goes beside it."""
+    recording = read(args)
+    names = chosen(recording, args.signals) if args.signals else None
+    for path in write_csv(recording, args.out, field=args.field, names=names):
+        print(path)
+    return 0

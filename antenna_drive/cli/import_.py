@@ -1,0 +1,63 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Turn a CSV from the field into a bag that every ROS 2 tool, plotter and command here opens.
+
+A file with the columns of a field test (time_s, rate_command_rad_s, current_1_A, current_2_A,
+tach_rate_1_rad_s, tach_rate_2_rad_s, encoder_rad, bias_voltage_V) or of `antenna-drive export`
+needs no map. Any other is described by a map, in YAML:
+
+  time: {column: "Time (ms)", unit: ms}          # s, ms, us, ns, iso8601
+  delimiter: ";"
+  signals:
+    test_signal/rate_command: {column: CMD, unit: deg/s, sign: -1}
+    motor_1/current: {column: I1, unit: A, scale: 0.1667, offset: 0.02, clock_offset_s: 0.004}
+    plant/encoder: {column: ENC, unit: counts, counts_per_revolution: 2097152}
+
+docs/recording.md lists every entry. A test sheet NAME.yaml beside NAME.csv goes into the bag.
+Whatever cannot be read is refused with its line and column, and then nothing is written.
+
+  antenna-drive import field.csv field_bag
+  antenna-drive import log.csv field_bag --map log_map.yaml
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from antenna_drive.cli.reading import warnings_in_one_line
+from antenna_drive.recording.csv_format import read_csv
+from antenna_drive.recording.import_map import import_csv, load_map
+from antenna_drive.recording.mcap_format import write_bag
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command understands."""
+    parser.add_argument('csv', type=Path, metavar='FIELD.csv', help='the file to read')
+    parser.add_argument('bag', type=Path, metavar='BAG', help='the folder to write; it must not '
+                                                              'be there yet')
+    parser.add_argument('--map', type=Path, metavar='MAP.yaml',
+                        help='which column is which signal, and how it is written')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Read the file, write the bag."""
+    with warnings_in_one_line():
+        recording = (import_csv(args.csv, load_map(args.map)) if args.map
+                     else read_csv(args.csv))
+    write_bag(recording, args.bag)
+    for name, channel in recording.channels.items():
+        print(f'{name} [{channel.unit}]: {len(channel)} samples')
+    return 0

@@ -1,0 +1,53 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Draw the signals of a recording over time: a PNG, PDF or SVG.
+
+Signals that belong together share a panel. Angles are in degrees, currents in article amperes
+with real ones on the right where the configuration tells how many they are.
+
+  antenna-drive plot run/ --out run.png
+  antenna-drive plot run/ --signals 'motor_*/current' torque_share/bias_voltage --to 12.6
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from antenna_drive.cli.output import replaced
+from antenna_drive.cli.reading import add_recording_options, read
+from antenna_drive.recording.picture import draw, picture_format
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command understands."""
+    add_recording_options(parser)
+    parser.add_argument('--signals', nargs='+', metavar='NAME',
+                        help="the signals to draw, such as plant/encoder or 'motor_*/current'; "
+                             'all if not given')
+    parser.add_argument('--out', type=Path, metavar='FILE',
+                        help='the picture, .png, .pdf or .svg; RECORDING.png here if not given')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Draw the picture."""
+    out = args.out or Path(f'{Path(args.recording).resolve().stem}.png')
+    form = picture_format(out)
+    recording = read(args)
+    with replaced(out) as stream:
+        draw(recording, stream, form, patterns=args.signals,
+             title=Path(args.recording).resolve().name)
+    print(out)
+    return 0

@@ -1,0 +1,62 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""How every command reads a recording: its options, and warnings in one line."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+import math
+import sys
+import warnings
+
+from antenna_drive.recording.files import read_recording
+from antenna_drive.recording.recording import Recording, RecordingWarning
+
+
+def add_recording_options(parser: argparse.ArgumentParser, span: bool = True) -> None:
+    """Add the recording to read, `--partial`, and `--from` and `--to` to read a part."""
+    parser.add_argument('recording', metavar='RECORDING',
+                        help='a bag (folder or .mcap), a .csv, or a servo log (.json)')
+    parser.add_argument('--partial', action='store_true',
+                        help='take what can be read of a bag that was cut off, and say how far')
+    if span:
+        parser.add_argument('--from', dest='start', type=float, default=-math.inf, metavar='S',
+                            help='leave out what was before this time [s]')
+        parser.add_argument('--to', dest='end', type=float, default=math.inf, metavar='S',
+                            help='leave out this time [s] and what came after')
+
+
+def read(args: argparse.Namespace) -> Recording:
+    """Read the recording that the options name; UserError says what is wrong with it."""
+    with warnings_in_one_line():
+        recording = read_recording(args.recording, partial=args.partial)
+    if 'start' in args and (args.start > -math.inf or args.end < math.inf):
+        recording = recording.between(args.start, args.end)
+    return recording
+
+
+@contextmanager
+def warnings_in_one_line() -> Iterator[None]:
+    """Show warnings about recordings to people, without the place in the program."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter('always', RecordingWarning)
+        yield
+    for warning in caught:
+        if issubclass(warning.category, RecordingWarning):
+            print(f'warning: {warning.message}', file=sys.stderr)
+        else:
+            warnings.warn_explicit(warning.message, warning.category, warning.filename,
+                                   warning.lineno)

@@ -1,0 +1,158 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The figures of a recording that tell how the torque bias did its work.
+
+Every sample counts until the next one of its signal, so that uneven sampling does not bias a
+share of time. Docstrings define the figures; docs/recording.md lists them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from antenna_drive.recording.recording import Channel, NANOSECONDS, Recording
+from antenna_drive.recording.sheet import Sensors
+import numpy as np
+
+MOTORS = ('motor_1', 'motor_2')
+# A reading within so many standard deviations of its noise is not told from zero.
+NOISE_WIDTH = 3.0
+
+
+@dataclass(frozen=True)
+class BiasStatistics:
+    """
+    The bias voltage.
+
+    Attributes
+    ----------
+    minimum_V, maximum_V : the range
+    at_zero : share of time at or below `zero_V`, within which the motors do not counteract
+    zero_V : what counts as zero: 0, or the noise and resolution that the test sheet tells
+
+    """
+
+    minimum_V: float
+    maximum_V: float
+    at_zero: float
+    zero_V: float
+
+
+@dataclass(frozen=True)
+class MotorStatistics:
+    """
+    One motor; None where its signal was not recorded.
+
+    Attributes
+    ----------
+    current_peak_A : greatest current either way, with its sign; the ammeter's where the current
+        itself was not recorded [article A]
+    current_peak_s : when it flowed
+    current_rms_A : root mean square [article A]
+    stick : share of time that the rotor stands still
+    still_rad_s : rate that counts as standing still: 0, or noise and resolution of the sheet
+    backlash_crossings : how often the teeth changed from one flank to the other: changes of the
+        sign of the gear torque, the zeros in the gap between left out
+
+    """
+
+    current_peak_A: float | None = None
+    current_peak_s: float | None = None
+    current_rms_A: float | None = None
+    stick: float | None = None
+    still_rad_s: float | None = None
+    backlash_crossings: int | None = None
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """
+    The figures of a recording; None where a signal was not recorded.
+
+    Attributes
+    ----------
+    start_s, end_s : span of the samples [s]
+    bias : the bias voltage
+    motors : 'motor_1' and 'motor_2' -> the motor's figures
+    axis_stick : share of time that the axis stands still, its rate being exactly zero
+
+    """
+
+    start_s: float
+    end_s: float
+    bias: BiasStatistics | None
+    motors: Mapping[str, MotorStatistics]
+    axis_stick: float | None
+
+
+def share_of_time(channel: Channel, holds: Any) -> float:
+    """Return the share of time for which `holds`, an array of shape (n,), is true."""
+    if len(channel) < 2:
+        return float(np.mean(holds))
+    width = np.diff(channel.time_ns)
+    return float(width[holds[:-1]].sum() / width.sum())
+
+
+def crossings(torque: Any) -> int:
+    """Return how often the sign of `torque`, shape (n,), changes, zeros left out."""
+    signs = np.sign(torque[torque != 0.0])
+    return int(np.count_nonzero(signs[1:] != signs[:-1]))
+
+
+def statistics(recording: Recording) -> Statistics:
+    """Return the figures of a recording."""
+    sensors = recording.sheet.sensors or Sensors()
+    bias = None
+    channel = _channel(recording, 'torque_share/bias_voltage')
+    if channel:
+        zero = _limit(sensors.bias_noise_V, sensors.bias_step_V)
+        bias = BiasStatistics(float(channel.values.min()), float(channel.values.max()),
+                              share_of_time(channel, channel.values <= zero), zero)
+    still = _limit(sensors.tach_noise_rad_s, sensors.tach_step_rad_s)
+    axis = _channel(recording, 'plant/axis_rate')
+    return Statistics(
+        recording.start_ns / NANOSECONDS, recording.end_ns / NANOSECONDS, bias,
+        {motor: _motor(recording, motor, still) for motor in MOTORS},
+        share_of_time(axis, axis.values == 0.0) if axis else None)
+
+
+def _motor(recording: Recording, motor: str, still: float) -> MotorStatistics:
+    figures: dict[str, Any] = {}
+    current = (_channel(recording, f'{motor}/current')
+               or _channel(recording, f'{motor}/ammeter'))
+    if current:
+        peak = int(np.argmax(np.abs(current.values)))
+        width = np.append(np.diff(current.time_ns), 0.0) if len(current) > 1 else np.ones(1)
+        figures.update(
+            current_peak_A=float(current.values[peak]),
+            current_peak_s=int(current.time_ns[peak]) / NANOSECONDS,
+            current_rms_A=float(np.sqrt((width * current.values**2).sum() / width.sum())))
+    rate = _channel(recording, f'{motor}/tach_rate')
+    if rate:
+        figures.update(stick=share_of_time(rate, np.abs(rate.values) <= still), still_rad_s=still)
+    torque = _channel(recording, f'{motor}/gear_torque')
+    if torque:
+        figures.update(backlash_crossings=crossings(torque.values))
+    return MotorStatistics(**figures)
+
+
+def _channel(recording: Recording, name: str) -> Channel | None:
+    return recording[name] if name in recording and len(recording[name]) else None
+
+
+def _limit(noise: float | None, step: float | None) -> float:
+    return max(NOISE_WIDTH * (noise or 0.0), step or 0.0)

@@ -1,0 +1,131 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Which signals people look at together, and in which units: degrees here, SI everywhere else.
+
+The report, the pictures and the layouts for plotting programs all show these panels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+import math
+from typing import NamedTuple
+
+from antenna_drive.recording.recording import Recording, RecordingError
+
+_DEGREES = 180.0 / math.pi
+_CURRENT = 'article A'
+
+
+class Panel(NamedTuple):
+    """Signals that share an axis: a title, the unit shown and how many of it are one SI unit."""
+
+    title: str
+    unit: str
+    factor: float
+    names: tuple[str, ...]
+
+
+PANELS = (
+    Panel('Axis rate', 'deg/s', _DEGREES, ('test_signal/rate_command', 'plant/axis_rate')),
+    Panel('Motor current', _CURRENT, 1.0, ('motor_1/current', 'motor_2/current')),
+    Panel('Ammeter', _CURRENT, 1.0, ('motor_1/ammeter', 'motor_2/ammeter')),
+    Panel('Motor rate', 'deg/s', _DEGREES,
+          ('motor_1/tach_rate', 'motor_2/tach_rate', 'plant/pinion_rate')),
+    Panel('Torque bias', 'V', 1.0, ('torque_share/bias_voltage', 'torque_share/counter_torque')),
+    Panel('Gear torque', 'N m', 1.0, ('motor_1/gear_torque', 'motor_2/gear_torque')),
+    Panel('Axis angle', 'deg', _DEGREES, ('plant/encoder', 'plant/axis_angle')),
+    Panel('Pointing error', 'mdeg', 1000.0 * _DEGREES,
+          ('plant/pointing_error_elevation', 'plant/pointing_error_cross_elevation')),
+    Panel('External torque', 'kN m', 1e-3, ('test_signal/external_torque',)),
+    Panel('Missed impulse of the gear torque', 'N m s', 1.0,
+          ('motor_1/missed_impulse', 'motor_2/missed_impulse')),
+)
+
+
+def chosen(recording: Recording, patterns: Sequence[str] | None) -> tuple[str, ...]:
+    """
+    Return the signals whose names fit any of the patterns, such as 'motor_*/current'.
+
+    Raises
+    ------
+    RecordingError : a pattern fits no signal; the message names the nearest one
+
+    """
+    if not patterns:
+        return tuple(name for name in recording if len(recording[name]))
+    names: dict[str, None] = {}
+    for pattern in patterns:
+        found = [name for name in recording if fnmatchcase(name, pattern)]
+        names.update(dict.fromkeys(found or [pattern]))
+    for name in names:
+        recording[name]  # says which one was meant
+    if not any(len(recording[name]) for name in names):
+        raise RecordingError(f'{", ".join(names)}: no sample')
+    return tuple(names)
+
+
+def panels_of(recording: Recording, patterns: Sequence[str] | None = None) -> tuple[Panel, ...]:
+    """
+    Return the panels that show a recording: the drive's own first, then one for each other signal.
+
+    Parameters
+    ----------
+    recording : what is to be looked at
+    patterns : the signals, see `chosen`; if not given, panels that tell nothing are left out: an
+        external torque of zero, ammeters that read the currents, and the lock-step's own signal
+
+    Raises
+    ------
+    RecordingError : a pattern fits no signal, or there is no sample at all
+
+    """
+    names = chosen(recording, patterns)
+    if not names:
+        raise RecordingError('there is no sample to draw')
+    panels = []
+    rest = dict.fromkeys(names)
+    for panel in PANELS:
+        shown = tuple(name for name in panel.names if name in rest)
+        for name in shown:
+            del rest[name]
+        if shown and (patterns or not all(_idle(recording, name) for name in shown)):
+            panels.append(panel._replace(names=shown))
+    for name in rest:
+        panels.append(Panel(name, recording[name].unit or '1', 1.0, (name,)))
+    return tuple(panels)
+
+
+def _idle(recording: Recording, name: str) -> bool:
+    unit, _, signal = name.partition('/')
+    if signal == 'external_torque':
+        return not recording[name].values.any()
+    if signal == 'ammeter':
+        return recording.channels.get(f'{unit}/current') == recording[name]
+    return signal == 'missed_impulse'
+
+
+def real_amperes(recording: Recording) -> float | None:
+    """Return how many real amperes one article ampere is, None if the recording tells nothing."""
+    for motor in ('motor_1', 'motor_2'):
+        try:
+            ratio = recording.configuration[motor]['armature'][
+                'physical_amperes_per_article_ampere']
+        except (KeyError, TypeError):
+            continue
+        if isinstance(ratio, float):
+            return ratio
+    return None

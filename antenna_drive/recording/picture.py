@@ -1,0 +1,93 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A picture of a recording, with matplotlib."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import IO
+
+from antenna_drive.recording.panels import panels_of, real_amperes
+from antenna_drive.recording.recording import Recording, RecordingError
+
+FORMATS = ('png', 'pdf', 'svg')
+# Colours that stay apart for colour-blind readers and in print (Okabe and Ito).
+COLOURS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9')
+
+
+def draw(recording: Recording, stream: IO[bytes], form: str, *,
+         patterns: Sequence[str] | None = None, title: str = '') -> None:
+    """
+    Draw the signals over time, one panel for those that belong together.
+
+    Parameters
+    ----------
+    recording : what to draw
+    stream : where to write the picture
+    form : one of FORMATS
+    patterns : the signals, such as 'motor_*/current'; all that have samples if not given
+    title : above the picture
+
+    Raises
+    ------
+    RecordingError : there is no such signal or format, or there is no sample
+
+    """
+    if form not in FORMATS:
+        raise RecordingError(f'{form!r}: no format of a picture, allowed are '
+                             f'{", ".join(FORMATS)}')
+    # a figure of its own: pyplot would want a screen and keep every figure
+    from matplotlib.figure import Figure
+    panels = panels_of(recording, patterns)
+    figure = Figure(figsize=(9.0, 0.8 + 1.7 * len(panels)), layout='constrained')
+    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    kappa = real_amperes(recording)
+    for axis, panel in zip(axes, panels, strict=True):
+        for name, colour in zip(panel.names, COLOURS * 3):
+            channel = recording[name]
+            axis.plot(channel.time_s, panel.factor * channel.values, color=colour, linewidth=1.0,
+                      label=name, marker='.' if len(channel) == 1 else '')
+        axis.set_title(panel.title, loc='left', fontsize='medium', fontweight='bold')
+        axis.set_ylabel(panel.unit)
+        axis.grid(alpha=0.3)
+        # above the panel, where it hides nothing
+        axis.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=len(panel.names),
+                    fontsize='small', frameon=False, borderaxespad=0.1)
+        axis.margins(x=0)
+        if panel.unit == 'article A' and kappa:
+            # article amperes are no real ones: these stand on the other side
+            other = axis.secondary_yaxis('right', functions=(
+                lambda a, k=kappa: k * a, lambda a, k=kappa: a / k))
+            other.set_ylabel('real A')
+    axes[-1].set_xlabel('time [s]')
+    if title:
+        figure.suptitle(title)
+    figure.savefig(stream, format=form, dpi=120)
+
+
+def picture_format(path: Path) -> str:
+    """
+    Return the format that a file's name asks for.
+
+    Raises
+    ------
+    RecordingError : it asks for none of FORMATS
+
+    """
+    form = path.suffix.lstrip('.').lower()
+    if form not in FORMATS:
+        raise RecordingError(f'{path}: the name has to end in one of '
+                             + ', '.join(f'.{known}' for known in FORMATS))
+    return form
