@@ -123,7 +123,7 @@ def axis_friction(structure: Any, angle: float, rate: float, t: float) -> tuple[
     level = structure.coulomb * (1.0 - structure.dahl)
     if structure.bump != 0.0:
         phase = 2.0 * math.pi * angle / structure.bump_pitch + structure.bump_phase
-        level *= 1.0 + structure.bump * (2.0 * math.exp(2.0 * (math.cos(phase) - 1.0)) - 0.6)
+        level *= 1.0 + structure.bump * (2.0 * math.exp(2.0 * (math.cos(phase) - 1.0)) - 0.617)
     if structure.warming != 0.0:
         level *= 1.0 - structure.warming * (1.0 - math.exp(-t / structure.warming_time))
     kinetic = level + stribeck_torque(structure.stribeck, rate, structure.stribeck_rate)
@@ -155,7 +155,7 @@ def tach_reading(motor: Any, y: FloatArray, at: int, t: float, middle: float) ->
         angle = motor.tach_cycles * y[at + THETA] + motor.tach_phase
         # Commutation: the rounded tops of a rectified wave, without its mean.
         reading += motor.tach_ripple * rate * 2.0 * (
-            math.sqrt(math.sin(0.5 * angle)**2 + 0.01) - 0.6470)
+            math.sqrt(math.sin(0.5 * angle)**2 + 0.01) - 0.6499)
     if motor.hum != 0.0:
         reading += motor.hum * math.sin(MAINS * t)
     if motor.dropout_length > 0.0:
@@ -252,7 +252,7 @@ def motor_derivative(motor: Any, machine: Machine, y: FloatArray, dy: FloatArray
     if motor.dead_zone > 0.0:
         v -= motor.dead_zone * math.tanh(v / motor.dead_zone)
     voltage = motor.loop_gain * v - motor.feedback_gain * i
-    limit = motor.voltage_limit - sag
+    limit = motor.voltage_limit / (1.0 + sag / motor.voltage_limit)
     rail = mode[VOLTAGE + which]
     if rail == 0:
         margin[VOLTAGE + which] = limit - abs(voltage)
@@ -261,7 +261,7 @@ def motor_derivative(motor: Any, machine: Machine, y: FloatArray, dy: FloatArray
         voltage = rail * limit
     warmth = y[at + WARMTH]
     resistance = motor.resistance * (1.0 + motor.warm_resistance * warmth)
-    strength = 1.0 - motor.warm_torque * warmth
+    strength = 1.0 / (1.0 + motor.warm_torque * warmth)
     dy[at + WARMTH] = (i * i - warmth) / motor.warming_time
     dy[at + I] = (voltage / motor.ampere_scale - resistance * i
                   - strength * motor.back_emf * w) / motor.inductance
@@ -387,3 +387,28 @@ def derivative(t: float, middle: float, y: FloatArray, mode: ModeArray, machine:
             middle, mode, margin, sag)
     structure_derivative(machine.structure[0], y, dy, t, middle, test.elevation, gears, mode,
                          margin)
+
+
+@compiled
+def readings(times: FloatArray, middles: FloatArray, states: FloatArray, machine: Machine,
+             test: Any, commands: FloatArray, biases: FloatArray, tachs: FloatArray) -> None:
+    """
+    Fill what follows from the state without being part of it.
+
+    Parameters
+    ----------
+    times, middles : as in `derivative`, shape (n,) [s]
+    states : shape (n, STATES)
+    machine, test : as in `derivative`
+    commands, biases, tachs : results, shapes (n,), (n,), (2, n) [rad/s, V, rad/s]
+
+    """
+    circuit = machine.circuit[0]
+    for k in range(len(times)):
+        commands[k] = command(test, times[k], middles[k])
+        x_2 = min(max(states[k, X_2], 0.0), circuit.ceiling)
+        biases[k] = bias_voltage(circuit, test, x_2, middles[k], 0)
+        for which in range(2):
+            tachs[which, k] = tach_reading(
+                machine.motors[which], states[k], MOTOR_AT + which * MOTOR_SIZE, times[k],
+                middles[k])

@@ -33,12 +33,13 @@ from antenna_drive.trial.machine import Machine
 import numpy as np
 
 # Reasons for which an integration ends.
-DONE, STEP_TOO_SMALL, NOT_FINITE, CHATTER = 0, 1, 2, 3
+DONE, STEP_TOO_SMALL, NOT_FINITE, CHATTER, TOO_MANY_STEPS = 0, 1, 2, 3, 4
 
 TIME_RESOLUTION = 1e-12     # to which a switching is located [s]
 STEP_FLOOR = 1e-11          # below it the problem is not the step [s]
 LONGEST_STEP = 5e-3         # so that two switchings of one body cannot hide in a step [s]
 CHATTER_LIMIT = 400         # switchings without progress in time
+MOST_STEPS = 5_000_000      # a drive that holds together takes some ten thousand
 
 A = np.array([
     [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -199,6 +200,8 @@ def integrate(machine: Machine, test: Any, start: FloatArray, mode: ModeArray,
                 return STEP_TOO_SMALL if np.isfinite(worst) else NOT_FINITE
             continue
         statistics[0] += 1
+        if statistics[0] > MOST_STEPS:
+            return TOO_MANY_STEPS
         step = h * min(5.0, max(0.2, growth))
 
         # Has a switch to be thrown within the step? Bracket the first moment, then bisect.

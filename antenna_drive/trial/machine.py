@@ -73,8 +73,8 @@ MOTOR = np.dtype([(name, np.float64) for name in (
     'windup',                   # share of the integration that the clamp fails to stop
     'integrator_leak',          # [1/s]
     'current_ripple',           # relative ripple of the torque constant
-    'warm_resistance',          # relative rise of the resistance when warm
-    'warm_torque',              # relative loss of the torque constant when warm
+    'warm_resistance',          # relative rise of the resistance per warmth [1/A^2]
+    'warm_torque',              # loss of torque constant: it is 1 / (1 + this * warmth) [1/A^2]
     'warming_time',             # [s]
     'coupling_frequency',       # of the tachometer's coupling [rad/s], 0: rigid
     'hardening',                # stiffness times 1 + hardening * deflection^2 [1/rad^2]
@@ -105,7 +105,7 @@ STRUCTURE = np.dtype([(name, np.float64) for name in (
     'warming', 'warming_time',                        # loss of Coulomb friction, [s]
     'mode_friction',            # dry friction in the structure [N m]
     'mode_friction_rate',       # [rad/s]
-    'supply_sag',               # [V per article A of both motors]
+    'supply_sag',               # at low current [V per article A of both]
     'ballast', 'ballast_at',    # load that shifts [N m], [s]
 )] + [
     ('mode_inertia', np.float64, (3,)),

@@ -148,7 +148,8 @@ def simulate(machine: Machine, sheet: TestSheet, times: FloatArray,
         filled = int(np.count_nonzero(np.isfinite(states[:, 0])))
         what = {integrator.STEP_TOO_SMALL: 'the step became too small',
                 integrator.NOT_FINITE: 'a state is not finite',
-                integrator.CHATTER: 'a switch chatters'}[reason]
+                integrator.CHATTER: 'a switch chatters',
+                integrator.TOO_MANY_STEPS: 'too many steps'}[reason]
         raise SimulationError(f'{what} after sample {filled} of {len(times)}')
     return _history(machine, test, times, states, edges, statistics)
 
@@ -172,18 +173,9 @@ def _history(machine: Machine, test: NDArray[np.void], times: FloatArray, states
     stretch = np.searchsorted(bounds, times, side='right') - 1
     middles = np.where(np.isfinite(bounds[stretch + 1]),
                        0.5 * (bounds[stretch] + bounds[stretch + 1]), bounds[stretch] + 1.0)
-    record = test[0]
     count = len(times)
     command, bias, tach = np.empty(count), np.empty(count), np.empty((2, count))
-    ceiling = float(machine.circuit[0]['ceiling'])
-    for k in range(count):
-        t, middle, y = times[k], middles[k], states[k]
-        command[k] = waveform.command(record, t, middle)
-        x_2 = min(max(y[equations.X_2], 0.0), ceiling)
-        bias[k] = equations.bias_voltage(machine.circuit[0], record, x_2, middle, 0)
-        for which in range(2):
-            tach[which, k] = equations.tach_reading(
-                machine.motors[which], y, MOTOR_AT + which * MOTOR_SIZE, t, middle)
+    equations.readings(times, middles, states, machine, test[0], command, bias, tach)
     encoder = (states[:, equations.ENCODER] if machine.structure[0]['encoder_frequency'] > 0.0
                else states[:, equations.THETA_A])
     columns = [MOTOR_AT + which * MOTOR_SIZE for which in range(2)]

@@ -1,0 +1,91 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Score the verdicts of a trial against its truths.
+
+Reads DIR/case_*/verdict.json, as `antenna-drive diagnose --json` writes it, and the truths of
+the trial, each checked against its seal. A case whose diagnosis failed counts as wrong; one
+that was not diagnosed yet is left out and counted as pending.
+
+docs/trial.md defines every figure. Exit code 1: there is no verdict to score.
+
+examples:
+  antenna-drive score trial7
+  antenna-drive score trial7 --json score.json --picture score.png
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import Any
+
+from antenna_drive.cli.output import add_json_option, STANDARD_OUTPUT, write_json
+from antenna_drive.errors import UserError
+from antenna_drive.trial.scorecard import read_cases, score
+
+# The figures in the order in which people read them, with what issue of quality they aim at.
+TARGETS = {
+    'cases': '', 'failures': '0', 'pending': '0', 'top1': '>= 0.90', 'top3': '>= 0.97',
+    'within_set': '', 'pairs_both': '>= 0.75', 'no_gap_on_none': '>= 0.97',
+    'auroc_unknown': '>= 0.95', 'overconfident_outside': '<= 0.05', 'ece': '<= 0.05',
+    'explained_fraction_median': '>= 0.95', 'seconds_median': '<= 30'}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of `antenna-drive score`."""
+    parser.add_argument('folder', type=Path, metavar='DIR', help='folder of the trial')
+    add_json_option(parser)
+    parser.add_argument('--picture', type=Path, metavar='FILE',
+                        help='draw confusion matrix and reliability diagram (.png, .pdf, .svg)')
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the scorecard; 1 if there is no verdict to score."""
+    cases, pending = read_cases(arguments.folder)
+    figures = score(cases, pending)
+    if arguments.picture is not None:
+        from antenna_drive.trial import pictures  # only a picture needs matplotlib
+        try:
+            pictures.draw_scorecard(figures, arguments.picture)
+        except ValueError as error:
+            raise UserError(f'{arguments.picture}: cannot be drawn, {error}') from error
+    if arguments.json is not None:
+        write_json(figures, arguments.json)
+    if arguments.json != STANDARD_OUTPUT:
+        print('\n'.join(_lines(figures)))
+    return 0 if cases else 1
+
+
+def _lines(figures: dict[str, Any]) -> list[str]:
+    lines = []
+    for name, target in TARGETS.items():
+        value = figures[name]
+        text = f'{value}' if isinstance(value, int) else _decimal(value)
+        low_high = figures['ci95'].get(name)
+        if low_high and math.isfinite(low_high[0]):
+            text += f'  [{_decimal(low_high[0])}, {_decimal(low_high[1])}]'
+        lines.append(f'{name:<26} {text:<28} {"target " + target if target else ""}'.rstrip())
+    for title, groups in (('kind', figures['by_kind']), ('size', figures['by_size']),
+                          ('effect', figures['by_effect'])):
+        lines += ['', f'{"by " + title:<36} cases  failures  top1   top3']
+        lines += [f'{label:<36} {group["cases"]:>5}  {group["failures"]:>8}  '
+                  f'{_decimal(group["top1"])}  {_decimal(group["top3"])}'
+                  for label, group in groups.items()]
+    return lines
+
+
+def _decimal(value: float) -> str:
+    return f'{value:.3f}' if math.isfinite(value) else '    -'

@@ -1,0 +1,117 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Make a trial of the diagnosis: sealed cases from an independent 'real antenna'.
+
+The antenna is a second program for the same drive. It shares no code with the emulator, and
+has its own integrator and its own form of every effect. Each case is one antenna, whose
+parameters are off by up to --tolerance, with three recordings through noisy sensors. Of all
+cases 55 percent have one effect of the catalogue, 15 percent two, 15 percent none, and 15
+percent one that no catalogue names.
+
+  DIR/manifest.json              settings, and a salted hash of the truth of each case
+  DIR/truth/case_0001.json       what is wrong with that antenna; no diagnosis reads it
+  DIR/case_0001/rec_a.csv .yaml  recording and test sheet; rec_b and rec_c alike
+
+The hash of the manifest is printed before any recording is made: note it down, and anyone can
+check later that no truth was changed. With --diagnose each case is diagnosed as well, and the
+verdict written to DIR/case_0001/verdict.json; `antenna-drive score DIR` then tells how good the
+verdicts are. Interrupted, the same command goes on where it stopped.
+
+example:
+  antenna-drive trial --cases 200 --seed 7 --out trial7 --diagnose && antenna-drive score trial7
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+import shlex
+
+from antenna_drive.cli.output import Progress
+from antenna_drive.errors import UserError
+from antenna_drive.trial import batch, sealing
+
+RATES_HZ = (50.0, 500.0)
+LARGEST_TOLERANCE = 0.05
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of `antenna-drive trial`."""
+    parser.add_argument('--cases', type=int, required=True, metavar='N',
+                        help='number of cases')
+    parser.add_argument('--seed', type=int, required=True, metavar='S',
+                        help='what the cases are drawn from; a published figure wants a seed '
+                             'that nothing was tuned on')
+    parser.add_argument('--out', type=Path, required=True, metavar='DIR',
+                        help='folder of the trial')
+    parser.add_argument('--tolerance', type=float, default=0.02, metavar='T',
+                        help='how far each parameter may be from the reference, 0 to '
+                             f'{LARGEST_TOLERANCE} (default %(default)s)')
+    parser.add_argument('--sample-rate', type=float, default=200.0, metavar='HZ',
+                        help='mean sample rate of the recordings, 50 to 500 '
+                             '(default %(default)s)')
+    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
+                        help='processes at once (default: one for each core, %(default)s here)')
+    parser.add_argument('--diagnose', action='store_true',
+                        help='have each case diagnosed as well')
+    parser.add_argument('--diagnose-options', default='', metavar='TEXT',
+                        help="more options for the diagnosis, e.g. '--config my.yaml'")
+    parser.add_argument('--time-limit', type=float, default=900.0, metavar='S',
+                        help='seconds after which a diagnosis counts as failed '
+                             '(default %(default)s)')
+    parser.add_argument('--quiet', action='store_true', help='show no progress')
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Make the cases, and have them diagnosed if asked for; 1 if a diagnosis failed."""
+    _check(arguments)
+    folder = arguments.out
+    manifest = batch.prepare(folder, arguments.cases, arguments.seed, arguments.tolerance,
+                             arguments.sample_rate, batch.DURATION_S)
+    print(f'{folder}: {arguments.cases} truths sealed, manifest '
+          f'{sealing.manifest_seal(manifest)}', flush=True)
+    with Progress('recordings', arguments.cases, quiet=arguments.quiet) as progress:
+        batch.make_cases(folder, manifest, arguments.jobs,
+                         lambda done, total: progress.update(done))
+    print(f'{folder}: {arguments.cases} cases complete', flush=True)
+    if not arguments.diagnose:
+        return 0
+    with Progress('diagnoses', arguments.cases, quiet=arguments.quiet) as progress:
+        failures = batch.diagnose_cases(
+            folder, manifest, arguments.jobs, shlex.split(arguments.diagnose_options),
+            arguments.time_limit, lambda done, total: progress.update(done))
+    if failures:
+        print(f'{folder}: {failures} diagnoses failed, see {batch.FAILURE} in their folders; '
+              'the same command tries them again')
+    return 1 if failures else 0
+
+
+def _check(arguments: argparse.Namespace) -> None:
+    if arguments.cases < 1:
+        raise UserError(f'--cases: {arguments.cases} given, allowed is 1 or more')
+    if arguments.seed < 0:
+        raise UserError(f'--seed: {arguments.seed} given, allowed is 0 or more')
+    if arguments.jobs < 1:
+        raise UserError(f'--jobs: {arguments.jobs} given, allowed is 1 or more')
+    if not 0.0 <= arguments.tolerance <= LARGEST_TOLERANCE:
+        raise UserError(f'--tolerance: {arguments.tolerance} given, allowed is 0 to '
+                        f'{LARGEST_TOLERANCE}')
+    low, high = RATES_HZ
+    if not low <= arguments.sample_rate <= high:
+        raise UserError(f'--sample-rate: {arguments.sample_rate} given, allowed is {low:g} to '
+                        f'{high:g} Hz')
+    if not arguments.time_limit > 0.0:
+        raise UserError(f'--time-limit: {arguments.time_limit} given, allowed is more than 0 s')

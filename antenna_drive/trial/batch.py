@@ -1,0 +1,248 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Make the recordings of a trial, and have them diagnosed, as batches that can be taken up again.
+
+What is complete is left alone: a case's folder appears under its name only when all its
+recordings are in it, a verdict only when the diagnosis has ended well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import as_completed, Future, ProcessPoolExecutor, ThreadPoolExecutor
+import importlib.util
+import json
+import math
+import multiprocessing
+import os
+from pathlib import Path
+import shutil
+import subprocess
+import sys
+from typing import Any
+
+from antenna_drive.errors import UserError
+from antenna_drive.trial import sealing
+from antenna_drive.trial.cases import draw_truths, make_recording, Truth
+from antenna_drive.trial.programme import RECORDINGS
+from antenna_drive.trial.real_antenna import FloatArray
+from antenna_drive.trial.sensors import COLUMNS
+import yaml
+
+VERDICT = 'verdict.json'
+FAILURE = 'failure.txt'
+DURATION_S = 30.0
+# Exact enough for every digit that a sensor gives, and short.
+FORMATS = {'time_s': '%.6f', 'rate_command_rad_s': '%.12g', 'encoder_rad': '%.12g'}
+USUAL_FORMAT = '%.9g'
+Done = Callable[[int, int], None]
+
+
+def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: float,
+            duration: float) -> dict[str, Any]:
+    """
+    Draw and seal the truths of a trial, or find them already sealed.
+
+    Parameters
+    ----------
+    folder : of the trial
+    count, seed, tolerance, sample_rate, duration : as in `cases.draw_truths`
+
+    Returns
+    -------
+    the manifest
+
+    Raises
+    ------
+    UserError : the folder holds a trial with other settings
+
+    """
+    settings = {'cases': count, 'seed': seed, 'tolerance': tolerance,
+                'sample_rate_hz': sample_rate, 'duration_s': duration}
+    if (folder / sealing.MANIFEST).exists():
+        manifest = sealing.read_manifest(folder)
+        if manifest['settings'] != settings:
+            old = manifest['settings']
+            differing = [f'{key} {old.get(key)}, not {value}'
+                         for key, value in settings.items() if old.get(key) != value]
+            raise UserError(f'{folder}: holds a trial with {"; ".join(differing)}; '
+                            'give the same settings to go on with it, or another --out')
+        return manifest
+    truths = draw_truths(count, seed, tolerance, sample_rate=sample_rate, duration=duration)
+    return sealing.seal(folder, settings, truths)
+
+
+def write_csv(path: Path, columns: dict[str, FloatArray]) -> None:
+    """Write the columns of a recording as CSV with a heading."""
+    formats = ','.join(FORMATS.get(name, USUAL_FORMAT) for name in COLUMNS)
+    rows = zip(*(columns[name].tolist() for name in COLUMNS))
+    lines = [','.join(COLUMNS), *(formats % row for row in rows)]
+    path.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+
+
+def make_case(folder: Path, truth: Truth) -> None:
+    """
+    Write the recordings of one case and their test sheets.
+
+    Parameters
+    ----------
+    folder : of the trial
+    truth : of the case
+
+    """
+    final = folder / truth['case']
+    draft = folder / f'.{truth["case"]}.{os.getpid()}'
+    shutil.rmtree(draft, ignore_errors=True)
+    draft.mkdir()
+    try:
+        for number, name in enumerate(RECORDINGS):
+            write_csv(draft / f'{name}.csv', make_recording(truth, number))
+            sheet = yaml.safe_dump(truth['sheets'][number], sort_keys=False,
+                                   default_flow_style=None)
+            (draft / f'{name}.yaml').write_text(sheet, encoding='utf-8')
+        os.replace(draft, final)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
+               done: Done = lambda part, total: None) -> None:
+    """
+    Make all cases that are not there yet.
+
+    Parameters
+    ----------
+    folder : of the trial
+    manifest : of the trial
+    jobs : how many processes
+    done : is told how many cases are complete, and of how many
+
+    """
+    _sweep(folder)
+    names = list(manifest['seals'])
+    wanted = [name for name in names if not (folder / name).is_dir()]
+    truths = [sealing.open_truth(folder, name, manifest) for name in wanted]
+    complete = len(names) - len(wanted)
+    done(complete, len(names))
+    # The first case compiles the equations, if need be, for all processes to come.
+    if truths:
+        make_case(folder, truths[0])
+        complete += 1
+        done(complete, len(names))
+    if jobs == 1 or len(truths) < 2:
+        for truth in truths[1:]:
+            make_case(folder, truth)
+            complete += 1
+            done(complete, len(names))
+        return
+    context = multiprocessing.get_context('spawn')
+    with ProcessPoolExecutor(jobs, mp_context=context) as pool:
+        for _ in _finished([pool.submit(make_case, folder, truth) for truth in truths[1:]]):
+            complete += 1
+            done(complete, len(names))
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what an interrupted run has left behind half-made."""
+    for draft in folder.glob('.case_*'):
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def _finished(futures: Sequence[Future[Any]]) -> Iterator[Any]:
+    """Give results as they come; on an error start nothing more."""
+    try:
+        for future in as_completed(futures):
+            yield future.result()
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+def diagnose_case(case: Path, options: Sequence[str], limit: float) -> bool:
+    """
+    Have one case diagnosed in a process of its own, which is told the recordings only.
+
+    Parameters
+    ----------
+    case : folder of the case
+    options : more options for the diagnosis
+    limit : seconds after which it counts as failed
+
+    Returns
+    -------
+    True if there is a verdict; else the reason lies in FAILURE
+
+    """
+    draft = case / f'.{VERDICT}'
+    command = [sys.executable, '-m', 'antenna_drive', 'diagnose',
+               *(str(case / f'{name}.csv') for name in RECORDINGS),
+               '--json', str(draft), *options]
+    try:
+        result = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                                stderr=subprocess.PIPE, timeout=limit, check=False)
+        reason = f'exit code {result.returncode}\n' + result.stderr.decode(errors='replace')
+    except subprocess.TimeoutExpired:
+        reason = f'no verdict after {limit:g} s'
+    (case / FAILURE).unlink(missing_ok=True)
+    if draft.exists():
+        try:
+            json.loads(draft.read_text(encoding='utf-8'))
+        except ValueError as error:
+            reason = f'verdict is not JSON: {error}\n{reason}'
+        else:
+            os.replace(draft, case / VERDICT)
+            return True
+    draft.unlink(missing_ok=True)
+    sealing.write_whole(case / FAILURE, reason[-20000:] + '\n')
+    return False
+
+
+def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
+                   options: Sequence[str] = (), limit: float = math.inf,
+                   done: Done = lambda part, total: None) -> int:
+    """
+    Have all cases diagnosed that have no verdict yet; failed ones are tried again.
+
+    Parameters
+    ----------
+    folder : of the trial
+    manifest : of the trial
+    jobs : how many diagnoses at once
+    options : more options for the diagnosis
+    limit : seconds after which one diagnosis counts as failed
+    done : is told how many cases are through, and of how many
+
+    Returns
+    -------
+    number of cases that failed
+
+    Raises
+    ------
+    UserError : there is no diagnosis in this installation
+
+    """
+    if importlib.util.find_spec('antenna_drive.cli.diagnose') is None:
+        raise UserError('--diagnose: this installation has no antenna-drive diagnose')
+    names = list(manifest['seals'])
+    wanted = [name for name in names if not (folder / name / VERDICT).exists()]
+    complete, failures = len(names) - len(wanted), 0
+    done(complete, len(names))
+    with ThreadPoolExecutor(jobs) as pool:
+        futures = [pool.submit(diagnose_case, folder / name, options, limit) for name in wanted]
+        for success in _finished(futures):
+            complete += 1
+            failures += not success
+            done(complete, len(names))
+    return failures

@@ -1,0 +1,181 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The cases of a trial: what is wrong with each antenna, drawn once and written down.
+
+Everything about a case follows from its truth, noise included, so that a case can be made
+again at any time and comes out the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+import dataclasses
+from typing import Any
+
+from antenna_drive.trial.effect import Effect
+from antenna_drive.trial.effects import CATALOGUE
+from antenna_drive.trial.machine import (
+    apply_tolerances, draw_tolerances, Machine, reference_machine)
+from antenna_drive.trial.outside import OUTSIDE
+from antenna_drive.trial.programme import draw_sheets
+from antenna_drive.trial.real_antenna import FloatArray, simulate
+from antenna_drive.trial.sensors import record, sample_instants
+from antenna_drive.trial.test_sheet import SensorGrade, TestSheet
+import numpy as np
+
+MIX = {'single': 0.55, 'pair': 0.15, 'none': 0.15, 'outside': 0.15}
+SMALLEST_IN_PAIR = 0.25     # of the range of sizes: both members have to leave a trace
+Truth = dict[str, Any]
+
+
+def case_name(number: int) -> str:
+    """Return the name of a case, from 1."""
+    return f'case_{number:04d}'
+
+
+def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float = 200.0,
+                duration: float = 30.0) -> list[Truth]:
+    """
+    Draw all cases of a trial.
+
+    Kinds come in the proportions of MIX in random order; effects take turns, so that each
+    comes up as often as any other; sizes are spread evenly over their range.
+
+    Parameters
+    ----------
+    count : number of cases
+    seed : of everything
+    tolerance : largest relative deviation of any parameter from the reference, unit 1
+    sample_rate : of the recordings [Hz]
+    duration : of each recording [s]
+
+    """
+    random = np.random.default_rng([seed, 0])
+    kinds = random.permutation(_kinds(count))
+    singles = _turns(list(CATALOGUE.values()), random)
+    firsts, seconds = _turns(list(CATALOGUE.values()), random), _turns(
+        list(CATALOGUE.values()), random)
+    outsiders = _turns(list(OUTSIDE.values()), random)
+    sizes = {kind: iter(_even_sizes(int(np.sum(kinds == kind)), random)) for kind in MIX}
+    truths = []
+    for number, kind in enumerate(kinds, start=1):
+        own = np.random.default_rng([seed, number])
+        effects: list[tuple[Effect, float]] = []
+        if kind == 'single':
+            effects = [(next(singles), next(sizes['single']))]
+        elif kind == 'outside':
+            effects = [(next(outsiders), next(sizes['outside']))]
+        elif kind == 'pair':
+            first = next(firsts)
+            second = next(effect for effect in seconds if _compatible(first, effect))
+            low = SMALLEST_IN_PAIR
+            effects = [(first, low + (1.0 - low) * next(sizes['pair'])),
+                       (second, float(own.uniform(low, 1.0)))]
+        truths.append({
+            'case': case_name(number), 'kind': str(kind),
+            'effects': [{'id': effect.id, 'size': size, 'parameters': effect.draw(size, own)}
+                        for effect, size in effects],
+            'tolerance': tolerance, 'seed': [seed, number],
+            'sample_rate_hz': sample_rate, 'duration_s': duration,
+            'sheets': [sheet.plain() for sheet in draw_sheets(tolerance, duration, own)]})
+    return truths
+
+
+def _kinds(count: int) -> list[str]:
+    """Return the kinds in the proportions of MIX, rounded so that they add up."""
+    bounds = np.round(np.cumsum([0.0, *MIX.values()]) * count).astype(int)
+    return [kind for kind, low, high in zip(MIX, bounds[:-1], bounds[1:])
+            for _ in range(high - low)]
+
+
+def _turns(effects: Sequence[Effect], random: np.random.Generator) -> Iterator[Effect]:
+    while True:
+        for k in random.permutation(len(effects)):
+            yield effects[k]
+
+
+def _even_sizes(count: int, random: np.random.Generator) -> list[float]:
+    """Return sizes one in each of `count` equal slices of 0 to 1, in random order."""
+    slices = random.permutation(count)
+    return [float(s) for s in (slices + random.uniform(0.0, 1.0, count)) / max(count, 1)]
+
+
+def _compatible(first: Effect, second: Effect) -> bool:
+    """Tell whether two effects are two: neither the same nor one inside the other."""
+    place_1, name_1 = first.id.split('.')
+    place_2, name_2 = second.id.split('.')
+    if 'motors' in (place_1, place_2) and place_1.startswith('motor') and (
+            place_2.startswith('motor')):
+        return name_1 != name_2
+    return first.id != second.id
+
+
+def build_machine(truth: Truth, recording: int) -> Machine:
+    """
+    Build the antenna of a case as it was during one recording.
+
+    Parameters
+    ----------
+    truth : of the case
+    recording : 0 for the first; wind and bad contacts are another draw in each
+
+    """
+    sheet = truth['sheets'][recording]
+    machine = reference_machine(sheet['circuit'], sheet['filter_1'],
+                                sheet['bias'].get('bias_pot', 0.7))
+    random = np.random.default_rng([*truth['seed'], 1])
+    apply_tolerances(machine, draw_tolerances(truth['tolerance'], random))
+    for entry in truth['effects']:
+        effect = CATALOGUE.get(entry['id']) or OUTSIDE[entry['id']]
+        values = dict(entry['parameters'])
+        if 'seed' in values:
+            values['seed'] += 1000000 * recording
+        effect.change(machine, values)
+    return machine
+
+
+def sheet_of(truth: Truth, recording: int) -> TestSheet:
+    """Return the test sheet of one recording of a case."""
+    plain = dict(truth['sheets'][recording])
+    plain.pop('start')
+    plain['sensors'] = SensorGrade(**plain['sensors'])
+    known = {field.name for field in dataclasses.fields(TestSheet)}
+    return TestSheet(**{name: value for name, value in plain.items() if name in known})
+
+
+def make_recording(truth: Truth, recording: int) -> dict[str, FloatArray]:
+    """
+    Simulate one recording of a case.
+
+    Parameters
+    ----------
+    truth : of the case
+    recording : its number, from 0
+
+    Returns
+    -------
+    columns of the recording by name, each of shape (n,)
+
+    Raises
+    ------
+    SimulationError : the antenna of this case cannot be integrated
+
+    """
+    random = np.random.default_rng([*truth['seed'], 2 + recording])
+    machine, sheet = build_machine(truth, recording), sheet_of(truth, recording)
+    instants, stamps = sample_instants(truth['sample_rate_hz'], truth['duration_s'], random)
+    place = (float(random.uniform(-1.0, 1.0)), float(random.uniform(-1.0, 1.0)))
+    history = simulate(machine, sheet, instants, place)
+    return record(history, machine, sheet.sensors, stamps, random)

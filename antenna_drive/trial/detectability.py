@@ -1,0 +1,193 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+How plainly an effect shows through noise and tolerances: what the ranges of sizes rest on.
+
+The effect's change of the recorded signals, in standard deviations of noise, less whatever
+the tolerances, the starting places and the sensors' offsets could imitate (to first order,
+each held to its prior by a ridge). Run `python -m antenna_drive.trial.detectability` for the
+table of docs/trial.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+import copy
+import math
+
+from antenna_drive.trial.cases import build_machine, draw_truths, sheet_of, Truth
+from antenna_drive.trial.effects import CATALOGUE
+from antenna_drive.trial.machine import (
+    apply_tolerances, draw_tolerances, Machine, Tolerances)
+from antenna_drive.trial.outside import OUTSIDE
+from antenna_drive.trial.real_antenna import FloatArray, simulate
+from antenna_drive.trial.sensors import record
+from antenna_drive.trial.test_sheet import SensorGrade
+import numpy as np
+
+RECORDINGS = 3
+PROBE = 0.1         # of a prior's spread, for the derivatives
+# Uniform within +-tolerance has this standard deviation, in units of the tolerance.
+UNIFORM_SPREAD = 1.0 / math.sqrt(3.0)
+RATE_HZ, DURATION_S = 200.0, 30.0
+
+
+class _NoNoise(np.random.Generator):
+    """A source that draws the middle of everything, for noiseless sensors."""
+
+    def __init__(self) -> None:
+        super().__init__(np.random.PCG64(0))
+
+    def normal(self, *_: object, **__: object) -> FloatArray:  # type: ignore[override]
+        return np.zeros(1)
+
+    def uniform(self, *_: object, **__: object) -> float:  # type: ignore[override]
+        return 0.0
+
+
+class Study:
+    """The standard programme on the reference antenna, and what tolerances do to it."""
+
+    def __init__(self, tolerance: float = 0.02, seed: int = 1,
+                 report: Callable[[float], None] = lambda part: None) -> None:
+        """
+        Simulate the derivatives by every tolerance, starting place and offset.
+
+        Parameters
+        ----------
+        tolerance : largest relative deviation of any parameter, unit 1
+        seed : of the programme
+        report : is told the done part, 0 to 1
+
+        """
+        truth = next(t for t in draw_truths(40, seed, tolerance) if t['kind'] == 'none')
+        self._truth: Truth = {**truth, 'tolerance': 0.0}
+        self._times = np.arange(int(RATE_HZ * DURATION_S) + 1) / RATE_HZ
+        neutral = draw_tolerances(0.0, np.random.default_rng(0))
+        self._base = self._signals(neutral, (0.3, -0.2), None)
+        columns = []
+        spread = tolerance * UNIFORM_SPREAD
+        total = sum(part.size for part in neutral)
+        for place, part in enumerate(neutral):
+            for index in np.ndindex(part.shape):
+                sides = []
+                for sign in (1.0, -1.0):
+                    moved = copy.deepcopy(neutral)
+                    moved[place][index] += sign * PROBE * spread
+                    sides.append(self._signals(moved, (0.3, -0.2), None))
+                columns.append((sides[0] - sides[1]) / (2.0 * PROBE))
+                report(len(columns) / total)
+        columns += self._places(neutral) + self._offsets()
+        self._nuisance = np.stack(columns, axis=1)
+        gram = self._nuisance.T @ self._nuisance
+        self._solver = np.linalg.inv(gram + np.eye(len(gram)))
+
+    def _places(self, neutral: Tolerances) -> list[FloatArray]:
+        columns = []
+        size = len(self._base) // RECORDINGS
+        for place in ((0.4, -0.2), (0.3, -0.1)):
+            change = (self._signals(neutral, place, None) - self._base) * UNIFORM_SPREAD / 0.1
+            for recording in range(RECORDINGS):
+                column = np.zeros_like(change)
+                part = slice(recording * size, (recording + 1) * size)
+                column[part] = change[part]
+                columns.append(column)
+        return columns
+
+    def _offsets(self) -> list[FloatArray]:
+        columns = []
+        count = len(self._times)
+        for block in range(len(self._base) // count):
+            column = np.zeros_like(self._base)
+            column[block * count:(block + 1) * count] = UNIFORM_SPREAD
+            columns.append(column)
+        return columns
+
+    def _signals(self, tolerances: Tolerances, place: tuple[float, float],
+                 effect: tuple[str, dict[str, float]] | None) -> FloatArray:
+        """Return all recorded signals in standard deviations of noise, one after the other."""
+        parts = []
+        truth = dict(self._truth)
+        if effect is not None:
+            truth['effects'] = [{'id': effect[0], 'parameters': effect[1]}]
+        for recording in range(RECORDINGS):
+            machine = build_machine(truth, recording)
+            apply_tolerances(machine, tolerances)
+            parts.append(self._recording(machine, recording, place))
+        return np.concatenate(parts)
+
+    def _recording(self, machine: Machine, recording: int,
+                   place: tuple[float, float]) -> FloatArray:
+        sheet = sheet_of(self._truth, recording)
+        history = simulate(machine, sheet, self._times, place)
+        fine = SensorGrade(current_step_A=0.0, tach_step_rad_s=0.0, bias_step_V=0.0,
+                           encoder_bits=40)
+        columns = record(history, machine, fine, self._times, _NoNoise())
+        grade = sheet.sensors
+        scaled = []
+        for name, noise, step in (
+                ('current_1_A', grade.current_noise_A, grade.current_step_A),
+                ('current_2_A', grade.current_noise_A, grade.current_step_A),
+                ('tach_rate_1_rad_s', grade.tach_noise_rad_s, grade.tach_step_rad_s),
+                ('tach_rate_2_rad_s', grade.tach_noise_rad_s, grade.tach_step_rad_s),
+                ('encoder_rad', 0.0, 2.0 * math.pi / 2**grade.encoder_bits),
+                ('bias_voltage_V', grade.bias_noise_V, grade.bias_step_V)):
+            scaled.append(columns[name] / math.hypot(noise, step / math.sqrt(12.0)))
+        return np.concatenate(scaled)
+
+    def of(self, effect_id: str, values: dict[str, float]) -> tuple[float, float]:
+        """
+        Return how far an effect moves the signals: in all, and beyond what tolerances imitate.
+
+        Parameters
+        ----------
+        effect_id : of the catalogue or outside it
+        values : the effect's numbers
+
+        Returns
+        -------
+        both as root of the sum of squares, in standard deviations of noise
+
+        """
+        neutral = draw_tolerances(0.0, np.random.default_rng(0))
+        change = self._signals(neutral, (0.3, -0.2), (effect_id, values)) - self._base
+        explained = self._nuisance @ (self._solver @ (self._nuisance.T @ change))
+        rest = float(change @ (change - explained))
+        return float(np.linalg.norm(change)), math.sqrt(max(rest, 0.0))
+
+
+def main() -> None:
+    """Print the table: every effect at its smallest, middle and largest size."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--tolerance', type=float, default=0.02)
+    parser.add_argument('--only', default='', help='part of the ids to print')
+    arguments = parser.parse_args()
+    study = Study(arguments.tolerance)
+    print('| effect | range of the size | beyond tolerances: smallest, middle, largest |')
+    print('|---|---|---|')
+    for effect in (*CATALOGUE.values(), *OUTSIDE.values()):
+        if arguments.only not in effect.id:
+            continue
+        size = effect.quantities[0]
+        cells = []
+        for part in (0.0, 0.5, 1.0):
+            values = effect.draw(part, np.random.default_rng(3))
+            cells.append(f'{study.of(effect.id, values)[1]:.0f}')
+        print(f'| {effect.id} | {size.name} {size.low:g} to {size.high:g} {size.unit} '
+              f'| {", ".join(cells)} |', flush=True)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,114 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What an unmodelled effect is here: how large it may be, and how it changes a machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+import math
+
+from antenna_drive.trial.machine import Machine
+import numpy as np
+
+Parameters = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """
+    One number of an effect and its plausible range.
+
+    Attributes
+    ----------
+    name, unit : 'torque', 'N m'
+    low, high : range of the size, both more than 0 unless `spacing` is 'even'
+    spacing : 'log', 'even' or 'whole' (whole numbers)
+    turned : '' or what chance may do to the size: 'sign' (negative as likely as positive),
+        'inverse' (1 / size as likely as size, for factors)
+
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    spacing: str = 'log'
+    turned: str = ''
+
+    def at(self, part: float, random: np.random.Generator) -> float:
+        """
+        Return the value at `part` of the range, 0 to 1, turned by chance.
+
+        Parameters
+        ----------
+        part : 0 for the smallest size, 1 for the largest
+        random : decides on the sign or the inverse
+
+        """
+        if self.spacing == 'log':
+            value = math.exp((1.0 - part) * math.log(self.low) + part * math.log(self.high))
+        elif self.spacing == 'even':
+            value = (1.0 - part) * self.low + part * self.high
+        else:
+            value = float(math.floor(self.low + part * (self.high - self.low) + 0.5))
+        turn = bool(random.integers(2))
+        if self.turned == 'sign' and turn:
+            return -value
+        if self.turned == 'inverse' and turn:
+            return 1.0 / value
+        return value
+
+
+PHASE = Quantity('phase', 'rad', 0.0, 2.0 * math.pi, 'even')
+
+
+@dataclass(frozen=True)
+class Effect:
+    """
+    An effect: its name, its numbers, the form it takes in the real antenna.
+
+    Attributes
+    ----------
+    id : 'component.effect', as the diagnosis names it
+    form : the form in this program, for people
+    quantities : the first one is the effect's size, the others are drawn evenly
+    change : sets the imperfection in a machine
+
+    """
+
+    id: str
+    form: str
+    quantities: tuple[Quantity, ...]
+    change: Callable[[Machine, Parameters], None]
+
+    def draw(self, size: float, random: np.random.Generator) -> dict[str, float]:
+        """
+        Draw the effect's numbers.
+
+        Parameters
+        ----------
+        size : 0 for just detectable, 1 for strong
+        random : source of everything else
+
+        Returns
+        -------
+        value by name of each quantity
+
+        """
+        first, *others = self.quantities
+        values = {first.name: first.at(size, random)}
+        for quantity in others:
+            values[quantity.name] = quantity.at(float(random.uniform()), random)
+        return values

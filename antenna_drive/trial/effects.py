@@ -1,0 +1,328 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The catalogue's effects in this program's own forms, with the range of each.
+
+The smallest sizes are just detectable on the standard test programme through noise and
+tolerances (docs/trial.md says how that was measured), the largest would send a crew up the
+antenna. A tachometer sits inside the rate loop; current, encoder and bias errors touch the
+recording only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+
+from antenna_drive.trial.effect import Effect, Parameters, PHASE, Quantity
+from antenna_drive.trial.machine import GUST_WAVES, Machine
+import numpy as np
+
+MOTORS = {'motor_1': slice(0, 1), 'motor_2': slice(1, 2), 'motors': slice(0, 2)}
+Change = Callable[[Machine, Parameters], None]
+
+
+def _factor(low: float, high: float, *, up_only: bool = False) -> Quantity:
+    return Quantity('factor', '1', low, high, turned='' if up_only else 'inverse')
+
+
+def _cycles(low: int, high: int) -> Quantity:
+    return Quantity('cycles', '1/rev', low, high, 'whole')
+
+
+# Motors: each effect for either motor alone and for both alike.
+
+def _motor_field(field: str, quantity: str) -> Callable[[slice], Change]:
+    def at(which: slice) -> Change:
+        def change(machine: Machine, values: Parameters) -> None:
+            machine.motors[field][which] = values[quantity]
+        return change
+    return at
+
+
+def _motor_factor(*fields: str) -> Callable[[slice], Change]:
+    def at(which: slice) -> Change:
+        def change(machine: Machine, values: Parameters) -> None:
+            for field in fields:
+                machine.motors[field][which] *= values['factor']
+        return change
+    return at
+
+
+def _motor_stribeck(which: slice) -> Change:
+    def change(machine: Machine, values: Parameters) -> None:
+        machine.motors['stribeck'][which] = values['rise']
+        machine.motors['stribeck_rate'][which] = values['half_rate']
+    return change
+
+
+def _motor_ripple(which: slice) -> Change:
+    def change(machine: Machine, values: Parameters) -> None:
+        machine.motors['ripple'][which] = values['torque']
+        machine.motors['ripple_cycles'][which] = values['cycles']
+        machine.motors['ripple_phase'][which] = values['phase']
+    return change
+
+
+_MOTOR_EFFECTS: tuple[
+    tuple[str, str, tuple[Quantity, ...], Callable[[slice], Change]], ...] = (
+    ('viscous_friction', 'drag of a lubricant that thins under shear: '
+     'c w (1 + (w / 20 rad/s)^2)^-0.075',
+     (Quantity('coefficient', 'N m s/rad', 0.004, 0.06),),
+     _motor_field('viscous', 'coefficient')),
+    ('stribeck_friction', 'hyperbola over Coulomb: rise / (1 + |w| / half_rate), at rest too',
+     (Quantity('rise', 'N m', 0.15, 2.0), Quantity('half_rate', 'rad/s', 0.5, 4.0)),
+     _motor_stribeck),
+    ('coulomb_friction', 'kinetic and static level times a factor',
+     (_factor(1.35, 8.0, up_only=True),), _motor_factor('coulomb')),
+    ('friction_asymmetry', 'level times 1 + share when positive, 1 - share when negative',
+     (Quantity('share', '1', 0.2, 0.9, turned='sign'),), _motor_field('asymmetry', 'share')),
+    ('load_dependent_friction', 'share (sqrt(T_g^2 + 0.25) - 0.5), T_g the gear torque in N m',
+     (Quantity('share', '1', 0.015, 0.2),), _motor_field('load_friction', 'share')),
+    ('torque_ripple', 'two harmonics of the shaft angle, the second 0.3 of the first',
+     (Quantity('torque', 'N m', 0.05, 1.5), _cycles(2, 24), PHASE), _motor_ripple),
+    ('torque_constant', 'torque and back-EMF constants together, as a weaker magnet does',
+     (_factor(1.06, 1.5),), _motor_factor('torque_constant', 'back_emf')),
+    ('armature_resistance', 'resistance times a factor; the amplifier keeps its design value',
+     (_factor(1.2, 4.0, up_only=True),), _motor_factor('resistance')),
+    ('amplifier_gain', 'k_r times a factor', (_factor(1.06, 2.0),), _motor_factor('rate_gain')),
+    ('amplifier_offset', "voltage at the amplifier's input",
+     (Quantity('voltage', 'V', 0.0015, 0.2, turned='sign'),),
+     _motor_field('input_offset', 'voltage')),
+    ('amplifier_dead_zone', 'smooth crossover: v - d tanh(v / d) of the current demand',
+     (Quantity('half_width', 'A', 0.03, 0.6),), _motor_field('dead_zone', 'half_width')),
+    ('current_limit', 'hard limit times a factor', (Quantity('factor', '1', 0.93, 0.35),),
+     _motor_factor('current_limit')),
+)
+
+
+# Gearboxes
+
+def _gear_factor(field: str, which: int) -> Change:
+    def change(machine: Machine, values: Parameters) -> None:
+        machine.motors[field][which] *= values['factor']
+    return change
+
+
+def _gear_hysteresis(which: int) -> Change:
+    def change(machine: Machine, values: Parameters) -> None:
+        machine.motors['hysteresis'][which] = values['share']
+    return change
+
+
+def _mesh_error(which: int) -> Change:
+    def change(machine: Machine, values: Parameters) -> None:
+        machine.motors['mesh_error'][which] = values['angle']
+        machine.motors['mesh_cycles'][which] = values['cycles']
+        machine.motors['mesh_phase'][which] = values['phase']
+    return change
+
+
+def _gearbox_effects(name: str, which: int) -> tuple[Effect, ...]:
+    return (
+        Effect(f'{name}.gap', 'gap times a factor', (_factor(1.15, 3.5),),
+               _gear_factor('half_gap', which)),
+        Effect(f'{name}.stiffness', 'stiffness times a factor', (_factor(1.08, 2.5),),
+               _gear_factor('stiffness', which)),
+        Effect(f'{name}.hysteresis', 'elastic torque times 1 + share z, '
+               "z' = (v - |v| z) / 0.03 rad, v the rate of deflection",
+               (Quantity('share', '1', 0.012, 0.5),), _gear_hysteresis(which)),
+        Effect(f'{name}.transmission_error', 'rounded saw-tooth of the motor angle, '
+               'sum of sin(n a) / (n 2^(n-1)), added to the deflection',
+               (Quantity('angle', 'rad', 0.002, 0.1), _cycles(1, 16), PHASE),
+               _mesh_error(which)))
+
+
+# Torque share
+
+def _circuit_factor(*fields: str) -> Change:
+    def change(machine: Machine, values: Parameters) -> None:
+        for field in fields:
+            machine.circuit[field] *= values['factor']
+    return change
+
+
+def _fade_out(machine: Machine, values: Parameters) -> None:
+    machine.circuit['fade_out'] += values['shift']
+
+
+_TORQUE_SHARE = (
+    Effect('torque_share.bias_pot', 'k_p times a factor', (_factor(1.07, 1.8),),
+           _circuit_factor('bias_pot')),
+    Effect('torque_share.fade_out_voltage', 'f_o shifted',
+           (Quantity('shift', 'V', 0.5, 5.0, turned='sign'),), _fade_out),
+    Effect('torque_share.share_filter', 'speed of transfer functions 2 to 4 times a factor, '
+           'steady gains unchanged', (_factor(1.12, 3.0),), _circuit_factor('k_2', 's_2', 'k_3')),
+    Effect('torque_share.filter_1_gain', "k' times a factor", (_factor(1.12, 2.0),),
+           _circuit_factor('filter_gain')),
+    Effect('torque_share.filter_1_pole', "p times a factor, k' unchanged",
+           (_factor(1.12, 3.0),), _circuit_factor('filter_pole')),
+)
+
+
+# Axis
+
+def _structure_field(field: str, quantity: str) -> Change:
+    def change(machine: Machine, values: Parameters) -> None:
+        machine.structure[field] = values[quantity]
+    return change
+
+
+def _structure_factor(field: str) -> Change:
+    def change(machine: Machine, values: Parameters) -> None:
+        machine.structure[field] *= values['factor']
+    return change
+
+
+def _axis_stribeck(machine: Machine, values: Parameters) -> None:
+    machine.structure['stribeck'] = values['rise']
+    machine.structure['stribeck_rate'] = values['half_rate']
+
+
+def _bumps(machine: Machine, values: Parameters) -> None:
+    machine.structure['bump'] = values['share']
+    machine.structure['bump_pitch'] = values['pitch']
+    machine.structure['bump_phase'] = values['phase']
+
+
+def _gust(machine: Machine, values: Parameters) -> None:
+    # Davenport's spectrum of wind speed, S ~ x^2 / (f (1 + x^2)^(4/3)), as a sum of sines.
+    frequency = np.geomspace(0.02, 3.0, GUST_WAVES)
+    x = frequency / values['corner']
+    power = x**2 / (1.0 + x**2)**(4.0 / 3.0)    # per unit of ln f: the waves are even in ln f
+    amplitude = np.sqrt(power)
+    amplitude *= values['rms'] / math.sqrt(0.5 * float(np.sum(amplitude**2)))
+    random = np.random.default_rng(int(values['seed']))
+    structure = machine.structure[0]
+    structure['gust'] = amplitude
+    structure['gust_frequency'] = 2.0 * math.pi * frequency
+    structure['gust_phase'] = random.uniform(0.0, 2.0 * math.pi, GUST_WAVES)
+
+
+def _one_mode(machine: Machine, values: Parameters) -> None:
+    machine.structure['mode_frequency'][0, int(values['mode']) - 1] *= values['factor']
+
+
+def _extra_mode(machine: Machine, values: Parameters) -> None:
+    machine.structure['extra_inertia'] = values['inertia']
+    machine.structure['extra_frequency'] = 2.0 * math.pi * values['frequency']
+    machine.structure['extra_damping'] = values['damping_ratio']
+
+
+_AXIS = (
+    Effect('axis.coulomb_friction', 'kinetic and static level times a factor',
+           (_factor(1.07, 2.0),), _structure_factor('coulomb')),
+    Effect('axis.viscous_friction', 'drag of a lubricant that thins under shear: '
+           'c w (1 + (w / 1.3 mrad/s)^2)^-0.075',
+           (Quantity('coefficient', 'N m s/rad', 8e5, 3e7),),
+           _structure_field('viscous', 'coefficient')),
+    Effect('axis.stribeck_friction', 'hyperbola over Coulomb: rise / (1 + |w| / half_rate); '
+           'stiction rises too',
+           (Quantity('rise', 'N m', 1e4, 1.5e5), Quantity('half_rate', 'rad/s', 4e-5, 4e-4)),
+           _axis_stribeck),
+    Effect('axis.position_dependent_friction', 'tight spots: level times '
+           '1 + share (2 exp(2 cos(a) - 2) - 0.617), a one turn per pitch',
+           (Quantity('share', '1', 0.02, 0.6), Quantity('pitch', 'rad', 0.002, 0.015), PHASE),
+           _bumps),
+    Effect('axis.gravity_imbalance', 'torque at the horizon times the cosine of elevation',
+           (Quantity('torque', 'N m', 5e3, 2e5, turned='sign'),),
+           _structure_field('gravity', 'torque')),
+    Effect('axis.wind_steady', 'constant torque',
+           (Quantity('torque', 'N m', 3e3, 1.5e5, turned='sign'),),
+           _structure_field('wind', 'torque')),
+    Effect('axis.wind_gust', "24 sines with Davenport's spectrum, another draw per recording",
+           (Quantity('rms', 'N m', 1.5e3, 6e4), Quantity('corner', 'Hz', 0.1, 0.5),
+            Quantity('seed', '1', 1, 1000000, 'whole')), _gust),
+    Effect('axis.inertia', 'hub inertia times a factor', (_factor(1.08, 1.8),),
+           _structure_factor('inertia')),
+    Effect('axis.mode_frequency', 'frequency of one of the three modes times a factor',
+           (_factor(1.06, 1.5), Quantity('mode', '1', 1, 3, 'whole')), _one_mode),
+    Effect('axis.mode_damping', 'damping of all modes times a factor',
+           (_factor(1.4, 15.0, up_only=True),), _structure_factor('mode_damping')),
+    Effect('axis.extra_mode', 'a fourth appendage on the hub',
+           (Quantity('inertia', 'kg m^2', 5e4, 2.5e6), Quantity('frequency', 'Hz', 1.2, 8.0),
+            Quantity('damping_ratio', '1', 0.005, 0.03)), _extra_mode),
+    Effect('axis.bull_gear_backlash', 'both gaps wider by one half gap, '
+           'which wear changes by a fifth along the bull gear',
+           (Quantity('half_gap', 'rad at the motor', 0.01, 0.4),),
+           _structure_field('bull_gap', 'half_gap')),
+)
+
+
+# Sensors and loop
+
+def _sensor_field(field: str, quantity: str) -> Change:
+    def change(machine: Machine, values: Parameters) -> None:
+        machine.sensors[field] = values[quantity]
+    return change
+
+
+def _cyclic_error(machine: Machine, values: Parameters) -> None:
+    machine.sensors['encoder_cyclic'] = values['angle']
+    machine.sensors['encoder_lines'] = values['cycles']
+    machine.sensors['encoder_phase'] = values['phase']
+
+
+def _tach_ripple(which: slice) -> Change:
+    def change(machine: Machine, values: Parameters) -> None:
+        machine.motors['tach_ripple'][which] = values['share']
+        machine.motors['tach_cycles'][which] = values['cycles']
+        machine.motors['tach_phase'][which] = values['phase']
+    return change
+
+
+def _channel_effects(number: int) -> tuple[Effect, ...]:
+    which = slice(number - 1, number)
+    return (
+        Effect(f'tach_{number}.gain', 'relative error, inside the loop',
+               (Quantity('error', '1', 0.006, 0.2, turned='sign'),),
+               _motor_field('tach_error', 'error')(which)),
+        Effect(f'tach_{number}.offset', 'inside the loop',
+               (Quantity('offset', 'rad/s', 0.015, 2.0, turned='sign'),),
+               _motor_field('tach_offset', 'offset')(which)),
+        Effect(f'tach_{number}.ripple', 'commutation: a rectified wave with rounded feet, '
+               'in proportion to the rate, inside the loop',
+               (Quantity('share', '1', 0.003, 0.2), _cycles(2, 24), PHASE),
+               _tach_ripple(which)),
+        Effect(f'current_{number}.gain', 'relative error of the recorder',
+               (Quantity('error', '1', 0.04, 0.4, turned='sign'),),
+               _sensor_field(f'current_error_{number}', 'error')),
+        Effect(f'current_{number}.offset', 'of the recorder',
+               (Quantity('offset', 'A', 0.04, 0.6, turned='sign'),),
+               _sensor_field(f'current_offset_{number}', 'offset')))
+
+
+_SENSORS = (
+    *_channel_effects(1), *_channel_effects(2),
+    Effect('encoder.quantisation', 'digits of this size instead of those on the sheet',
+           (Quantity('step', 'rad', 1.5e-5, 5e-4),), _sensor_field('encoder_step', 'step')),
+    Effect('encoder.cyclic_error', 'two harmonics, the second a quarter of the first',
+           (Quantity('angle', 'rad', 5e-6, 2e-4), _cycles(600, 6000), PHASE), _cyclic_error),
+    Effect('encoder.offset', 'constant',
+           (Quantity('offset', 'rad', 6e-5, 2e-3, turned='sign'),),
+           _sensor_field('encoder_offset', 'offset')),
+    Effect('bias_voltage.gain', 'relative error of the recorder',
+           (Quantity('error', '1', 0.04, 0.4, turned='sign'),),
+           _sensor_field('bias_error', 'error')),
+)
+_LOOP = (
+    Effect('loop.delay', 'of the rate error of both motors, as a [3/4] Pade approximant',
+           (Quantity('delay', 's', 8e-4, 1.2e-2),), _motor_field('delay', 'delay')(slice(0, 2))),
+)
+
+CATALOGUE: dict[str, Effect] = {effect.id: effect for effect in (
+    *(Effect(f'{motor}.{name}', form, quantities, change(which))
+      for motor, which in MOTORS.items() for name, form, quantities, change in _MOTOR_EFFECTS),
+    *_gearbox_effects('gearbox_1', 0), *_gearbox_effects('gearbox_2', 1),
+    *_TORQUE_SHARE, *_AXIS, *_SENSORS, *_LOOP)}

@@ -1,0 +1,112 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The test programme: three recordings as a servo engineer would take them.
+
+A slow square wave brings out friction, gaps and the start of motion; a fast triangle brings
+out load, saturation, limits and the fading of the bias; a multisine or a chirp brings out
+inertia, structure, filters and delay. They are taken at three elevations, which separates
+gravity from wind. Sizes vary from case to case, the plan does not.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from antenna_drive.trial.test_sheet import SensorGrade, TestSheet
+import numpy as np
+
+RECORDINGS = ('rec_a', 'rec_b', 'rec_c')
+SOURCE_BIAS_V = (4.1, 8.3)      # 10 to 20 percent of the motors' largest current
+
+
+def draw_sheets(tolerance: float, duration: float,
+                random: np.random.Generator) -> tuple[TestSheet, ...]:
+    """
+    Draw the test sheets of one case, one for each name in RECORDINGS.
+
+    Parameters
+    ----------
+    tolerance : how far the machine may be from the reference, unit 1
+    duration : length of each recording [s]
+    random : source of randomness
+
+    """
+    fitted = 'new' if random.uniform() < 0.7 else 'old'
+    pot = _rounded(random.uniform(0.65, 0.9), 3)
+    elevations = random.permutation([
+        _rounded(random.uniform(15.0, 30.0), 1), _rounded(random.uniform(40.0, 55.0), 1),
+        _rounded(random.uniform(65.0, 80.0), 1)])
+    circuit = {'type': 'circuit', 'bias_pot': pot, 'start': 'steady'}
+    cold = {'type': 'circuit', 'bias_pot': pot, 'start': 'zero'}
+    tests = (
+        (_slow_square(random), _slow_bias(circuit, random)),
+        (_fast_triangle(random), cold if random.uniform() < 0.5 else circuit),
+        (_broad_band(duration, random), circuit))
+    return tuple(
+        TestSheet(circuit=fitted, filter_1=fitted, bias=bias, waveform=shape,
+                  elevation_deg=float(elevation), sensors=SensorGrade(),
+                  parameter_tolerance=tolerance)
+        for (shape, bias), elevation in zip(tests, elevations))
+
+
+def _rounded(value: float, digits: int) -> float:
+    return float(round(float(value), digits))
+
+
+def _log_uniform(low: float, high: float, digits: int, random: np.random.Generator) -> float:
+    return _rounded(math.exp(random.uniform(math.log(low), math.log(high))), digits)
+
+
+def _slow_square(random: np.random.Generator) -> dict[str, Any]:
+    return {'type': 'square', 'amplitude_deg_s': _log_uniform(0.02, 0.12, 4, random),
+            'period_s': _rounded(random.uniform(5.0, 7.5), 2),
+            'phase': float(random.choice([0.0, 0.25]))}
+
+
+def _slow_bias(circuit: dict[str, Any], random: np.random.Generator) -> dict[str, Any]:
+    way = random.uniform()
+    voltage = _rounded(random.uniform(*SOURCE_BIAS_V), 2)
+    if way < 0.3:
+        return {'type': 'fixed', 'voltage_V': voltage}
+    if way < 0.6:
+        return {'type': 'fixed_step', 'voltage_V': voltage,
+                'at_s': _rounded(random.uniform(8.0, 16.0), 1)}
+    return circuit
+
+
+def _fast_triangle(random: np.random.Generator) -> dict[str, Any]:
+    return {'type': 'triangle', 'amplitude_deg_s': _rounded(random.uniform(0.4, 0.685), 3),
+            'period_s': _rounded(random.uniform(4.5, 7.0), 2), 'phase': 0.0}
+
+
+def _broad_band(duration: float, random: np.random.Generator) -> dict[str, Any]:
+    if random.uniform() < 0.3:
+        return {'type': 'chirp', 'amplitude_deg_s': _log_uniform(0.04, 0.1, 4, random),
+                'f0_hz': 0.1, 'f1_hz': _rounded(random.uniform(6.0, 9.0), 1),
+                'duration_s': duration - 2.0, 'start_s': 1.0}
+    count = 12
+    # Whole cycles in half the recording, so that the second half repeats the first.
+    low, high = 0.1, 8.0
+    lines = np.unique(np.round(np.geomspace(low, high, count)
+                               * np.exp(random.uniform(-0.15, 0.15, count)) * 14.0))
+    frequencies = lines / 14.0
+    weights = frequencies**-0.5
+    weights /= math.sqrt(float(np.sum(weights**2)))
+    return {'type': 'multisine', 'amplitude_deg_s': _log_uniform(0.06, 0.2, 4, random),
+            'frequencies_hz': [_rounded(f, 6) for f in frequencies],
+            'weights': [_rounded(w, 4) for w in weights],
+            'phases': [_rounded(p, 4) for p in random.uniform(0.0, 2.0 * math.pi, len(lines))],
+            'start_s': 1.0}

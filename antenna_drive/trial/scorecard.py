@@ -1,0 +1,298 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The scorecard of a trial: every figure a pure function of truths and verdicts.
+
+docs/trial.md defines each figure. A case without a valid verdict counts as wrong wherever it
+could have been right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+import math
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from antenna_drive.trial import sealing
+from antenna_drive.trial.batch import FAILURE, VERDICT
+from antenna_drive.trial.cases import Truth
+from antenna_drive.trial.verdict import NONE, read_verdict, UNKNOWN, Verdict, VerdictError
+import numpy as np
+
+FIRST_FEW = 3
+OVERCONFIDENT = 0.9
+BINS = 10
+SIZES = ('small', 'middle', 'large')
+SCORED_SINGLE, SCORED_PAIR = 'single', 'pair'
+
+
+@dataclass(frozen=True)
+class Case:
+    """A truth with its verdict, which is None where the diagnosis failed."""
+
+    truth: Truth
+    verdict: Verdict | None
+
+    @property
+    def kind(self) -> str:
+        """Return 'single', 'pair', 'none' or 'outside'."""
+        return str(self.truth['kind'])
+
+    @property
+    def effects(self) -> frozenset[str]:
+        """Return what the best verdict names: the effects, UNKNOWN outside, NONE without."""
+        if self.kind == 'outside':
+            return frozenset([UNKNOWN])
+        return frozenset(entry['id'] for entry in self.truth['effects']) or frozenset([NONE])
+
+    @property
+    def label(self) -> str:
+        """Return the truth for people: its ids, or 'none'."""
+        return ' + '.join(entry['id'] for entry in self.truth['effects']) or NONE
+
+    @property
+    def size(self) -> str:
+        """Return into which third of its range the smallest effect falls, one of SIZES."""
+        smallest = min((entry['size'] for entry in self.truth['effects']), default=0.0)
+        return SIZES[min(int(smallest * len(SIZES)), len(SIZES) - 1)]
+
+    def named_among(self, first: int, *, exactly: bool = False) -> bool:
+        """Tell whether one of the first entries names the truth, or its confusable set."""
+        if self.verdict is None:
+            return False
+        return any(entry.effects == self.effects if exactly
+                   else self.verdict.means(entry.effects, self.effects)
+                   for entry in self.verdict.which[:first])
+
+    @property
+    def within_set(self) -> bool:
+        """Tell whether all that is true is among what the first entry and its sets hold."""
+        if self.verdict is None:
+            return False
+        held: frozenset[str] = frozenset().union(*(
+            self.verdict.confusable_with(name) for name in self.verdict.which[0].effects))
+        return self.effects <= held
+
+    @property
+    def right(self) -> bool:
+        """Tell whether the first entry names the truth, or its confusable set."""
+        return self.named_among(1)
+
+
+def read_cases(folder: Path) -> tuple[list[Case], int]:
+    """
+    Read truths and verdicts of a trial, checking every seal.
+
+    Parameters
+    ----------
+    folder : of the trial
+
+    Returns
+    -------
+    the cases that were diagnosed, and the number of those that were not yet
+
+    Raises
+    ------
+    SealError : a truth is missing or was changed
+
+    """
+    manifest = sealing.read_manifest(folder)
+    cases, pending = [], 0
+    for name in manifest['seals']:
+        truth = sealing.open_truth(folder, name, manifest)
+        place = folder / name
+        if (place / VERDICT).exists():
+            try:
+                cases.append(Case(truth, read_verdict(place / VERDICT)))
+            except VerdictError:
+                cases.append(Case(truth, None))
+        elif (place / FAILURE).exists():
+            cases.append(Case(truth, None))
+        else:
+            pending += 1
+    return cases, pending
+
+
+class Rate(NamedTuple):
+    """A share with its 95 percent interval (Wilson), and how many it rests on."""
+
+    value: float
+    low: float
+    high: float
+    cases: int
+
+
+def rate(outcomes: Iterable[bool]) -> Rate:
+    """Return the share of true outcomes; nan without any."""
+    values = list(outcomes)
+    count = len(values)
+    if not count:
+        return Rate(math.nan, math.nan, math.nan, 0)
+    share, z = sum(values) / count, 1.959964
+    middle = (share + z * z / (2 * count)) / (1 + z * z / count)
+    half = z / (1 + z * z / count) * math.sqrt(
+        share * (1 - share) / count + z * z / (4 * count * count))
+    return Rate(share, max(0.0, middle - half), min(1.0, middle + half), count)
+
+
+def auroc(positive: Sequence[float], negative: Sequence[float]) -> float:
+    """Return how often a positive scores above a negative, ties by half; nan without either."""
+    if not positive or not negative:
+        return math.nan
+    first, second = np.asarray(positive)[:, None], np.asarray(negative)[None, :]
+    return float(np.mean((first > second) + 0.5 * (first == second)))
+
+
+class Bin(NamedTuple):
+    """One bar of the reliability diagram."""
+
+    low: float
+    high: float
+    cases: int
+    confidence: float       # mean, nan if empty
+    accuracy: float         # nan if empty
+
+
+def reliability(confidences: Sequence[float], right: Sequence[bool]) -> list[Bin]:
+    """Return the bins of the reliability diagram, equally wide from 0 to 1."""
+    place = [min(int(c * BINS), BINS - 1) for c in confidences]
+    bins = []
+    for k in range(BINS):
+        inside = [i for i, p in enumerate(place) if p == k]
+        mean: Callable[[list[float]], float] = (
+            lambda values: sum(values) / len(values) if values else math.nan)
+        bins.append(Bin(k / BINS, (k + 1) / BINS, len(inside),
+                        mean([confidences[i] for i in inside]),
+                        mean([float(right[i]) for i in inside])))
+    return bins
+
+
+def calibration_error(bins: Sequence[Bin]) -> float:
+    """Return the expected calibration error; nan without a case."""
+    total = sum(b.cases for b in bins)
+    if not total:
+        return math.nan
+    return sum(b.cases * abs(b.accuracy - b.confidence) for b in bins if b.cases) / total
+
+
+def _median(values: Iterable[float]) -> float:
+    finite = [value for value in values if math.isfinite(value)]
+    return float(np.median(finite)) if finite else math.nan
+
+
+def case_reliability(cases: Sequence[Case]) -> list[Bin]:
+    """Return the reliability diagram of the cases that have a verdict."""
+    answered = [case for case in cases if case.verdict is not None]
+    return reliability([case.verdict.confidence() for case in answered if case.verdict],
+                       [case.right for case in answered])
+
+
+def _overconfident(case: Case) -> bool:
+    if case.verdict is None:
+        return False
+    return any(entry.probability > OVERCONFIDENT and not entry.effects & {UNKNOWN, NONE}
+               for entry in case.verdict.which)
+
+
+def _unknown(cases: Iterable[Case]) -> list[float]:
+    return [case.verdict.probability_of(UNKNOWN) for case in cases if case.verdict]
+
+
+def confusion(cases: Sequence[Case]) -> dict[str, dict[str, int]]:
+    """Return how often each truth was answered how, pairs left out: truth, then first entry."""
+    table: dict[str, dict[str, int]] = {}
+    for case in cases:
+        if case.kind == SCORED_PAIR:
+            continue
+        answer = 'failure'
+        if case.verdict:
+            answer = ' + '.join(sorted(case.verdict.which[0].effects))
+        row = table.setdefault(case.label, {})
+        row[answer] = row.get(answer, 0) + 1
+    return table
+
+
+def score(cases: Sequence[Case], pending: int = 0) -> dict[str, Any]:
+    """
+    Compute the scorecard.
+
+    Parameters
+    ----------
+    cases : with their verdicts
+    pending : number of cases that were not diagnosed yet
+
+    Returns
+    -------
+    figures by name, nan where there is no case to judge by; docs/trial.md defines them
+
+    """
+    by_kind = {kind: [case for case in cases if case.kind == kind]
+               for kind in (SCORED_SINGLE, SCORED_PAIR, 'none', 'outside')}
+    singles, pairs = by_kind[SCORED_SINGLE], by_kind[SCORED_PAIR]
+    outside = by_kind['outside']
+    known = [case for case in cases if case.kind != 'outside']
+    rates = {
+        'top1': rate(case.right for case in singles),
+        'top3': rate(case.named_among(FIRST_FEW) for case in singles),
+        'within_set': rate(case.within_set for case in singles),
+        'pairs_both': rate(case.right for case in pairs),
+        'no_gap_on_none': rate(
+            case.verdict is not None and case.verdict.verdict == 'no_gap'
+            for case in by_kind['none'])}
+    overconfident = rate(_overconfident(case) for case in outside)
+    more_rates = {
+        'top1_exact': rate(case.named_among(1, exactly=True) for case in singles),
+        'top3_exact': rate(case.named_among(FIRST_FEW, exactly=True) for case in singles),
+        'pairs_one': rate(_one_named(case) for case in pairs),
+        'overconfident_outside': overconfident}
+    figures: dict[str, Any] = {
+        'cases': len(cases),
+        'failures': sum(case.verdict is None for case in cases),
+        **{name: value.value for name, value in rates.items()},
+        'auroc_unknown': auroc(_unknown(outside), _unknown(known)),
+        'overconfident_outside': overconfident.value,
+        'ece': calibration_error(case_reliability(cases)),
+        'explained_fraction_median': _median(
+            case.verdict.explained_fraction for case in (*singles, *pairs)
+            if case.verdict and case.right),
+        'seconds_median': _median(case.verdict.seconds for case in cases if case.verdict),
+        'pending': pending,
+        **{name: value.value for name, value in more_rates.items() if name not in rates},
+        'ci95': {name: [value.low, value.high]
+                 for name, value in {**rates, **more_rates}.items()},
+        'by_kind': {kind: _summary(group) for kind, group in by_kind.items()},
+        'by_size': {size: _summary([case for case in singles if case.size == size])
+                    for size in SIZES},
+        'by_effect': {label: _summary([case for case in (*singles, *outside)
+                                       if case.label == label])
+                      for label in sorted({case.label for case in (*singles, *outside)})},
+        'confusion': confusion(cases),
+        'reliability': [b._asdict() for b in case_reliability(cases)]}
+    return figures
+
+
+def _one_named(case: Case) -> bool:
+    """Tell whether the first entry of a pair's verdict names at least one of the two."""
+    if case.verdict is None:
+        return False
+    return any(case.verdict.confusable_with(name) & case.effects
+               for name in case.verdict.which[0].effects)
+
+
+def _summary(cases: Sequence[Case]) -> dict[str, Any]:
+    return {'cases': len(cases), 'failures': sum(case.verdict is None for case in cases),
+            'top1': rate(case.right for case in cases).value,
+            'top3': rate(case.named_among(FIRST_FEW) for case in cases).value}

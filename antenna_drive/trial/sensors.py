@@ -1,0 +1,117 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What the recorder writes down of what truly happened: noise, digits, an uneven clock."""
+
+from __future__ import annotations
+
+import math
+
+from antenna_drive.trial.machine import Machine
+from antenna_drive.trial.real_antenna import FloatArray, History
+from antenna_drive.trial.test_sheet import SensorGrade
+import numpy as np
+
+JITTER = 0.03               # spread of the sampling instants, in sample periods
+STAMP_ERROR_S = 5e-5        # spread of the time stamps about the true instants
+STAMP_DIGIT_S = 1e-6
+# Offsets that no recorder is free of: at most one standard deviation of its noise.
+ENCODER_ZERO_RAD = 5e-6
+
+COLUMNS = ('time_s', 'rate_command_rad_s', 'current_1_A', 'current_2_A', 'tach_rate_1_rad_s',
+           'tach_rate_2_rad_s', 'encoder_rad', 'bias_voltage_V')
+
+
+def sample_instants(rate: float, duration: float,
+                    random: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    """
+    Draw when the recorder samples, and when it says that it did.
+
+    Parameters
+    ----------
+    rate : mean sample rate [Hz]
+    duration : length of the recording [s]
+    random : source of randomness
+
+    Returns
+    -------
+    true instants and time stamps, both strictly ascending from 0, shape (n,) [s]
+
+    """
+    count = int(round(rate * duration)) + 1
+    grid = np.arange(count) / rate
+    spread = np.clip(random.normal(0.0, JITTER, count), -0.3, 0.3) / rate
+    instants = np.maximum(grid + spread, 0.0)
+    error = np.clip(random.normal(0.0, STAMP_ERROR_S, count), -0.1 / rate, 0.1 / rate)
+    stamps = np.round((instants + error) / STAMP_DIGIT_S) * STAMP_DIGIT_S
+    instants[0] = stamps[0] = 0.0
+    return instants, stamps
+
+
+def _digits(values: FloatArray, step: float) -> FloatArray:
+    # Adding zero turns -0 into 0.
+    return np.round(values / step) * step + 0.0 if step > 0.0 else values
+
+
+def _encoder(angle: FloatArray, machine: Machine, grade: SensorGrade,
+             random: np.random.Generator) -> FloatArray:
+    sensors = machine.sensors[0]
+    phase = sensors['encoder_lines'] * angle + sensors['encoder_phase']
+    reading = angle + sensors['encoder_offset'] + random.uniform(-1.0, 1.0) * ENCODER_ZERO_RAD
+    reading = reading + sensors['encoder_cyclic'] * (
+        np.sin(phase) + 0.25 * np.sin(2.0 * phase + 0.5))
+    step = float(sensors['encoder_step']) or 2.0 * math.pi / 2**grade.encoder_bits
+    # An encoder counts whole lines passed: it rounds down.
+    return np.floor(reading / step) * step
+
+
+def record(history: History, machine: Machine, grade: SensorGrade, stamps: FloatArray,
+           random: np.random.Generator) -> dict[str, FloatArray]:
+    """
+    Turn true signals into recorded ones.
+
+    Parameters
+    ----------
+    history : true signals at the true instants
+    machine : holds the errors of the sensors
+    grade : noise and resolution
+    stamps : time stamps, shape (n,) [s]
+    random : source of noise and offsets
+
+    Returns
+    -------
+    the columns of the recording, by name, each of shape (n,)
+
+    """
+    count = len(stamps)
+    sensors = machine.sensors[0]
+    columns = {'time_s': stamps, 'rate_command_rad_s': history.command}
+    for which in range(2):
+        gain = 1.0 + float(sensors[f'current_error_{which + 1}'])
+        offset = float(sensors[f'current_offset_{which + 1}'])
+        offset += random.uniform(-1.0, 1.0) * grade.current_noise_A
+        noise = random.normal(0.0, 1.0, count) * grade.current_noise_A
+        columns[f'current_{which + 1}_A'] = _digits(
+            gain * history.current[which] + offset + noise, grade.current_step_A)
+    for which in range(2):
+        true = history.tach[which]
+        offset = random.uniform(-1.0, 1.0) * grade.tach_noise_rad_s
+        spread = np.hypot(grade.tach_noise_rad_s, grade.tach_noise_relative * true)
+        columns[f'tach_rate_{which + 1}_rad_s'] = _digits(
+            true + offset + random.normal(0.0, 1.0, count) * spread, grade.tach_step_rad_s)
+    columns['encoder_rad'] = _encoder(history.encoder_angle, machine, grade, random)
+    bias = (1.0 + float(sensors['bias_error'])) * history.bias
+    bias = bias + random.uniform(-1.0, 1.0) * grade.bias_noise_V
+    columns['bias_voltage_V'] = _digits(
+        bias + random.normal(0.0, 1.0, count) * grade.bias_noise_V, grade.bias_step_V)
+    return {name: columns[name] for name in COLUMNS}

@@ -1,0 +1,166 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A verdict of the diagnosis, read from its JSON and checked before anything is scored."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+UNKNOWN, NONE = 'unknown', 'none'
+VERDICTS = ('no_gap', 'explained', 'partly_explained', 'unknown_effect')
+LARGEST_SET = 5             # ids in a confusable set that still says something
+SUM_ERROR = 0.01            # allowed in the sum of the probabilities
+
+
+class VerdictError(ValueError):
+    """A verdict is not what the diagnosis promises; counted as a failure."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One line of 'which': ids that act together, and how probable that is."""
+
+    effects: frozenset[str]
+    probability: float
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """
+    What a diagnosis says.
+
+    Attributes
+    ----------
+    verdict : one of VERDICTS
+    which : ranked, the most probable first
+    confusable : groups of ids that the data cannot tell apart
+    explained_fraction : nan if not given
+    seconds : nan if not given
+
+    """
+
+    verdict: str
+    which: tuple[Entry, ...]
+    confusable: tuple[frozenset[str], ...]
+    explained_fraction: float
+    seconds: float
+
+    def confusable_with(self, effect: str) -> frozenset[str]:
+        """
+        Return all ids published as confusable with `effect`, itself included.
+
+        The groups that hold it count together: beyond LARGEST_SET ids they say nothing, and
+        the effect stands alone. Otherwise many small groups could cover everything.
+        """
+        together = frozenset([effect]).union(
+            *(group for group in self.confusable if effect in group))
+        return together if len(together) <= LARGEST_SET else frozenset([effect])
+
+    def means(self, named: frozenset[str], true: frozenset[str]) -> bool:
+        """Tell whether an entry names the true effects, each itself or one confusable with it."""
+        return len(named) == len(true) and any(True for _ in self._matchings(
+            sorted(named), true))
+
+    def _matchings(self, named: list[str], true: frozenset[str]) -> Iterator[None]:
+        if not named:
+            yield None
+            return
+        for effect in true & self.confusable_with(named[0]):
+            yield from self._matchings(named[1:], true - {effect})
+
+    def confidence(self) -> float:
+        """Return the probability of the first entry with all that means the same."""
+        first = self.which[0].effects
+        return min(1.0, sum(entry.probability for entry in self.which
+                            if entry.effects == first or self.means(first, entry.effects)))
+
+    def probability_of(self, answer: str) -> float:
+        """Return the probability of UNKNOWN or NONE."""
+        return sum(entry.probability for entry in self.which if entry.effects == {answer})
+
+
+def read_verdict(path: Path) -> Verdict:
+    """
+    Read and check a verdict.
+
+    Raises
+    ------
+    VerdictError : it is missing, not JSON, or not a verdict; the message says why
+
+    """
+    try:
+        content = json.loads(path.read_text(encoding='utf-8'))
+    except (OSError, ValueError) as error:
+        raise VerdictError(f'{path}: {error}') from error
+    try:
+        return parse_verdict(content)
+    except VerdictError as error:
+        raise VerdictError(f'{path}: {error}') from None
+
+
+def parse_verdict(content: Any) -> Verdict:
+    """
+    Check the content of a verdict.
+
+    Raises
+    ------
+    VerdictError : it is not a verdict; the message names the key
+
+    """
+    if not isinstance(content, dict):
+        raise VerdictError('not a JSON object')
+    if content.get('verdict') not in VERDICTS:
+        raise VerdictError(f'verdict: {content.get("verdict")!r}, not one of {VERDICTS}')
+    entries = content.get('which')
+    if not isinstance(entries, list) or not entries:
+        raise VerdictError('which: not a list with entries')
+    which = tuple(_entry(entry) for entry in entries)
+    probabilities = [entry.probability for entry in which]
+    if abs(sum(probabilities) - 1.0) > SUM_ERROR:
+        raise VerdictError(f'which: probabilities add up to {sum(probabilities):.3f}, not to 1')
+    ranked = tuple(sorted(which, key=lambda entry: -entry.probability))
+    groups = content.get('confusable', [])
+    if not isinstance(groups, list) or not all(
+            isinstance(group, list) and all(isinstance(name, str) for name in group)
+            for group in groups):
+        raise VerdictError('confusable: not a list of lists of ids')
+    how_far = content.get('how_far')
+    fraction = how_far.get('explained_fraction') if isinstance(how_far, dict) else None
+    value = fraction.get('value') if isinstance(fraction, dict) else fraction
+    return Verdict(content['verdict'], ranked, tuple(frozenset(group) for group in groups),
+                   _number_or_nan(value), _number_or_nan(content.get('seconds')))
+
+
+def _entry(content: Any) -> Entry:
+    if not isinstance(content, dict):
+        raise VerdictError('which: an entry is not a JSON object')
+    effects, probability = content.get('effects'), content.get('probability')
+    if not isinstance(effects, list) or not effects or not all(
+            isinstance(name, str) for name in effects):
+        raise VerdictError(f'which.effects: {effects!r}, not a list of ids')
+    if isinstance(probability, bool) or not isinstance(probability, (int, float)) or not (
+            0.0 <= probability <= 1.0):
+        raise VerdictError(f'which.probability: {probability!r}, not a number from 0 to 1')
+    return Entry(frozenset(effects), float(probability))
+
+
+def _number_or_nan(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return math.nan
+    return float(value)

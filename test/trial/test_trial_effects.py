@@ -1,0 +1,196 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The effects: their names, their closed forms, and that each one shows and none breaks."""
+
+from __future__ import annotations
+
+import functools
+import math
+
+from antenna_drive.trial import equations
+from antenna_drive.trial.cases import draw_truths
+from antenna_drive.trial.effect import Effect
+from antenna_drive.trial.effects import CATALOGUE
+from antenna_drive.trial.machine import reference_machine
+from antenna_drive.trial.outside import OUTSIDE
+from antenna_drive.trial.real_antenna import simulate
+from antenna_drive.trial.sensors import record
+from antenna_drive.trial.test_sheet import TestSheet
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+
+PLAIN = TestSheet('new', 'new', {'type': 'circuit', 'bias_pot': 0.8, 'start': 'steady'},
+                  {'type': 'triangle', 'amplitude_deg_s': 0.685, 'period_s': 4.0})
+MOTOR_EFFECTS = {
+    'viscous_friction', 'stribeck_friction', 'coulomb_friction', 'friction_asymmetry',
+    'load_dependent_friction', 'torque_ripple', 'torque_constant', 'armature_resistance',
+    'amplifier_gain', 'amplifier_offset', 'amplifier_dead_zone', 'current_limit'}
+OTHER_EFFECTS = {
+    'gearbox_1': {'gap', 'stiffness', 'hysteresis', 'transmission_error'},
+    'gearbox_2': {'gap', 'stiffness', 'hysteresis', 'transmission_error'},
+    'torque_share': {'bias_pot', 'fade_out_voltage', 'share_filter', 'filter_1_gain',
+                     'filter_1_pole'},
+    'axis': {'coulomb_friction', 'viscous_friction', 'stribeck_friction',
+             'position_dependent_friction', 'gravity_imbalance', 'wind_steady', 'wind_gust',
+             'inertia', 'mode_frequency', 'mode_damping', 'extra_mode', 'bull_gear_backlash'},
+    'tach_1': {'gain', 'offset', 'ripple'}, 'tach_2': {'gain', 'offset', 'ripple'},
+    'current_1': {'gain', 'offset'}, 'current_2': {'gain', 'offset'},
+    'encoder': {'quantisation', 'cyclic_error', 'offset'}, 'bias_voltage': {'gain'},
+    'loop': {'delay'}}
+
+
+def signals(effect: Effect | None, size: float) -> NDArray[np.float64]:
+    """Return seven seconds of recorded signals, all noises alike, with and without an effect."""
+    machine = reference_machine('new', 'new', 0.8)
+    if effect is not None:
+        effect.change(machine, effect.draw(size, np.random.default_rng(5)))
+    times = np.arange(0.0, 7.0, 0.01)
+    history = simulate(machine, PLAIN, times, (0.2, -0.4))
+    columns = record(history, machine, PLAIN.sensors, times, np.random.default_rng(6))
+    return np.stack(list(columns.values()))
+
+
+@functools.cache
+def unchanged_signals() -> NDArray[np.float64]:
+    """Return the signals without any effect."""
+    return signals(None, 0.0)
+
+
+def test_catalogue_names_every_effect_of_the_specification() -> None:
+    specified = {f'{motor}.{name}' for motor in ('motor_1', 'motor_2', 'motors')
+                 for name in MOTOR_EFFECTS}
+    specified |= {f'{part}.{name}' for part, names in OTHER_EFFECTS.items() for name in names}
+    assert set(CATALOGUE) == specified
+    assert len(OUTSIDE) >= 10
+    assert not set(OUTSIDE) & set(CATALOGUE)
+
+
+@pytest.mark.parametrize('effect', [*CATALOGUE.values(), *OUTSIDE.values()],
+                         ids=lambda effect: effect.id)
+def test_every_effect_shows_at_both_ends_of_its_range(effect: Effect) -> None:
+    before = unchanged_signals()
+    for size in (0.0, 1.0):
+        after = signals(effect, size)
+        assert np.all(np.isfinite(after))
+        if effect.id in ('outside.shifting_ballast', 'motors.current_limit') and size == 0.0:
+            continue    # comes after 8 s, or beyond this test's current
+        if effect.id not in ('motor_1.current_limit', 'motor_2.current_limit',
+                             'outside.dragging_brake', 'outside.shifting_ballast'):
+            assert np.any(after != before)
+
+
+def test_sizes_span_the_range_and_turn_both_ways() -> None:
+    effect = CATALOGUE['motor_1.amplifier_gain']
+    quantity = effect.quantities[0]
+    drawn = [quantity.at(0.5, np.random.default_rng(seed)) for seed in range(20)]
+    middle = math.sqrt(quantity.low * quantity.high)
+    assert sorted({round(value, 12) for value in drawn}) == pytest.approx([1 / middle, middle])
+    for part, end in ((0.0, quantity.low), (1.0, quantity.high)):
+        value = quantity.at(part, np.random.default_rng(0))
+        assert max(value, 1.0 / value) == pytest.approx(end)
+
+
+def test_mesh_error_is_the_rounded_saw_tooth() -> None:
+    machine = reference_machine()
+    machine.motors['mesh_error'] = 0.01
+    machine.motors['mesh_cycles'] = 3.0
+    for theta in (0.1, 1.0, 2.2, -1.4):
+        x, rate, _ = equations.gear_deflection(
+            machine.motors[0], machine.structure[0], theta, 2.0, 0.0, 0.0)
+        terms = np.arange(1, 60)
+        series = np.sum(np.sin(terms * 3.0 * theta) / (terms * 2.0**(terms - 1)))
+        slope = np.sum(3.0 * np.cos(terms * 3.0 * theta) / 2.0**(terms - 1))
+        assert x == pytest.approx(theta - 0.01 * series, abs=1e-14)
+        assert rate == pytest.approx(2.0 - 0.01 * slope * 2.0, abs=1e-13)
+
+
+def test_damaged_tooth_moves_as_fast_as_it_says() -> None:
+    machine = reference_machine()
+    machine.motors['tooth_height'] = 0.1
+    machine.motors['tooth_ratio'] = 2.5
+    step = 1e-6
+    for theta in (0.2, -0.4, 1.0):
+        (before, _, _), (_, rate, _), (after, _, _) = (
+            equations.gear_deflection(
+                machine.motors[0], machine.structure[0], theta + shift, 3.0, 0.0, 0.0)
+            for shift in (-step, 0.0, step))
+        assert rate == pytest.approx(3.0 * (after - before) / (2.0 * step), rel=1e-7)
+
+
+@pytest.mark.parametrize('frequency', [0.5, 5.0, 20.0])
+def test_delay_is_a_delay(frequency: float) -> None:
+    """The approximant's response against exp(-j w delay), from its own state equations."""
+    delay, rows = 0.01, 4
+    y, slope = np.zeros(rows), np.zeros(rows)
+    matrix, gain, out = np.zeros((rows, rows)), np.zeros(rows), np.zeros(rows)
+    for k in range(rows):
+        y[:] = 0.0
+        y[k] = 1.0
+        out[k] = equations.delayed(y, slope, 0, 0.0, delay)
+        matrix[:, k] = slope
+    y[:] = 0.0
+    equations.delayed(y, slope, 0, 1.0, delay)
+    gain[:] = slope
+    omega = 2.0 * math.pi * frequency
+    response = out @ np.linalg.solve(1j * omega * np.eye(rows) - matrix, gain)
+    first_missing_term = 6.0 * 24.0 / (math.factorial(7) * math.factorial(8)) * (omega * delay)**8
+    assert abs(response - np.exp(-1j * omega * delay)) < 1.5 * first_missing_term + 1e-12
+
+
+def test_stribeck_falls_as_a_hyperbola() -> None:
+    assert equations.stribeck_torque(4.0, 0.0, 2.0) == 4.0
+    assert equations.stribeck_torque(4.0, -2.0, 2.0) == 2.0
+    assert equations.stribeck_torque(4.0, 6.0, 2.0) == 1.0
+
+
+def test_gust_has_the_strength_it_says() -> None:
+    machine = reference_machine()
+    CATALOGUE['axis.wind_gust'].change(machine, {'rms': 2e4, 'corner': 0.2, 'seed': 9.0})
+    structure = machine.structure[0]
+    assert math.sqrt(0.5 * float(np.sum(structure['gust']**2))) == pytest.approx(2e4)
+    assert structure['gust_frequency'].max() < 2.0 * math.pi * 5.0
+    torque = [equations.load_torque(structure, 0.0, t, t, 0.0) for t in np.arange(0, 1000, 0.05)]
+    assert np.std(torque) == pytest.approx(2e4, rel=0.1)
+
+
+def test_tach_ripple_leaves_the_mean_alone() -> None:
+    motor = reference_machine().motors
+    motor['tach_ripple'] = 0.2
+    motor['tach_cycles'] = 6.0
+    y = np.zeros(equations.STATES)
+    y[equations.MOTOR_AT + equations.W] = 10.0
+    readings = []
+    for theta in np.arange(0.0, 2.0 * math.pi, 2.0 * math.pi / 6000):
+        y[equations.MOTOR_AT + equations.THETA] = theta
+        readings.append(equations.tach_reading(motor[0], y, equations.MOTOR_AT, 0.0, 0.5))
+    assert np.mean(readings) == pytest.approx(10.0, rel=1e-4)
+    assert np.std(readings) == pytest.approx(0.2 * 10.0 * 0.592, rel=0.01)
+
+
+def test_cases_keep_the_mix_and_take_turns() -> None:
+    truths = draw_truths(200, 4, 0.02)
+    kinds = [truth['kind'] for truth in truths]
+    assert {kind: kinds.count(kind) for kind in set(kinds)} == {
+        'single': 110, 'pair': 30, 'none': 30, 'outside': 30}
+    singles = [truth['effects'][0] for truth in truths if truth['kind'] == 'single']
+    assert {entry['id'] for entry in singles} == set(CATALOGUE)
+    sizes = sorted(entry['size'] for entry in singles)
+    assert all(k / 110 <= size < (k + 1) / 110 for k, size in enumerate(sizes))
+    for truth in truths:
+        ids = [entry['id'] for entry in truth['effects']]
+        assert len(set(ids)) == {'single': 1, 'pair': 2, 'none': 0, 'outside': 1}[truth['kind']]
+        assert (truth['kind'] == 'outside') == any(name in OUTSIDE for name in ids)
+    assert truths == draw_truths(200, 4, 0.02)
+    assert truths != draw_truths(200, 5, 0.02)
