@@ -163,10 +163,10 @@ def _statistics(figures: Statistics, recording: Recording, kappa: float | None) 
 def _motor_rows(motor: str, own: MotorStatistics, recording: Recording,
                 kappa: float | None) -> Iterable[tuple[str, str, str]]:
     peak = own.current_peak_A
-    real = f' ({peak * kappa:.4g} real A)' if peak is not None and kappa else ''
+    real = f', {peak * kappa:.4g} real A' if peak is not None and kappa else ''
     limit = _lookup(recording.configuration, motor, 'motor', 'current_limit')
-    limited = f', limit {limit:g} A' if isinstance(limit, float) else ''
-    at = '' if own.current_peak_s is None else f'at {own.current_peak_s:g} s{limited}{real}'
+    limited = f'; limit {limit:g} article A' if isinstance(limit, float) else ''
+    at = '' if own.current_peak_s is None else f'at {own.current_peak_s:g} s{real}{limited}'
     yield 'current peak', _number(peak, 'article&nbsp;A'), at
     yield 'current, root mean square', _number(own.current_rms_A, 'article&nbsp;A'), ''
     still = '' if own.still_rad_s is None else (

@@ -40,7 +40,7 @@ def some_recording(samples: int = 4000) -> Recording:
     signals = {name: math.cos(i) * np.sin(2 * math.pi * time / (1.0 + i))
                for i, name in enumerate(n for panel in PANELS for n in panel.names)}
     return Recording.from_arrays(
-        time, {**signals, 'wind/speed': np.full(samples, 7.5)},
+        time, {**signals, 'wind/speed': 7.5 + 0.1 * np.cos(time)},
         configuration={'motor_1': {'motor': {'current_limit': 5.049}, 'armature': {
             'physical_amperes_per_article_ampere': 6.0}}, HOSTILE: HOSTILE},
         changes=(Change(1200, 'torque_share', {'bias_pot': 0.892}),) * 2,
@@ -105,7 +105,7 @@ def test_the_page_loads_draws_every_curve_and_asks_nobody(browser: Page, tmp_pat
     text = browser.tell('document.body.innerText')
     for word in ('backlash crossings', 'current peak', 'bias voltage', 'rotor stands still',
                  'bias at zero', 'axis stands still', '1. step 1200', '2. step 1200',
-                 'limit 5.049 A', 'elevation_deg'):
+                 'limit 5.049 article A', 'elevation_deg'):
         assert word in text, word
 
 
