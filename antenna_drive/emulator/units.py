@@ -23,7 +23,9 @@ from antenna_drive.emulator import wiring
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.parameters.loading import check_waveform
 from antenna_drive.parameters.records import record_of
-from antenna_drive.parameters.schema import check_changes, Entry, Value
+from antenna_drive.parameters.schema import (
+    check_changes, Entry, nearest, ParameterError, Value,
+)
 from antenna_drive.parameters.sets import changed, Drive, values
 from antenna_drive.physics import motor_drive, structure, test_signal, torque_share
 from antenna_drive.physics.integrator import work_space
@@ -225,7 +227,7 @@ _UNITS: dict[str, type[Any]] = {
 }
 
 
-def build(name: str, drive: Drive) -> Unit:
+def build(name: str, drive: Drive, overrides: Mapping[str, Value] | None = None) -> Unit:
     """
     Build one of the drive's units.
 
@@ -233,11 +235,24 @@ def build(name: str, drive: Drive) -> Unit:
     ----------
     name : one of wiring.UNITS
     drive : the parameters of the whole drive
+    overrides : settings of the unit, constants too, that differ from the drive's
 
     Raises
     ------
     KeyError : there is no unit of that name
+    ParameterError : an override is unknown or its value is not allowed
 
     """
-    unit: Unit = _UNITS[name](name, drive)
-    return unit
+    unit = _UNITS[name](name, drive)
+    if overrides:
+        settings = unit.settings()
+        for key in overrides:
+            if key not in settings:
+                raise ParameterError(f'{key}: no such parameter{nearest(key, tuple(settings))}')
+        # the drive calls each unit's set by the unit's name
+        unit = _UNITS[name](name, changed(drive, {
+            f'{name}.{unit._path(key)}': settings[key][0].check(key, value)
+            for key, value in overrides.items()}))
+        unit.check({})
+    result: Unit = unit
+    return result

@@ -292,9 +292,12 @@ def _check_modes(axis: Axis, given: _Given) -> None:
     for name in ('mode_frequencies', 'mode_damping_ratios', 'pointing_elevation',
                  'pointing_cross_elevation'):
         if len(getattr(axis, name)) != count:
+            said_in = (given['axis.mode_inertias'][1], given[f'axis.{name}'][1])
+            # the reference fits itself, so the other of the two files is the one to mend
+            path = next((item for item in said_in if item != str(find('reference'))), said_in[1])
             raise ParameterError(
-                f'{given[f"axis.{name}"][1]}: axis.{name}: {len(getattr(axis, name))} numbers '
-                f'given, allowed is {count}, one for each of axis.mode_inertias')
+                f'{path}: axis.{name}: {len(getattr(axis, name))} numbers given, '
+                f'allowed is {count}, one for each of axis.mode_inertias')
 
 
 def check_waveform(waveform: Waveform, key: str) -> None:

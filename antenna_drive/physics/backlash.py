@@ -37,11 +37,15 @@ def dead_zone(twist, half_gap):  # type: ignore[no-untyped-def]
 
 
 @inner
-def contact_side(twist, half_gap):  # type: ignore[no-untyped-def]
-    """Return which flank touches: +1, -1, or 0 inside the gap; angles in rad."""
-    if twist > half_gap:
+def contact_side(twist, twist_rate, half_gap, stiffness, damping):  # type: ignore[no-untyped-def]
+    """
+    Return which flank pushes: +1, -1, or 0 for none; arguments as in `contact_torque`.
+
+    Flanks that move apart faster than they spring back no longer push, if still pressed a little.
+    """
+    if twist > half_gap and stiffness * (twist - half_gap) + damping * twist_rate > 0.0:
         return 1
-    if twist < -half_gap:
+    if twist < -half_gap and stiffness * (twist + half_gap) + damping * twist_rate < 0.0:
         return -1
     return 0
 
@@ -54,7 +58,7 @@ def contact_torque(side, twist, twist_rate, half_gap, stiffness, damping):
 
     Parameters
     ----------
-    side : the flank that touches, from `contact_side`
+    side : the flank that pushes, from `contact_side`
     twist, twist_rate : angle and rate between the two gears [rad], [rad/s]
     half_gap : b [rad]
     stiffness : k [N m/rad]
@@ -62,13 +66,13 @@ def contact_torque(side, twist, twist_rate, half_gap, stiffness, damping):
 
     Returns
     -------
-    torque on the driven gear [N m]; flanks push and never pull
+    torque on the driven gear [N m]; a flank that pushes has the sign of its side
 
     """
     if side > 0:
-        return max(0.0, stiffness * (twist - half_gap) + damping * twist_rate)
+        return stiffness * (twist - half_gap) + damping * twist_rate
     if side < 0:
-        return min(0.0, stiffness * (twist + half_gap) + damping * twist_rate)
+        return stiffness * (twist + half_gap) + damping * twist_rate
     return 0.0
 
 

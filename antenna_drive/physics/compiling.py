@@ -36,7 +36,8 @@ Function = TypeVar('Function', bound=Callable[..., Any])
 
 # A zero divisor gives infinity, as in C, and the check for it stays out of the inner loops.
 # Compiled code allocates nothing, and so need not count who holds an array.
-_OPTIONS: dict[str, Any] = {'error_model': 'numpy', '_nrt': False}
+# nogil: runs of several variants of a drive share the cores, see emulator/batch.py
+_OPTIONS: dict[str, Any] = {'error_model': 'numpy', '_nrt': False, 'nogil': True}
 
 
 def inner(function: Function) -> Function:
@@ -89,10 +90,9 @@ def _candidate_roots() -> list[Path]:
 
 
 def _sources_digest() -> str:
-    package = Path(__file__).resolve().parent.parent
+    # a parameter that comes or goes changes the type of a record, and numba looks at types
     digest = hashlib.sha256(numba.__version__.encode())
-    for room in ('parameters', 'physics', 'emulator'):
-        for source in sorted((package / room).glob('*.py')):
-            digest.update(source.name.encode())
-            digest.update(source.read_bytes())
+    for source in sorted(Path(__file__).resolve().parent.glob('*.py')):
+        digest.update(source.name.encode())
+        digest.update(source.read_bytes())
     return digest.hexdigest()[:16]

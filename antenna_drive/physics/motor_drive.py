@@ -123,8 +123,11 @@ def _rates(t, x, mode, u, p, dx):  # type: ignore[no-untyped-def]
 
 @shared
 def _switch(t, x, mode, u, p, commit):  # type: ignore[no-untyped-def]
-    angle = twist(x[ANGLE], _axis_angle(u, t), p.gear_ratio, p.gearbox)
-    side = contact_side(angle, p.gearbox.half_gap)
+    gear = p.gearbox
+    side = contact_side(
+        twist(x[ANGLE], _axis_angle(u, t), p.gear_ratio, gear),
+        twist_rate(x[ANGLE], x[RATE], _held(u, AXIS_RATE, t), p.gear_ratio, gear),
+        gear.half_gap, gear.stiffness, gear.contact_damping)
     error, demand, centre = _demand(t, x, u, p)
     excess = (demand - centre if error > 0.0 else centre - demand) - p.motor.current_limit
     winding = mode[WINDING]

@@ -1,0 +1,34 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The lock-step at 1 ms against the converged reference, and against the published limit."""
+
+from antenna_drive.article.accuracy import distances, growth_rate, stability_limit
+import pytest
+
+
+@pytest.mark.parametrize('name', ['T1', 'T2', 'T3a', 'T3b', 'T4a', 'T4e'])
+def test_every_signal_is_within_a_fifth_of_a_percent(name: str) -> None:
+    found = distances(1e-3, [name])
+    assert len(found) >= 10
+    worst = max(found, key=lambda item: item.share)
+    assert worst.share < 0.002, worst
+
+
+def test_filter_1_goes_unstable_where_the_model_says() -> None:
+    # 145.4 1/s: the linear limit with the rotors held by static friction; the article says 146
+    assert stability_limit(1e-3) == pytest.approx(145.4, abs=1.0)
+
+
+def test_the_growth_changes_sign_about_the_limit() -> None:
+    assert growth_rate(140.0, 1e-3) < 0.0 < growth_rate(150.0, 1e-3)

@@ -1,0 +1,155 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Configuration files: what is right is read to the last digit, what is wrong is told in one line."""
+
+from pathlib import Path
+import re
+
+from antenna_drive.parameters import load, ParameterError
+from antenna_drive.parameters.loading import find
+from antenna_drive.parameters.records import record_of
+from antenna_drive.parameters.sets import values
+from hypothesis import given, HealthCheck, settings, strategies as st
+import pytest
+import yaml
+
+
+def _file(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / 'drive.yaml'
+    path.write_text(text)
+    return path
+
+
+def test_the_reference_is_number_for_number_what_its_file_says() -> None:
+    content = yaml.safe_load(find('reference').read_text())
+    drive = load()
+    homes = {'axis': (drive.plant.axis,), 'torque_share': (drive.torque_share.torque_share,),
+             'filter_1': (drive.torque_share.filter_1,)}
+    checked = 0
+    for section, entries in content.items():
+        sets = homes.get(section) or (getattr(drive.motor_1, section),
+                                      getattr(drive.motor_2, section))
+        for key, entry in entries.items():
+            expected = entry['value']
+            for parameters in sets:
+                found = getattr(parameters, key)
+                assert found == (tuple(expected) if isinstance(expected, list) else expected)
+                checked += 1
+    assert checked > 50
+
+
+def test_every_reference_entry_says_unit_range_and_source() -> None:
+    for section, entries in yaml.safe_load(find('reference').read_text()).items():
+        for key, entry in entries.items():
+            assert set(entry) == {'value', 'unit', 'range', 'source'}, f'{section}.{key}'
+
+
+@pytest.mark.parametrize(('name', 'k_2', 's_2', 'k_3', 'g_4', 'gain', 'pole'), [
+    ('old_circuit', -3.502, 1.093, 2.0, 2.8, 3.31 / 0.73, 1.0 / 0.73),
+    ('new_circuit', -2.114, 0.8895, 3.831, 1.617, 48.67 / 0.73, 1.0 / 0.1125)])
+def test_the_circuits_are_table_1(name: str, k_2: float, s_2: float, k_3: float, g_4: float,
+                                  gain: float, pole: float) -> None:
+    share, filter_1 = load(name).torque_share.torque_share, load(name).torque_share.filter_1
+    assert (share.k_2, share.s_2, share.k_3, share.g_4) == (k_2, s_2, k_3, g_4)
+    assert filter_1.gain == pytest.approx(gain, rel=2e-3)
+    assert filter_1.pole == pytest.approx(pole, rel=2e-3)
+
+
+def test_a_file_lies_over_the_reference_and_a_motor_may_differ(tmp_path: Path) -> None:
+    path = _file(tmp_path, 'gearbox: {stiffness: 30.0}\nmotor_2: {gearbox: {half_gap: 0.2}}\n')
+    drive = load(path)
+    assert drive.motor_1.gearbox.stiffness == drive.motor_2.gearbox.stiffness == 30.0
+    assert drive.motor_1.gearbox.half_gap == 0.148
+    assert drive.motor_2.gearbox.half_gap == 0.2
+    assert load('new_circuit', path).torque_share.filter_1.gain == 66.67
+
+
+@pytest.mark.parametrize(('text', 'said'), [
+    ('gearbox: {stifness: 30.0}', r'gearbox\.stifness: no such entry, did you mean stiffness\?'),
+    ('gear_box: {stiffness: 30.0}', r'gear_box: no such section, did you mean gearbox\?'),
+    ('gearbox: {stiffness: -1.0}', r'gearbox\.stiffness: -1\.0 given, allowed is a number from '),
+    ('gearbox: {stiffness: stiff}', r"gearbox\.stiffness: 'stiff' given, allowed is a number"),
+    ('axis: {inertia_hub: 8.74e6}', r"axis\.inertia_hub: '8\.74e6' given, allowed is a number"),
+    ('gearbox: {stiffness: .nan}', r'gearbox\.stiffness: nan given, allowed'),
+    ('gearbox: {stiffness: .inf}', r'gearbox\.stiffness: inf given, allowed'),
+    ('gearbox: {stiffness: true}', r'gearbox\.stiffness: True given, allowed'),
+    ('gearbox: {stiffness: }', r'gearbox\.stiffness: None given, allowed'),
+    ('gearbox: {stiffness: {value: 30.0, unit: Nm/deg}}', r"unit 'Nm/deg' given, allowed is 'N m/"),
+    ('gearbox: {stiffness: {value: 30.0, range: [40, 50]}}', r'30\.0 given, allowed .* 40 to 50'),
+    ('gearbox: {stiffness: {value: 30.0, range: [-4, 50]}}', r'range \[-4, 50\] given'),
+    ('gearbox: {stiffness: {vaule: 30.0}}', r'vaule: no such part of an entry, did you mean val'),
+    ('gearbox: {stiffness: {unit: N m/rad}}', r'value is missing'),
+    ('gearbox: {stiffness: 1.0, stiffness: 2.0}', r'line 1: stiffness is given twice'),
+    ('gearbox: [1, 2]', r'gearbox: \[1, 2\] given, allowed is a mapping'),
+    ('- 1', r'list given, allowed is a mapping of sections'),
+    ('gearbox: {stiffness: 30.0', r'line \d+: '),
+    ('axis: {mode_inertias: [1.0, 2.0]}', r'axis\.mode_frequencies: 3 numbers given, allowed is 2'),
+    ('axis: {mode_inertias: []}', r'axis\.mode_inertias: \[\] given, allowed is a list of 1 to 6'),
+    ('axis: {mode_inertias: [1.0, x, 2.0]}', r"axis\.mode_inertias\[1\]: 'x' given"),
+    ('motor_1: {gearbox: {gap: 1.0}}', r'motor_1\.gearbox\.gap: no such entry'),
+    ('motor_1: {axis: {}}', r'motor_1\.axis: no such section'),
+    ('torque_share: {bias_source: batery}', r"'batery' given, allowed is one of circuit, fixed"),
+    ('torque_share: {saturation_low: 14.0}', r'saturation_low: 14 given, allowed is at most'),
+    ('test_signal: {rate: {waveform: saw}}', r"'saw' given, allowed is one of zero, square"),
+    ('test_signal: {rate: {frequencies: [1.0]}}', r'rate\.weights: 3 numbers given, allowed is 1'),
+    ('base: none\ngearbox: {stiffness: 30.0}', r'axis\.gear_ratio: is missing, allowed is'),
+    ('base: refrence', r"base: 'refrence' given, allowed is reference or none"),
+])
+def test_what_is_wrong_is_told_in_one_line(tmp_path: Path, text: str, said: str) -> None:
+    path = _file(tmp_path, text)
+    with pytest.raises(ParameterError) as caught:
+        load(path)
+    message = str(caught.value)
+    assert '\n' not in message
+    assert re.search(said, message), message
+    assert str(path) in message
+
+
+def test_a_file_that_is_not_there_or_not_text(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match='new_circit: no such file.*did you mean new_circuit'):
+        load('new_circit')
+    path = tmp_path / 'binary.yaml'
+    path.write_bytes(b'\xff\xfe\x00\x01')
+    with pytest.raises(ParameterError, match='not UTF-8'):
+        load(path)
+
+
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.recursive(
+    st.none() | st.booleans() | st.floats() | st.text(max_size=8),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(
+        st.sampled_from(('gearbox', 'stiffness', 'value', 'unit', 'axis', 'motor_1', 'base',
+                         'range', 'torque_share')) | st.text(max_size=6), inner, max_size=3),
+    max_leaves=12))
+def test_any_yaml_is_read_or_refused_in_one_line(tmp_path: Path, content: object) -> None:
+    path = _file(tmp_path, yaml.safe_dump(content))
+    try:
+        load(path)
+    except ParameterError as error:
+        assert '\n' not in str(error)
+
+
+def test_the_record_holds_what_the_set_holds() -> None:
+    drive = load()
+    record = record_of(drive.plant)[0]
+    for name, entry, value in values(drive.plant):
+        field = record
+        for part in name.split('.'):
+            field = field[part]
+        if entry.lengths is not None:
+            assert isinstance(value, tuple)
+            assert tuple(field[:len(value)]) == value
+        else:
+            assert field == value
+    assert record['axis']['mode_inertias_count'] == 3
