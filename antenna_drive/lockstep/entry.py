@@ -1,0 +1,255 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+From a command line to a running node, and back to an exit code.
+
+This module imports neither ROS 2 nor numpy until it has to, so that Ctrl-C is answered from
+the first moment and a machine without ROS 2 is told so in one line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+import os
+import signal
+import sys
+from types import FrameType
+from typing import Any, TYPE_CHECKING
+
+from antenna_drive.errors import UserError
+
+if TYPE_CHECKING:
+    from antenna_drive.emulator.unit import Unit
+    from antenna_drive.parameters.schema import Value
+    from rclpy.node import Node
+
+OK, BAD_INPUT, NOT_INSTALLED = 0, 2, 3
+
+# The process that a node must not outlive, by number; set by whoever starts nodes for himself.
+PARENT = 'ANTENNA_DRIVE_PARENT'
+
+# Makes the unit of a node: its name, configuration files, what else was given by name.
+MakeUnit = Callable[[str, Sequence[str], Mapping[str, Any]], 'Unit']
+
+
+def run_drive_unit(default_name: str, names: Sequence[str], args: Sequence[str] | None = None,
+                   fed_by_topic: Sequence[str] = (), description: str = '') -> int:
+    """
+    Run one of the drive's units as a ROS 2 node until it is told to end.
+
+    Parameters
+    ----------
+    default_name : the node's name unless it is remapped with -r __node:=...
+    names : names of the units that this executable can be
+    args : command line without the program's name; None for the process's own
+    fed_by_topic : settings that follow a Float64 topic `<node>/<setting>`
+    description : what --help says first
+
+    Returns
+    -------
+    exit code: 0 ended as asked, 2 wrong input, 3 no ROS 2
+
+    """
+    def make(name: str, config: Sequence[str], given: Mapping[str, Any]) -> Unit:
+        from antenna_drive.emulator import units
+        from antenna_drive.parameters import load
+        import numpy as np
+        if name not in names:
+            raise UserError(f'{name}: no such unit, allowed for this node are {", ".join(names)}; '
+                            f'choose with --ros-args -r __node:={names[-1]}')
+        unit = units.build(name, load(*config), given)
+        # compile now, not in the first step
+        unit.start(1e-3)
+        unit.step(0, np.zeros((len(unit.inputs), 2)))
+        return unit
+
+    return _run(default_name, make, args, fed_by_topic, description)
+
+
+def run_unit(unit: Unit, args: Sequence[str] | None = None) -> int:
+    """
+    Run a unit of your own as a ROS 2 node that takes the place of one of the drive's.
+
+    Parameters
+    ----------
+    unit : its name is the name of the unit that it stands in for
+    args : command line without the program's name; None for the process's own
+
+    Returns
+    -------
+    exit code: 0 ended as asked, 2 wrong input, 3 no ROS 2
+
+    """
+    def make(name: str, config: Sequence[str], given: Mapping[str, Any]) -> Unit:
+        from antenna_drive.emulator.wiring import UNITS
+        from antenna_drive.parameters.schema import nearest, ParameterError
+        if name not in UNITS:
+            raise UserError(f'{name}: no such unit, allowed are {", ".join(UNITS)}')
+        unit.name = name
+        settings = unit.settings()
+        changes: dict[str, Value] = {}
+        for key, value in given.items():
+            if key not in settings:
+                raise ParameterError(f'{key}: no such parameter{nearest(key, tuple(settings))}')
+            changes[key] = settings[key][0].check(key, value)
+        unit.tune(changes)
+        return unit
+
+    return _run(unit.name, make, args, (), type(unit).__doc__ or '')
+
+
+def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None,
+         fed_by_topic: Sequence[str], description: str) -> int:
+    ending = _Ending()
+    _follow(os.environ.get(PARENT))
+    arguments = list(sys.argv[1:] if args is None else args)
+    program = default_name
+    try:
+        if '-h' in arguments or '--help' in arguments:
+            print(_help(program, description))
+            return OK
+        choose_transport(os.environ)
+        return _run_node(default_name, make, arguments, fed_by_topic, ending)
+    except UserError as error:
+        return _say(program, str(error), BAD_INPUT)
+    except ModuleNotFoundError as error:
+        from antenna_drive.cli import REMEDIES
+        missing = (error.name or '').partition('.')[0]
+        if missing not in REMEDIES:
+            raise
+        return _say(program, f'needs {missing}: {REMEDIES[missing]}', NOT_INSTALLED)
+
+
+class _Ending:
+    """Turns SIGINT and SIGTERM into an orderly end: at once while starting, else by `stop`."""
+
+    def __init__(self) -> None:
+        self._stop: Callable[[], None] | None = None
+        self.asked = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._answer)
+
+    def _answer(self, number: int, frame: FrameType | None) -> None:
+        if self.asked:
+            return
+        self.asked = True
+        if self._stop is None:
+            # An exception could come up inside a library's callback and be swallowed there.
+            os._exit(OK)
+        self._stop()
+
+    def by(self, stop: Callable[[], None]) -> None:
+        """From now on end by calling `stop`."""
+        self._stop = stop
+
+
+def _follow(parent: str | None) -> None:
+    """End when the parent does, where the kernel offers it (Linux)."""
+    if parent is None or not sys.platform.startswith('linux'):
+        return
+    import ctypes
+    pr_set_pdeathsig = 1  # linux/prctl.h
+    ctypes.CDLL(None).prctl(pr_set_pdeathsig, int(signal.SIGTERM))
+    try:
+        os.kill(int(parent), 0)
+    except ProcessLookupError:
+        os._exit(OK)  # it died before we could ask
+
+
+def _run_node(default_name: str, make: MakeUnit, arguments: list[str],
+              fed_by_topic: Sequence[str], ending: _Ending) -> int:
+    import rclpy
+    from rclpy.signals import SignalHandlerOptions
+    from rclpy.utilities import remove_ros_args
+
+    left = remove_ros_args([default_name, *arguments])[1:]
+    if left:
+        raise UserError(f'{left[0]}: no such option; ROS 2 arguments follow --ros-args, '
+                        'as in --ros-args -p config:=[old_circuit]')
+    try:
+        rclpy.init(args=[default_name, *arguments],
+                   signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:
+        raise UserError(_first_line(error)) from error
+    try:
+        node = _bare_node(default_name)
+        try:
+            return _spin(node, make, fed_by_topic, ending)
+        finally:
+            node.destroy_node()
+    finally:
+        rclpy.try_shutdown()
+
+
+def _bare_node(default_name: str) -> Node:
+    from rclpy.exceptions import InvalidParameterTypeException
+    from rclpy.node import Node
+    try:
+        return Node(default_name, automatically_declare_parameters_from_overrides=True)
+    except (RuntimeError, InvalidParameterTypeException) as error:
+        raise UserError(_first_line(error)) from error
+
+
+def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], ending: _Ending) -> int:
+    from antenna_drive.lockstep.node import DriveNode, OWN_PARAMETERS
+    from antenna_drive.lockstep.ros_parameters import Overrides
+
+    overrides = Overrides(node)
+    config = [name for name in overrides.names('config', ()) if name != 'reference']
+    given = {name: value for name, value in overrides.rest().items()
+             if name not in OWN_PARAMETERS}
+    unit = make(node.get_name(), config, given)
+    drive_node = DriveNode(node, unit, overrides, config, fed_by_topic)
+    ending.by(drive_node.stop)
+    if not ending.asked:
+        drive_node.spin()
+    return OK
+
+
+def choose_transport(environment: dict[str, str] | os._Environ[str]) -> None:
+    """
+    Keep to this machine, by UDP, unless the user has said otherwise.
+
+    Discovery: whoever wants other machines sets ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET, or any
+    other of ROS 2's own variables, and nothing is touched. Transport: for many small messages,
+    each of which somebody sleeps for, Fast DDS's shared memory costs more than the loopback
+    interface; see docs/lockstep.md.
+    """
+    if not any(name in environment for name in (
+            'ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_LOCALHOST_ONLY', 'ROS_STATIC_PEERS')):
+        environment['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    if not any(name in environment for name in (
+            'FASTDDS_BUILTIN_TRANSPORTS', 'FASTDDS_DEFAULT_PROFILES_FILE',
+            'FASTRTPS_DEFAULT_PROFILES_FILE')):
+        environment['FASTDDS_BUILTIN_TRANSPORTS'] = 'UDPv4'
+
+
+def _help(program: str, description: str) -> str:
+    return '\n'.join((
+        f'usage: {program} [--ros-args ROS_ARGUMENTS]', '', description.strip(), '',
+        'Useful ROS 2 arguments:',
+        "  -p config:=\"['old_circuit']\"   configuration files or sets, later over earlier",
+        '  --params-file FILE            parameters from a YAML file',
+        '  -r __ns:=/east                put the node into a namespace',
+        '  -r __node:=NAME               give it another name',
+        'While it runs: ros2 param list, describe, get and set.'))
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).strip() or type(error).__name__).splitlines()[0]
+
+
+def _say(program: str, message: str, status: int) -> int:
+    print(f'{program}: {" ".join(message.split())}', file=sys.stderr)
+    return status

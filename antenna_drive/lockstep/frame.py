@@ -1,0 +1,95 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The frame: what one node tells the others about one macro-step, and its bytes on the wire.
+
+A frame is a std_msgs/Float64MultiArray holding run, step, step_s, then value and time
+derivative of each output of the unit. Its layout names them, so that a frame can be read
+without this package. Nothing here needs ROS.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+import struct
+
+from antenna_drive.emulator.unit import FloatArray, Signal
+import numpy as np
+
+HEADER = ('run', 'step', 'step_s')
+
+# A frame with this run is a hello: "I am here and have no part in any run".
+NO_RUN = 0.0
+
+# Runs are microseconds of wall time; beyond this a double no longer tells them apart.
+LARGEST_RUN = 2.0 ** 52
+
+_CDR_LITTLE_ENDIAN = b'\x00\x01\x00\x00'
+
+
+class FrameLayout:
+    """The length, labels and bytes of one unit's frames."""
+
+    def __init__(self, signals: Sequence[Signal]) -> None:
+        """Lay out frames that carry `signals`; none for an observer, which only says its step."""
+        columns = [*HEADER]
+        for signal in signals:
+            columns.append(f'{signal.name} [{signal.unit}]')
+            columns.append(f'd/dt {signal.name} [{signal.rate_unit}]')
+        self.signals = tuple(signals)
+        self.length = len(columns)
+        self.label = ', '.join(columns)
+        self._prefix = _cdr_prefix(self.label, self.length)
+        self._data = struct.Struct(f'<{self.length}d')
+        self._header = struct.Struct('<3d')
+        self._size = len(self._prefix) + self._data.size
+
+    def encode(self, run: float, step: int, step_s: float, outputs: FloatArray) -> bytes:
+        """
+        Return the serialised message.
+
+        Parameters
+        ----------
+        run, step, step_s : the run's id, the macro-step, its length [s]
+        outputs : array of shape (number of signals, 2): value and time derivative
+
+        """
+        return self._prefix + self._header.pack(run, step, step_s) + outputs.tobytes()
+
+    def hello(self, birth: float) -> bytes:
+        """Return the serialised hello of a node born at `birth` [us of wall time]."""
+        return self.encode(NO_RUN, int(birth), 0.0, np.zeros((len(self.signals), 2)))
+
+    def decode(self, message: bytes) -> tuple[float, ...] | None:
+        """Return the numbers of a message of exactly this layout, None for any other message."""
+        if len(message) != self._size or not message.startswith(self._prefix):
+            return None
+        return self._data.unpack_from(message, len(self._prefix))
+
+
+def _cdr_prefix(label: str, length: int) -> bytes:
+    # Common Data Representation (OMG DDSI-RTPS 9.4, XCDR version 1): everything before the doubles
+    text = label.encode() + b'\0'
+    body = struct.pack('<II', 1, len(text)) + text
+    body += b'\0' * (-len(body) % 4)
+    body += struct.pack('<IIII', length, length, 0, length)
+    body += b'\0' * (-len(body) % 8)
+    return _CDR_LITTLE_ENDIAN + body
+
+
+def all_finite(numbers: Sequence[float]) -> bool:
+    """Return whether no number is NaN or infinite."""
+    # The sum is finite only if every term is; it may overflow though all terms are finite.
+    return math.isfinite(sum(numbers)) or all(map(math.isfinite, numbers))

@@ -1,0 +1,161 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Where a node keeps its peers' frames until it needs them, and refuses what it must not use.
+
+Frames may come in any order, twice, late or from somebody who should not send them: only
+run and step decide. Nothing here needs ROS, and nothing here reads a clock.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Mapping
+from enum import Enum
+import math
+
+from antenna_drive.lockstep.frame import all_finite, LARGEST_RUN, NO_RUN
+
+# A neighbour may be one step ahead and its neighbour two; four is the next power of two.
+DEPTH = 4
+
+# A peer that has heard of a new run sends its frame 0 before the conductor's may have come.
+EARLY_FRAMES = 16
+
+Frame = tuple[float, ...]
+
+
+class Refusal(str, Enum):
+    """Why a frame was not used."""
+
+    WRONG_LENGTH = 'wrong length'
+    NAN = 'NaN'
+    INFINITE = 'infinite'
+    NOT_A_STEP = 'step not a whole number'
+    WRONG_RUN = 'wrong run'
+    TOO_OLD = 'too old'
+    TOO_FAR_AHEAD = 'too far ahead'
+    DUPLICATE = 'duplicate'
+    CONTRADICTION = 'contradicts an earlier frame'
+
+
+class Inbox:
+    """
+    The frames of the run in progress, by peer and step.
+
+    Attributes
+    ----------
+    run, step : the run in progress (0.0: none) and the step whose frames are wanted next
+    refused : how many frames were refused, by (peer, reason)
+    hellos : births [us] of peers that said hello, in order of arrival; the owner empties it
+
+    """
+
+    def __init__(self, lengths: Mapping[str, int]) -> None:
+        """Take frames from the peers named in `lengths`, each with its number of doubles."""
+        self.run = NO_RUN
+        self.step = 0
+        self.refused: Counter[tuple[str, Refusal]] = Counter()
+        self.hellos: list[tuple[str, float]] = []
+        self.slots: dict[str, list[Frame | None]] = {peer: [None] * DEPTH for peer in lengths}
+        self._lengths = dict(lengths)
+        self._early: deque[tuple[str, Frame, int]] = deque()
+        self._past_runs: deque[float] = deque(maxlen=8)
+
+    def begin(self, run: float) -> None:
+        """Turn to a new run: forget the old one's frames and take in those that came early."""
+        self.forget(self.run)
+        self.run = run
+        self.step = 0
+        for slots in self.slots.values():
+            slots[:] = [None] * DEPTH
+        early, self._early = self._early, deque()
+        for peer, frame, _ in early:
+            self._file(peer, frame)
+
+    def forget(self, run: float) -> None:
+        """Let leftovers of a past run pass without counting them as refused."""
+        if run != NO_RUN and run not in self._past_runs:
+            self._past_runs.append(run)
+
+    def refuse(self, peer: str, reason: Refusal) -> None:
+        """Count a frame as refused."""
+        self.refused[peer, reason] += 1
+
+    def well_formed(self, peer: str, frame: Frame) -> bool:
+        """Check everything about a frame that needs no knowledge of the run; count a refusal."""
+        if len(frame) != self._lengths[peer]:
+            self.refuse(peer, Refusal.WRONG_LENGTH)
+        elif not all_finite(frame):
+            nan = any(map(math.isnan, frame))
+            self.refuse(peer, Refusal.NAN if nan else Refusal.INFINITE)
+        elif frame[1] < 0.0 or not frame[1].is_integer():
+            self.refuse(peer, Refusal.NOT_A_STEP)
+        elif not 0.0 <= frame[0] < LARGEST_RUN or not frame[0].is_integer():
+            self.refuse(peer, Refusal.WRONG_RUN)
+        else:
+            return True
+        return False
+
+    def offer(self, peer: str, frame: Frame) -> None:
+        """Take in a well-formed frame, or refuse it and count why."""
+        run = frame[0]
+        if run == self.run and run != NO_RUN:
+            self._file(peer, frame)
+        elif run == NO_RUN:
+            self.hellos.append((peer, frame[1]))
+        elif run > self.run:
+            self._early.append((peer, frame, self.step))
+            if len(self._early) > EARLY_FRAMES:
+                self.refuse(self._early.popleft()[0], Refusal.WRONG_RUN)
+        elif run not in self._past_runs:
+            self.refuse(peer, Refusal.WRONG_RUN)
+
+    def advance(self) -> None:
+        """Drop the frames of the current step and want the next."""
+        slot = self.step % DEPTH
+        for slots in self.slots.values():
+            slots[slot] = None
+        self.step += 1
+        # Nobody can announce a run and let this one go on: what came early and is still
+        # waiting so many steps later belongs to no run.
+        while self._early and self.step - self._early[0][2] > DEPTH:
+            self.refuse(self._early.popleft()[0], Refusal.WRONG_RUN)
+
+    def holds(self, peer: str) -> bool:
+        """Return whether the peer's frame of the current step is there."""
+        return self.slots[peer][self.step % DEPTH] is not None
+
+    def has_room(self, peer: str) -> bool:
+        """Return whether the next frame of a peer in good order would find a place."""
+        return self.slots[peer][(self.step + DEPTH - 1) % DEPTH] is None
+
+    def _file(self, peer: str, frame: Frame) -> None:
+        if frame[0] != self.run:
+            self.refuse(peer, Refusal.WRONG_RUN)
+            return
+        step = int(frame[1])
+        ahead = step - self.step
+        if ahead < 0:
+            self.refuse(peer, Refusal.TOO_OLD)
+        elif ahead >= DEPTH:
+            self.refuse(peer, Refusal.TOO_FAR_AHEAD)
+        else:
+            slots = self.slots[peer]
+            held = slots[step % DEPTH]
+            if held is None:
+                slots[step % DEPTH] = frame
+            else:
+                same = held == frame
+                self.refuse(peer, Refusal.DUPLICATE if same else Refusal.CONTRADICTION)

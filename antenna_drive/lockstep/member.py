@@ -1,0 +1,317 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The protocol of a unit that takes part in a run, and of the one that owns it: the conductor.
+
+Both are plain state machines: frames go in through `receive`, outputs to be published come
+out of `go_on`. Who carries the frames, and how fast, is somebody else's affair.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+from antenna_drive.emulator.unit import FloatArray, Signal, Unit
+from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
+from antenna_drive.lockstep.frame import all_finite, FrameLayout, HEADER, NO_RUN
+from antenna_drive.lockstep.inbox import DEPTH, Frame, Inbox, Refusal
+import numpy as np
+
+
+class Member:
+    """
+    A unit's part in the lock-step.
+
+    It starts afresh whenever the conductor announces a new run, puts out its frame 0, and goes
+    from step k to k + 1 when it holds step k of the conductor and of each of its inputs.
+
+    Attributes
+    ----------
+    run, step, step_s : the run (0.0: none yet), the step last put out, its length [s]
+    resting : True when the conductor has said that no run is in progress
+    fault : why the unit cannot go on in this run, '' if it can
+
+    """
+
+    def __init__(self, unit: Unit, birth: float,
+                 outputs: Mapping[str, Sequence[Signal]] = OUTPUTS,
+                 conductor: str = TEST_SIGNAL, others: Collection[str] = ()) -> None:
+        """
+        Prepare a unit for its first run.
+
+        Parameters
+        ----------
+        unit : the unit to be stepped
+        birth : when this node was started [us of wall time]; it joins younger runs only
+        outputs : signals of each unit of the drive, by unit
+        conductor : name of the unit that owns the run
+        others : peers to wait for at every step although the unit reads nothing from them
+
+        Raises
+        ------
+        ValueError : an input of the unit names no signal of the drive
+
+        """
+        self.unit = unit
+        self.birth = birth
+        self.conductor = conductor
+        self.layout = FrameLayout(unit.outputs)
+        columns = [_column(name, outputs) for name in unit.inputs]
+        peers = {peer: None for peer, _ in columns}
+        if unit.name != conductor:
+            peers[conductor] = None
+        peers.update(dict.fromkeys(others))
+        peers.pop(unit.name, None)
+        self.peers = tuple(peers)
+        self.layouts = {peer: FrameLayout(outputs.get(peer, ())) for peer in peers}
+        self.inbox = Inbox({peer: layout.length for peer, layout in self.layouts.items()})
+        self.step = 0
+        self.step_s = 0.0
+        self.resting = False
+        self.fault = ''
+        self._announced: Frame | None = None
+        self._inputs = np.zeros((len(columns), 2))
+        self._own_slots: list[Frame | None] = [None] * DEPTH
+        self._sources = [(self._own_slots if peer == unit.name else self.inbox.slots[peer], column)
+                         for peer, column in columns]
+
+    @property
+    def run(self) -> float:
+        """Return the id of the run in progress, 0.0 for none."""
+        return self.inbox.run
+
+    def receive(self, peer: str, frame: Frame) -> None:
+        """Take in a frame or refuse it."""
+        if not self.inbox.well_formed(peer, frame):
+            return
+        if peer == self.conductor:
+            self._receive_from_conductor(frame)
+        elif self.run == NO_RUN and frame[0] <= self.birth:
+            # what a peer's history holds of runs before our time
+            self.inbox.forget(frame[0])
+        else:
+            self.inbox.offer(peer, frame)
+            self.inbox.hellos.clear()
+
+    def _receive_from_conductor(self, frame: Frame) -> None:
+        run, step, step_s = frame[:3]
+        if run == NO_RUN:
+            self.resting = True
+        elif run == self.run:
+            self.resting = False
+            self.inbox.offer(self.conductor, frame)
+        elif run <= self.birth:
+            self.inbox.forget(run)
+        elif run > self.run and step == 0.0 and step_s > 0.0:
+            self._announced = frame
+        else:
+            self.inbox.refuse(self.conductor, Refusal.WRONG_RUN)
+
+    def wanted(self) -> tuple[str, ...]:
+        """Return the peers from whom a frame would be of use now."""
+        if self.run == NO_RUN or self.fault:
+            return (self.conductor,)
+        holds = self.inbox.holds
+        return tuple(peer for peer in self.peers if not holds(peer) or (
+            # a new run may be announced while somebody else is waited for
+            peer == self.conductor and self.inbox.has_room(peer)))
+
+    def missing(self) -> tuple[str, ...]:
+        """Return the peers without whom the next step cannot be made."""
+        if self.run == NO_RUN or self.fault:
+            return (self.conductor,)
+        holds = self.inbox.holds
+        return tuple(peer for peer in self.peers if not holds(peer))
+
+    def go_on(self) -> FloatArray | None:
+        """
+        Start the run that was announced or make the next step, if everything for it is there.
+
+        Returns
+        -------
+        array of shape (len(outputs), 2), to be published as step `step` of run `run`; None if
+        something is missing
+
+        """
+        if self._announced is not None:
+            frame, self._announced = self._announced, None
+            outputs = self._begin(frame[0], frame[2])
+            self.inbox.offer(self.conductor, frame)
+            return outputs
+        if self.run == NO_RUN or self.fault:
+            return None
+        slot = self.step % DEPTH
+        for slots in self.inbox.slots.values():
+            if slots[slot] is None:
+                return None
+        return self._advance(slot)
+
+    def _begin(self, run: float, step_s: float) -> FloatArray | None:
+        self.inbox.begin(run)
+        self.step = 0
+        self.step_s = step_s
+        self.resting = False
+        self.fault = ''
+        return self._checked(self.unit.start(step_s))
+
+    def _advance(self, slot: int) -> FloatArray | None:
+        inputs = self._inputs
+        for row, (slots, column) in enumerate(self._sources):
+            frame = slots[slot]
+            assert frame is not None
+            inputs[row, 0] = frame[column]
+            inputs[row, 1] = frame[column + 1]
+        outputs = self.unit.step(self.step, inputs)
+        self.inbox.advance()
+        self.step += 1
+        return self._checked(outputs)
+
+    def _checked(self, outputs: FloatArray) -> FloatArray | None:
+        # A unit's own bad output is refused where it arises: nobody else ever sees it.
+        outputs = np.asarray(outputs, dtype=np.float64)
+        shape = (len(self.unit.outputs), 2)
+        if outputs.shape != shape:
+            self.fault = f'outputs of shape {outputs.shape}, wanted {shape}'
+        else:
+            values = outputs.ravel().tolist()
+            if all_finite(values):
+                self._own_slots[self.step % DEPTH] = (
+                    self.run, float(self.step), self.step_s, *values)
+                return outputs
+            signal = self.unit.outputs[
+                int(np.argmin(np.isfinite(outputs).all(axis=1)))].name
+            self.fault = f'{signal} is NaN or infinite'
+        self.fault = f'{self.unit.name}: {self.fault} at step {self.step}'
+        return None
+
+
+class Conductor(Member):
+    """
+    The member that owns the run: its id, its macro-step, its beginning and its end.
+
+    It begins a run when it has heard from every other member, publishes step k + 1 only when
+    it holds step k of every one, and begins afresh when one of them says hello: that is a node
+    that was started again.
+    """
+
+    def __init__(self, unit: Unit, birth: float, step_s: float, last_step: int | None = None,
+                 outputs: Mapping[str, Sequence[Signal]] = OUTPUTS,
+                 observers: Collection[str] = ()) -> None:
+        """
+        Prepare to conduct every unit in `outputs` and the observers named.
+
+        Parameters
+        ----------
+        unit, birth, outputs : see Member
+        step_s : length of the macro-step [s]
+        last_step : the step at which a run ends; None for a run without end
+        observers : further members, which read the drive and put out nothing
+
+        """
+        members = [name for name in outputs if name != unit.name]
+        super().__init__(unit, birth, outputs, unit.name, (*members, *observers))
+        self.wanted_step_s = step_s
+        self.last_step = last_step
+        self.ended = False
+        self._heard: dict[str, float] = {}
+        self._begin_again = True
+
+    def receive(self, peer: str, frame: Frame) -> None:
+        """Take in a frame or refuse it; note who is there."""
+        if not self.inbox.well_formed(peer, frame):
+            return
+        if self.run == NO_RUN:
+            self._heard[peer] = max(self._heard.get(peer, 0.0), frame[0], self._birth_in(frame))
+            self.inbox.forget(frame[0])
+        elif frame[0] > self.run:
+            # nobody but the conductor makes runs
+            self.inbox.refuse(peer, Refusal.WRONG_RUN)
+        else:
+            self.inbox.offer(peer, frame)
+            for name, birth in self.inbox.hellos:
+                self._heard[name] = max(self._heard[name], birth)
+                self._begin_again = True
+            self.inbox.hellos.clear()
+
+    @staticmethod
+    def _birth_in(frame: Frame) -> float:
+        return frame[1] if frame[0] == NO_RUN else 0.0
+
+    def unheard(self) -> tuple[str, ...]:
+        """Return the members that have not been heard of yet."""
+        return tuple(peer for peer in self.peers if peer not in self._heard)
+
+    def wanted(self) -> tuple[str, ...]:
+        """Return the members from whom a frame would be of use now."""
+        if self.run == NO_RUN or self.ended:
+            return self.peers
+        return self.missing()
+
+    def missing(self) -> tuple[str, ...]:
+        """Return the members without whom the next step cannot be made."""
+        if self.run == NO_RUN:
+            return self.unheard()
+        holds = self.inbox.holds
+        return tuple(peer for peer in self.peers if not holds(peer))
+
+    def new_run(self, now: float) -> FloatArray | None:
+        """
+        Begin a run if one is due and everybody is there.
+
+        Parameters
+        ----------
+        now : wall time [us]; the run's id, unless somebody was born later by his own clock
+
+        Returns
+        -------
+        array of shape (len(outputs), 2), to be published as frame 0; None if no run is due
+
+        """
+        if not self._begin_again or self.unheard():
+            return None
+        self._begin_again = False
+        self.ended = False
+        run = max(float(int(now)), self.birth + 1.0, self.run + 1.0,
+                  *(heard + 1.0 for heard in self._heard.values()))
+        return self._begin(run, self.wanted_step_s)
+
+    def go_on(self) -> FloatArray | None:
+        """Make the next step if every member has made the last, and the run has not ended."""
+        if self.run == NO_RUN or self.fault or self.ended or self._begin_again:
+            return None
+        slot = self.step % DEPTH
+        for slots in self.inbox.slots.values():
+            if slots[slot] is None:
+                return None
+        if self.last_step is not None and self.step >= self.last_step:
+            self._wait_for_the_last(slot)
+            return None
+        return self._advance(slot)
+
+    def _wait_for_the_last(self, slot: int) -> None:
+        # Whoever holds the last step makes one more: by this we know that all have used it.
+        if self.step == self.last_step:
+            self.inbox.advance()
+            self.step += 1
+        else:
+            self.ended = True
+
+
+def _column(name: str, outputs: Mapping[str, Sequence[Signal]]) -> tuple[str, int]:
+    unit, _, signal = name.partition('/')
+    names = [known.name for known in outputs.get(unit, ())]
+    if signal not in names:
+        known_names = ', '.join(f'{key}/{item.name}' for key in outputs for item in outputs[key])
+        raise ValueError(f'{name}: no such signal, known are {known_names}')
+    return unit, len(HEADER) + 2 * names.index(signal)

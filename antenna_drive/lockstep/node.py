@@ -1,0 +1,267 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""One node: a member of the lock-step on ROS 2, its parameters, topics and reports."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+import json
+from threading import Thread
+import time
+from typing import Any
+
+from antenna_drive.emulator.unit import FloatArray, Unit
+from antenna_drive.emulator.wiring import TEST_SIGNAL
+from antenna_drive.lockstep import ros_parameters
+from antenna_drive.lockstep.member import Conductor, Member
+from antenna_drive.lockstep.pace import Pace
+from antenna_drive.lockstep.readings import ChangeRecord, READING_QOS, Readings
+from antenna_drive.lockstep.report import Report
+from antenna_drive.lockstep.ros_link import FrameLink
+from antenna_drive.parameters.schema import Entry, Value
+from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import Float64
+
+# No wait is longer than this [s]: signals and reports are served in between.
+_LONGEST_WAIT_S = 0.2
+
+_AMPERES = 'armature.physical_amperes_per_article_ampere'
+
+PUBLISH_RATE = Entry('Hz', 0.0, 1e4, 'readings per simulated second on each signal topic, 0: none',
+                     live=True)
+PACE = Entry('1', 0.0, 1e3, 'how many times faster than real time, 0: as fast as possible',
+             live=True)
+STEP = Entry('s', 1e-5, 0.1, 'macro-step')
+DURATION = Entry('s', 0.0, 1e9, 'simulated time after which the run ends, 0: never')
+
+# What a node itself may be told, beside the settings of its unit.
+OWN_PARAMETERS = ('config', 'publish_rate', 'run.step', 'run.pace', 'run.duration',
+                  'run.observers')
+
+
+class DriveNode:
+    """
+    A unit as a ROS 2 node.
+
+    The lock-step loop runs in the thread that calls `spin`; parameter services and whatever
+    else the node offers run in a second thread, which sleeps unless it is asked.
+    """
+
+    def __init__(self, node: Node, unit: Unit, overrides: ros_parameters.Overrides,
+                 config: Collection[str] = (), fed_by_topic: Collection[str] = ()) -> None:
+        """
+        Declare parameters and topics.
+
+        Parameters
+        ----------
+        node : a bare node of the unit's name
+        unit : the unit, with every override already in force
+        overrides : what the user gave at the start
+        config : the configuration files the unit was made from
+        fed_by_topic : live settings that follow a Float64 topic `<node>/<setting>` instead of
+            being parameters
+
+        Raises
+        ------
+        ParameterError : an override is not allowed, or no parameter has that name
+
+        """
+        self._node = node
+        self._unit = unit
+        self._fed_by_topic = tuple(fed_by_topic)
+        self.tuning = ros_parameters.Tuning(unit)
+        self._stop = False
+        birth = float(time.time_ns() // 1000)
+        settings: dict[str, tuple[Entry, Value]] = {
+            name: item for name, item in unit.settings().items() if name not in fed_by_topic}
+        own: dict[str, tuple[Entry, Value]] = {
+            'publish_rate': (PUBLISH_RATE, overrides.get('publish_rate', PUBLISH_RATE, 100.0))}
+        self._pace: Pace | None = None
+        self._member = self._make_member(birth, overrides, own)
+        overrides.check_all_known([*settings, *own])
+        ros_parameters.declare_names(node, 'config', [*config] or ['reference'],
+                                     'configuration files or sets of config/, later over earlier')
+        ros_parameters.declare(node, {**settings, **own})
+        self._own_entries = {name: entry for name, (entry, _) in own.items()}
+        self._link = FrameLink(node, self._member.layouts)
+        self.tuning.wake = self._link.wake
+        amperes = settings.get(_AMPERES)
+        self._readings = Readings(
+            node, unit.outputs, float(own['publish_rate'][1]), self._pace is not None,
+            float(amperes[1]) if amperes else None)
+        self._record = ChangeRecord(node)
+        self._report = Report(node, self._member, self._pace, self._link.publishers)
+        for setting in fed_by_topic:
+            self._follow(setting)
+        ros_parameters.accept_changes(
+            node, {name: entry for name, (entry, _) in {**settings, **own}.items()}, self._change)
+        self._every = 0
+        self._quiet = False
+        self._said_end = False
+
+    def _make_member(self, birth: float, overrides: ros_parameters.Overrides,
+                     own: dict[str, tuple[Entry, Value]]) -> Member:
+        if self._unit.name != TEST_SIGNAL:
+            return Member(self._unit, birth)
+        for name, entry, default in (('run.step', STEP, 1e-3), ('run.pace', PACE, 1.0),
+                                     ('run.duration', DURATION, 0.0)):
+            own[name] = (entry, overrides.get(name, entry, default))
+        observers = overrides.names('run.observers', ())
+        ros_parameters.declare_names(self._node, 'run.observers', observers,
+                                     'names of recorders that every step waits for')
+        step_s, pace, duration = (float(own[name][1])
+                                  for name in ('run.step', 'run.pace', 'run.duration'))
+        self._pace = Pace(pace)
+        return Conductor(self._unit, birth, step_s, round(duration / step_s) or None,
+                         observers=observers)
+
+    def _follow(self, setting: str) -> None:
+        def follow(message: Float64) -> None:
+            if self.tuning.request({setting: message.data}, wait=False):
+                self._report.refused_values += 1
+
+        self._node.create_subscription(
+            Float64, f'{self._node.get_name()}/{setting}', follow, READING_QOS)
+
+    def _change(self, changes: dict[str, Value]) -> str:
+        # in the thread of the parameter services
+        own = {name: value for name, value in changes.items() if name in self._own_entries}
+        for_unit = {name: value for name, value in changes.items() if name not in own}
+        reason = self.tuning.request(for_unit) if for_unit else ''
+        if reason:
+            return reason
+        if 'publish_rate' in own:
+            self._readings.rate_hz = float(own['publish_rate'])
+            self._every = self._readings.every(self._member.step_s or 1e-3)
+        if 'run.pace' in own and self._pace is not None:
+            self._pace.change(float(own['run.pace']), time.monotonic(), self._member.step)
+            self._link.wake()
+        return ''
+
+    def stop(self) -> None:
+        """End `spin` soon; may be called from a signal handler."""
+        self._stop = True
+
+    def spin(self) -> None:
+        """Take part in runs until `stop` is called."""
+        executor = SingleThreadedExecutor(context=self._node.context)
+        executor.add_node(self._node)
+        services = Thread(target=_serve, args=(executor,), daemon=True)
+        services.start()
+        try:
+            self._hello()
+            while not self._stop:
+                outputs = self._go_on()
+                if outputs is None:
+                    self._wait()
+                else:
+                    self._publish(outputs)
+        finally:
+            executor.shutdown(timeout_sec=0.5)
+            services.join(0.5)
+
+    def _hello(self) -> None:
+        self._link.publish(self._member.layout.hello(self._member.birth))
+
+    def _go_on(self) -> FloatArray | None:
+        if self.tuning.pending:
+            self._apply_changes()
+        member = self._member
+        if self._pace is None:
+            return member.go_on()
+        assert isinstance(member, Conductor)
+        if self._quiet:
+            outputs = member.new_run(time.time_ns() / 1e3)
+            if outputs is not None:
+                self._pace.begin(time.monotonic())
+                return outputs
+        if self._pace.factor > 0.0 and member.run:
+            now = time.monotonic()
+            if self._pace.remaining(member.step + 1, member.step_s, now) > 0.0:
+                return None
+            outputs = member.go_on()
+            if outputs is not None:
+                self._pace.note(member.step, member.step_s, now)
+            return outputs
+        return member.go_on()
+
+    def _apply_changes(self) -> None:
+        changes = self.tuning.apply()
+        if changes and self._member.run:
+            self._record.add(self._member.run, self._member.step, changes)
+            self._report.last_change = json.dumps(
+                {'run': int(self._member.run), 'step': self._member.step, 'changes': changes})
+
+    def _publish(self, outputs: FloatArray) -> None:
+        member = self._member
+        step = member.step
+        self._link.publish(member.layout.encode(member.run, step, member.step_s, outputs))
+        if step == 0:
+            self._begun()
+        if self._every and step % self._every == 0:
+            self._readings.publish(step, member.step_s, outputs)
+        self._quiet = False
+        self._report.stepped()
+        now = time.monotonic()
+        if now >= self._report.next_s:
+            self._report.publish(now)
+
+    def _begun(self) -> None:
+        member = self._member
+        self._said_end = False
+        self._every = self._readings.every(member.step_s)
+        self._record.begin(member.run, {
+            name: value for name, (_, value) in self._unit.settings().items()})
+        self._node.get_logger().info(
+            f'run {member.run:.0f} begins, macro-step {member.step_s:g} s')
+
+    def _wait(self) -> None:
+        member = self._member
+        link = self._link
+        # Most frames have come by now: taking them costs less than waiting for them.
+        taken = False
+        for peer in member.missing():
+            frame = link.take(peer)
+            if frame is not None:
+                member.receive(peer, frame)
+                taken = True
+        if taken:
+            self._quiet = False
+            return
+        now = time.monotonic()
+        timeout = _LONGEST_WAIT_S
+        if self._pace is not None and member.run and not member.missing():
+            timeout = min(timeout, self._pace.remaining(member.step + 1, member.step_s, now))
+        else:
+            self._report.waiting(now)
+        if isinstance(member, Conductor) and member.ended and not self._said_end:
+            self._said_end = True
+            self._hello()
+        ready = link.wait(member.wanted(), timeout)
+        for peer in ready:
+            frame = link.take(peer)
+            if frame is not None:
+                member.receive(peer, frame)
+        self._quiet = not ready
+        now = time.monotonic()
+        if now >= self._report.next_s:
+            self._report.publish(now)
+
+
+def _serve(executor: Any) -> None:
+    try:
+        executor.spin()
+    except (ExternalShutdownException, ShutdownException):
+        pass

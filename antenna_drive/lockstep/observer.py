@@ -1,0 +1,191 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Somebody who reads every signal of a running drive at every step, and loses none.
+
+An observer that test_signal was told of (run.observers) is a member of the lock-step: no step
+is made before it has seen the last, however fast the drive runs. Any other is a guest: it
+follows a run as long as it keeps within the second that the nodes remember.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+import json
+import os
+from threading import Thread
+import time
+from types import TracebackType
+from typing import Any
+
+from antenna_drive.emulator.unit import FloatArray, Signal, Unit
+from antenna_drive.emulator.wiring import OUTPUTS
+from antenna_drive.lockstep.entry import choose_transport
+from antenna_drive.lockstep.member import Member
+from antenna_drive.lockstep.readings import CHANGES_QOS
+from antenna_drive.lockstep.ros_link import FrameLink
+import numpy as np
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import String
+
+OnBegin = Callable[[int, float], None]
+OnStep = Callable[[int, float, FloatArray], None]
+OnChange = Callable[[str, Mapping[str, Any]], None]
+
+_LONGEST_WAIT_S = 0.1
+
+
+class _Reader(Unit):
+    """The unit behind an observer: it reads everything and puts out nothing."""
+
+    def __init__(self, name: str, inputs: tuple[str, ...], on_step: OnStep) -> None:
+        super().__init__(name)
+        self.inputs = inputs  # type: ignore[misc]
+        self._on_step = on_step
+        self._step_s = 0.0
+
+    def start(self, step_s: float) -> FloatArray:
+        self._step_s = step_s
+        return np.zeros((0, 2))
+
+    def step(self, k: int, inputs: FloatArray) -> FloatArray:
+        self._on_step(k, k * self._step_s, inputs)
+        return np.zeros((0, 2))
+
+
+class Observer:
+    """
+    Calls back for every complete step of a drive.
+
+    Use it as a context manager; `spin` does the work, in the thread that calls it.
+
+    Attributes
+    ----------
+    names : the signals, 'unit/signal', in the order of the rows given to `on_step`
+
+    """
+
+    def __init__(self, name: str, on_step: OnStep, *, on_begin: OnBegin | None = None,
+                 on_change: OnChange | None = None, namespace: str = '',
+                 domain_id: int | None = None, guest: bool = False,
+                 outputs: Mapping[str, Sequence[Signal]] = OUTPUTS) -> None:
+        """
+        Join a drive.
+
+        Parameters
+        ----------
+        name : name of the observer's node; a member is one that run.observers names
+        on_step : called as on_step(step, time [s], samples) with an array of shape
+            (len(names), 2), value and derivative, valid during the call only
+        on_begin : called as on_begin(run, macro-step [s]) when a run begins, also in the middle
+            of another: what came before belongs to a run that is over
+        on_change : called as on_change(unit, record) with what a node says on `<unit>/changes`,
+            see ChangeRecord; from another thread
+        namespace, domain_id : where the drive is; None for the domain in the environment
+        guest : True for an observer that nobody waits for
+        outputs : the signals of each unit
+
+        """
+        choose_transport(os.environ)
+        self.names = tuple(
+            f'{unit}/{signal.name}' for unit, signals in outputs.items() for signal in signals)
+        self._on_begin = on_begin
+        self._context = Context()
+        self._context.init(args=[], domain_id=domain_id)
+        self._node = Node(name, namespace=namespace, context=self._context)
+        birth = 0.0 if guest else float(time.time_ns() // 1000)
+        self._member = Member(_Reader(name, self.names, on_step), birth, outputs)
+        self._link = FrameLink(self._node, self._member.layouts)
+        self._executor: SingleThreadedExecutor | None = None
+        self._thread: Thread | None = None
+        if on_change is not None:
+            self._listen(outputs, on_change)
+        self._link.publish(self._member.layout.hello(birth))
+
+    def _listen(self, outputs: Mapping[str, Sequence[Signal]], on_change: OnChange) -> None:
+        for unit in outputs:
+            def pass_on(message: String, unit: str = unit) -> None:
+                on_change(unit, json.loads(message.data))
+
+            self._node.create_subscription(String, f'{unit}/changes', pass_on, CHANGES_QOS)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._thread = Thread(target=_serve, args=(self._executor,), daemon=True)
+        self._thread.start()
+
+    @property
+    def node(self) -> Node:
+        """Return the observer's node."""
+        return self._node
+
+    @property
+    def lost(self) -> str:
+        """Say which frame was lost, '' if none: a guest that was too slow cannot go on."""
+        for (peer, reason), count in self._member.inbox.refused.items():
+            if reason.value == 'too far ahead' and peer in self._member.missing():
+                return f'{count} frames of {peer} after step {self._member.step}'
+        return ''
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Return the units that are waited for."""
+        return self._member.missing()
+
+    @property
+    def resting(self) -> bool:
+        """Return whether the drive has said that its run is over."""
+        return self._member.resting
+
+    def spin(self, until: Callable[[], bool]) -> None:
+        """Follow the drive until `until()` is true; it is asked every 0.1 s and at each step."""
+        member, link = self._member, self._link
+        while not until():
+            outputs = member.go_on()
+            if outputs is not None:
+                if member.step == 0 and self._on_begin is not None:
+                    self._on_begin(int(member.run), member.step_s)
+                link.publish(member.layout.encode(
+                    member.run, member.step, member.step_s, outputs))
+                continue
+            for peer in link.wait(member.wanted(), _LONGEST_WAIT_S):
+                frame = link.take(peer)
+                if frame is not None:
+                    member.receive(peer, frame)
+
+    def close(self) -> None:
+        """Leave the drive."""
+        if self._executor is not None:
+            self._executor.shutdown(timeout_sec=0.5)
+        if self._thread is not None:
+            self._thread.join(0.5)
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def __enter__(self) -> Observer:
+        """Return the observer."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 traceback: TracebackType | None) -> None:
+        """Leave the drive."""
+        self.close()
+
+
+def _serve(executor: SingleThreadedExecutor) -> None:
+    try:
+        executor.spin()
+    except (ExternalShutdownException, ShutdownException):
+        pass

@@ -1,0 +1,60 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""When each step of a run is due: k times real time, or as soon as possible."""
+
+from __future__ import annotations
+
+
+class Pace:
+    """
+    The timetable of a run on a clock that the caller reads.
+
+    Step k is due at start + k * step_s / factor: nothing adds up, so nothing drifts. A step
+    that comes late is counted and made all the same; the next ones catch up.
+
+    Attributes
+    ----------
+    factor : how many times faster than real time; 0 for as fast as possible
+    late_steps : steps of this run that came more than one step's time after they were due
+
+    """
+
+    def __init__(self, factor: float) -> None:
+        """Set the pace."""
+        self.factor = factor
+        self.late_steps = 0
+        self._start = 0.0
+        self._first_step = 0
+
+    def begin(self, now: float) -> None:
+        """Start the timetable: step 0 is made at `now` [s]."""
+        self.change(self.factor, now, 0)
+        self.late_steps = 0
+
+    def change(self, factor: float, now: float, step: int) -> None:
+        """Go on at another pace from `step`, which is made at `now` [s]."""
+        self.factor = factor
+        self._start = now
+        self._first_step = step
+
+    def remaining(self, step: int, step_s: float, now: float) -> float:
+        """Return how long it is until `step` is due [s], zero or less if it is."""
+        if self.factor <= 0.0:
+            return 0.0
+        return self._start + (step - self._first_step) * step_s / self.factor - now
+
+    def note(self, step: int, step_s: float, now: float) -> None:
+        """Count `step`, made at `now`, if it is late."""
+        if self.factor > 0.0 and -self.remaining(step, step_s, now) > step_s / self.factor:
+            self.late_steps += 1

@@ -1,0 +1,178 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Start the drive's processes, watch over them, and end every one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from types import TracebackType
+from typing import IO
+
+from antenna_drive.emulator.wiring import MOTORS, PLANT, TEST_SIGNAL, TORQUE_SHARE, UNITS
+from antenna_drive.errors import UserError
+from antenna_drive.lockstep.entry import choose_transport, PARENT
+
+MODULES = {
+    TEST_SIGNAL: 'antenna_drive.nodes.test_signal',
+    **dict.fromkeys(MOTORS, 'antenna_drive.nodes.motor_drive'),
+    TORQUE_SHARE: 'antenna_drive.nodes.torque_share',
+    PLANT: 'antenna_drive.nodes.rate_loop_plant',
+}
+
+# Nodes end within two seconds of a signal; after this something is wrong with them.
+END_PATIENCE_S = 5.0
+
+Parameter = float | int | bool | str | Sequence[float] | Sequence[str]
+
+
+class DriveProcesses:
+    """
+    The five processes of a drive, as a context manager that leaves none behind.
+
+    Should this process die without a word, the kernel ends the nodes (on Linux).
+    """
+
+    def __init__(self, parameters: Mapping[str, Mapping[str, Parameter]] | None = None, *,
+                 config: Sequence[str] = (), namespace: str = '', domain_id: int | None = None,
+                 order: Sequence[str] = UNITS,
+                 commands: Mapping[str, Sequence[str]] | None = None,
+                 environment: Mapping[str, str] | None = None) -> None:
+        """
+        Say what to start; `start` or entering the context does it.
+
+        Parameters
+        ----------
+        parameters : what to set on each node, by unit and parameter name
+        config : configuration files or sets of config/ for every node
+        namespace : of every node, '/east'; '' for none
+        domain_id : the ROS 2 domain; None for the one in the environment
+        order : the units, in the order in which they are started
+        commands : commands to run in place of our own nodes, by unit
+        environment : variables to set beside those of this process
+
+        """
+        self.order = tuple(order)
+        self._parameters = {name: dict(values) for name, values in (parameters or {}).items()}
+        self._config = [str(item) for item in config]
+        self._namespace = namespace
+        self._commands = dict(commands or {})
+        self._environment = {**os.environ, **(environment or {}), PARENT: str(os.getpid())}
+        if domain_id is not None:
+            self._environment['ROS_DOMAIN_ID'] = str(domain_id)
+        choose_transport(self._environment)
+        self._processes: dict[str, subprocess.Popen[bytes]] = {}
+        self._logs: dict[str, IO[bytes]] = {}
+
+    def command(self, unit: str) -> list[str]:
+        """Return the command line of a unit's process."""
+        start = self._commands.get(unit, (sys.executable, '-m', MODULES.get(unit, '')))
+        arguments = [*start, '--ros-args', '-r', f'__node:={unit}']
+        if self._namespace:
+            arguments += ['-r', f'__ns:={self._namespace}']
+        parameters: dict[str, Parameter] = dict(self._parameters.get(unit, {}))
+        if self._config:
+            parameters.setdefault('config', self._config)
+        for name, value in parameters.items():
+            arguments += ['-p', f'{name}:={_yaml(value)}']
+        return arguments
+
+    def start(self, *units: str) -> None:
+        """Start the processes of `units`, of all in `order` if none is named."""
+        for unit in units or self.order:
+            log = self._logs.setdefault(unit, tempfile.TemporaryFile())
+            # A session of their own: Ctrl-C is for us, who then end the nodes in order.
+            self._processes[unit] = subprocess.Popen(
+                self.command(unit), env=self._environment, stdin=subprocess.DEVNULL,
+                stdout=log, stderr=log, start_new_session=True)
+
+    def process(self, unit: str) -> subprocess.Popen[bytes]:
+        """Return the process of a unit."""
+        return self._processes[unit]
+
+    def log(self, unit: str) -> str:
+        """Return what a unit's process has printed so far."""
+        log = self._logs[unit]
+        return os.pread(log.fileno(), os.fstat(log.fileno()).st_size, 0).decode(errors='replace')
+
+    def check(self) -> None:
+        """
+        Make sure that all processes run.
+
+        Raises
+        ------
+        UserError : one has ended by itself; the message is its last line
+
+        """
+        for unit, process in self._processes.items():
+            status = process.poll()
+            if status is not None:
+                lines = self.log(unit).strip().splitlines() or ['nothing said']
+                raise UserError(f'the process of {unit} has ended with status {status}: '
+                                f'{lines[-1]}')
+
+    def kill(self, unit: str) -> None:
+        """End a unit's process as a crash would: at once, without a word."""
+        self._processes[unit].kill()
+        self._processes[unit].wait()
+
+    def stop(self, number: signal.Signals = signal.SIGINT) -> dict[str, int]:
+        """
+        End all processes.
+
+        Returns
+        -------
+        exit code by unit; -9 if a process had to be killed
+
+        """
+        for process in self._processes.values():
+            if process.poll() is None:
+                process.send_signal(number)
+        deadline = time.monotonic() + END_PATIENCE_S
+        codes: dict[str, int] = {}
+        for unit, process in self._processes.items():
+            try:
+                codes[unit] = process.wait(max(0.0, deadline - time.monotonic()))
+            except subprocess.TimeoutExpired:
+                process.kill()
+                codes[unit] = process.wait()
+        return codes
+
+    def __enter__(self) -> DriveProcesses:
+        """Start all processes."""
+        self.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 traceback: TracebackType | None) -> None:
+        """End all processes."""
+        self.stop()
+        for log in self._logs.values():
+            log.close()
+
+
+def _yaml(value: Parameter) -> str:
+    # JSON is YAML, but for the exponent of a float: YAML 1.1 wants a point in the mantissa
+    if isinstance(value, (list, tuple)):
+        return '[' + ', '.join(_yaml(item) for item in value) + ']'
+    if isinstance(value, float):
+        text = repr(value)
+        return text if 'e' not in text or '.' in text else text.replace('e', '.0e')
+    return json.dumps(value)

@@ -1,0 +1,104 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The topics for people and plotters: one Float64 per signal at a decimated rate, and the clock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import json
+import struct
+
+from antenna_drive.emulator.unit import FloatArray, Signal
+from antenna_drive.parameters.schema import Value
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Float64, String
+
+READING_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+
+# Whoever comes late still gets the changes of the run in progress.
+CHANGES_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE,
+                         durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+_FLOAT64 = struct.Struct('<4sd')
+_CLOCK = struct.Struct('<4siI')
+_LITTLE_ENDIAN = b'\x00\x01\x00\x00'
+
+
+class Readings:
+    """Publish `<node>/<signal>` every so many steps, and `clock` if the node owns the time."""
+
+    def __init__(self, node: Node, signals: tuple[Signal, ...], rate_hz: float,
+                 with_clock: bool, amperes: float | None = None) -> None:
+        """
+        Advertise the topics.
+
+        Parameters
+        ----------
+        node, signals : the node and what its unit puts out
+        rate_hz : messages per simulated second and topic; 0 for none
+        with_clock : whether to publish `clock`
+        amperes : real amperes per article ampere, to publish `<node>/armature_current` [real A]
+            beside `<node>/current`; None for not
+
+        """
+        name = node.get_name()
+        self.rate_hz = rate_hz
+        self._rows = [(row, 1.0, node.create_publisher(
+            Float64, f'{name}/{signal.name}', READING_QOS)) for row, signal in enumerate(signals)]
+        names = [signal.name for signal in signals]
+        if amperes is not None and 'current' in names:
+            self._rows.append((names.index('current'), amperes, node.create_publisher(
+                Float64, f'{name}/armature_current', READING_QOS)))
+        self._clock = node.create_publisher(Clock, 'clock', READING_QOS) if with_clock else None
+
+    def every(self, step_s: float) -> int:
+        """Return after how many steps of `step_s` [s] the next readings are published."""
+        return max(1, round(1.0 / (self.rate_hz * step_s))) if self.rate_hz > 0.0 else 0
+
+    def publish(self, step: int, step_s: float, outputs: FloatArray) -> None:
+        """Publish the readings of a step."""
+        values = outputs[:, 0].tolist()
+        for row, scale, publisher in self._rows:
+            publisher.publish(_FLOAT64.pack(_LITTLE_ENDIAN, scale * values[row]))
+        if self._clock is not None:
+            seconds, nanoseconds = divmod(round(step * step_s * 1e9), 1_000_000_000)
+            self._clock.publish(_CLOCK.pack(_LITTLE_ENDIAN, seconds, nanoseconds))
+
+
+class ChangeRecord:
+    """
+    Publish `<node>/changes`: what took effect at which step of which run, as JSON.
+
+    A run begins with {"run", "step": 0, "settings": {...}}, every parameter in force; each live
+    change follows as {"run", "step", "changes": {...}}: in force from that step to the next.
+    """
+
+    def __init__(self, node: Node) -> None:
+        """Advertise the topic."""
+        self._publisher = node.create_publisher(
+            String, f'{node.get_name()}/changes', CHANGES_QOS)
+
+    def begin(self, run: float, settings: Mapping[str, Value]) -> None:
+        """Record what is in force as a run begins."""
+        self._publish(run, 0, 'settings', settings)
+
+    def add(self, run: float, step: int, changes: Mapping[str, Value]) -> None:
+        """Record changes that take effect at `step`."""
+        self._publish(run, step, 'changes', changes)
+
+    def _publish(self, run: float, step: int, key: str, values: Mapping[str, Value]) -> None:
+        text = json.dumps({'run': int(run), 'step': step, key: dict(values)})
+        self._publisher.publish(String(data=text))

@@ -1,0 +1,148 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a node says of itself: in /diagnostics once a second, in its log when it has to wait."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from antenna_drive.lockstep.member import Conductor, Member
+from antenna_drive.lockstep.pace import Pace
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+
+PERIOD_S = 1.0
+# A wait is told after this; with the period above that is within two seconds.
+PATIENCE_S = 0.9
+
+
+class Report:
+    """The state of one node, for people."""
+
+    def __init__(self, node: Node, member: Member, pace: Pace | None,
+                 publishers: Callable[[], dict[str, int]]) -> None:
+        """
+        Report on `member`.
+
+        Parameters
+        ----------
+        node : the node that publishes and logs
+        member, pace : what to report on; pace only for the conductor
+        publishers : returns how many publishers each peer's frame topic has
+
+        """
+        self._node = node
+        self._member = member
+        self._pace = pace
+        self._publishers = publishers
+        self._topic = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._refused_before = 0
+        self._late_before = 0
+        self._waiting_since: float | None = None
+        self._told = False
+        self._fault_told = ''
+        self.next_s = 0.0
+        self.last_change = ''
+        self.refused_values = 0
+
+    def stepped(self) -> None:
+        """Note that the node has gone on."""
+        if self._waiting_since is not None:
+            if self._told:
+                self._node.get_logger().info(
+                    f'going on at step {self._member.step} of run {self._member.run:.0f}')
+                self._told = False
+            self._waiting_since = None
+
+    def waiting(self, now: float) -> None:
+        """Note at `now` [s] that the node cannot go on; say so in the log if it lasts."""
+        if self._waiting_since is None:
+            self._waiting_since = now
+        fault = self._member.fault
+        if fault and fault != self._fault_told:
+            self._node.get_logger().error(f'{fault}; stopped until a new run begins')
+        self._fault_told = fault
+        if not self._told and not fault and self._waits_long(now):
+            self._node.get_logger().warning(f'{self._waits_for()}')
+            self._told = True
+
+    def _waits_long(self, now: float) -> bool:
+        return (self._waiting_since is not None and not self._at_rest()
+                and now - self._waiting_since >= PATIENCE_S)
+
+    def _at_rest(self) -> bool:
+        member = self._member
+        return member.ended if isinstance(member, Conductor) else member.resting
+
+    def _waits_for(self) -> str:
+        member = self._member
+        names = ', '.join(member.missing()) or 'nobody'
+        if member.run == 0.0:
+            return f'waiting for {names} to begin a run'
+        return f'waiting for {names} at step {member.step} of run {member.run:.0f}'
+
+    def publish(self, now: float) -> None:
+        """Publish the state at `now` [s]."""
+        self.next_s = now + PERIOD_S
+        level, message = self._judge(now)
+        status = DiagnosticStatus(
+            level=level, name=self._node.get_fully_qualified_name(), message=message,
+            hardware_id='antenna_drive')
+        status.values = [KeyValue(key=key, value=value) for key, value in self._values(now)]
+        array = DiagnosticArray(status=[status])
+        array.header.stamp = self._node.get_clock().now().to_msg()
+        self._topic.publish(array)
+
+    def _judge(self, now: float) -> tuple[bytes, str]:
+        member = self._member
+        refused = sum(member.inbox.refused.values())
+        late = self._pace.late_steps if self._pace else 0
+        doubled = [peer for peer, count in self._publishers().items() if count > 1]
+        try:
+            if member.fault:
+                return DiagnosticStatus.ERROR, member.fault
+            if refused > self._refused_before:
+                return (DiagnosticStatus.WARN,
+                        f'{refused - self._refused_before} frames refused')
+            if self._waits_long(now):
+                return DiagnosticStatus.WARN, self._waits_for()
+            if doubled:
+                return (DiagnosticStatus.WARN,
+                        f'more than one publisher of {", ".join(doubled)} frames')
+            if late > self._late_before:
+                return DiagnosticStatus.WARN, f'{late - self._late_before} steps late'
+            if self._at_rest():
+                return DiagnosticStatus.OK, 'no run in progress'
+            return DiagnosticStatus.OK, 'stepping' if member.run else 'waiting for a run to begin'
+        finally:
+            self._refused_before = refused
+            self._late_before = late
+
+    def _values(self, now: float) -> list[tuple[str, str]]:
+        member = self._member
+        values = [('run', f'{member.run:.0f}'), ('step', str(member.step)),
+                  ('macro-step [s]', repr(member.step_s))]
+        if self._waits_long(now) and self._waiting_since is not None:
+            values.append(('waiting for', ', '.join(member.missing())))
+            values.append(('waiting since [s]', f'{now - self._waiting_since:.1f}'))
+        refused = member.inbox.refused
+        values.append(('refused frames', str(sum(refused.values()))))
+        values += [(f'refused: {peer}, {reason.value}', str(count))
+                   for (peer, reason), count in sorted(refused.items())]
+        values.append(('refused values', str(self.refused_values)))
+        if self._pace is not None:
+            values.append(('pace', repr(self._pace.factor)))
+            values.append(('late steps', str(self._pace.late_steps)))
+        values.append(('last change', self.last_change))
+        return values

@@ -1,0 +1,128 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+How frames travel over ROS 2: the only file that goes below rclpy's public interface.
+
+An executor builds a wait set, a task and a message object for every frame, several times the
+cost of a step. Here one wait set lives as long as the node, frames are taken as bytes, and
+nobody but the lock-step thread ever touches them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from antenna_drive.lockstep.frame import FrameLayout
+from rclpy.callback_groups import CallbackGroup
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from std_msgs.msg import Float64MultiArray
+
+# One second of frames at 1 kHz. Transient local: whoever matches late still gets frame 0.
+FRAME_QOS = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=1000,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+
+
+class _NotForExecutors(CallbackGroup):
+    """The group of the subscriptions that no executor may serve."""
+
+    def can_execute(self, entity: Any) -> bool:
+        return False
+
+    def beginning_execution(self, entity: Any) -> bool:
+        return False
+
+    def ending_execution(self, entity: Any) -> None:
+        pass
+
+
+class FrameLink:
+    """A node's frames out, its peers' frames in, and the wait in between."""
+
+    def __init__(self, node: Node, layouts: Mapping[str, FrameLayout]) -> None:
+        """Publish `<node>/frame` and subscribe to `<peer>/frame` of each peer in `layouts`."""
+        self._layouts = dict(layouts)
+        self._publisher = node.create_publisher(
+            Float64MultiArray, f'{node.get_name()}/frame', FRAME_QOS)
+        self._group = _NotForExecutors()
+        self._subscriptions = {
+            peer: node.create_subscription(
+                Float64MultiArray, f'{peer}/frame', _never_called, FRAME_QOS,
+                callback_group=self._group, raw=True)
+            for peer in self._layouts}
+        self._handles = {peer: item.handle for peer, item in self._subscriptions.items()}
+        self._guard = node.create_guard_condition(_nothing, callback_group=self._group)
+        self._guard_handle = self._guard.handle
+        context = node.context.handle
+        assert context is not None
+        self._wait_set = _rclpy.WaitSet(len(self._handles), 1, 0, 0, 0, 0, context)
+        self.publish = self._publisher.handle.publish_raw
+
+    def take(self, peer: str) -> tuple[float, ...] | None:
+        """
+        Take the oldest frame of a peer that has not been taken.
+
+        Returns
+        -------
+        its numbers, none at all if the message cannot be read; None if there is no message
+
+        """
+        taken = self._handles[peer].take_message(Float64MultiArray, True)
+        if taken is None:
+            return None
+        message: bytes = taken[0]  # type: ignore[assignment]
+        frame = self._layouts[peer].decode(message)
+        return _read(message) if frame is None else frame
+
+    def wait(self, peers: Sequence[str], timeout_s: float) -> list[str]:
+        """Sleep until a frame comes, `wake` is called or time is up; return whose have come."""
+        wait_set = self._wait_set
+        wait_set.clear_entities()
+        for peer in peers:
+            wait_set.add_subscription(self._handles[peer])
+        wait_set.add_guard_condition(self._guard_handle)
+        wait_set.wait(max(0, int(timeout_s * 1e9)))
+        return [peer for index, peer in enumerate(peers)
+                if wait_set.is_ready('subscription', index)]
+
+    def wake(self) -> None:
+        """End a wait, from any thread."""
+        self._guard.trigger()
+
+    def publishers(self) -> dict[str, int]:
+        """Return how many publishers each peer's frame topic has."""
+        return {peer: item.get_publisher_count() for peer, item in self._subscriptions.items()}
+
+
+def _read(message: bytes) -> tuple[float, ...]:
+    # Somebody else's layout or byte order, or no Float64MultiArray at all.
+    try:
+        return tuple(deserialize_message(message, Float64MultiArray).data)
+    except RuntimeError:
+        return ()
+
+
+def _never_called(message: Any) -> None:
+    raise AssertionError('frames are taken by the lock-step thread alone')
+
+
+def _nothing() -> None:
+    pass

@@ -1,0 +1,251 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+A unit's settings as ROS 2 parameters: described, checked, and changed at a step.
+
+The parameter services run in a thread of their own. They check a set of changes as a whole,
+hand it to the lock-step thread and answer when it is in force, so that what `ros2 param get`
+says is what the unit uses.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+import math
+from threading import Event
+from typing import Any
+
+from antenna_drive.emulator.unit import Unit
+from antenna_drive.parameters.schema import Entry, nearest, ParameterError, Value
+from rcl_interfaces.msg import (
+    FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult,
+)
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+# What rclpy declares by itself.
+_RCLPY_OWN = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
+
+# How long a service call waits for the lock-step thread; a step takes a thousandth of this.
+_PATIENCE_S = 5.0
+
+Settings = Mapping[str, tuple[Entry, Value]]
+
+
+class _Request:
+    """Changes on their way to the lock-step thread."""
+
+    def __init__(self, changes: dict[str, Value]) -> None:
+        self.changes = changes
+        self.done = Event()
+        self.refusal = ''
+
+
+class Tuning:
+    """The live changes of one unit, from any thread to the lock-step thread."""
+
+    def __init__(self, unit: Unit) -> None:
+        """Take changes for `unit`."""
+        self._unit = unit
+        self._queue: deque[_Request] = deque()
+        self.wake: Callable[[], None] = _nothing
+        self.refused = 0
+
+    @property
+    def pending(self) -> bool:
+        """Return whether changes wait to be applied."""
+        return bool(self._queue)
+
+    def request(self, changes: dict[str, Value], wait: bool = True) -> str:
+        """
+        Ask for changes from a thread other than the lock-step thread.
+
+        Returns
+        -------
+        why all of them are refused, or '' if they are in force (with wait) or will be
+
+        """
+        try:
+            self._unit.check(changes)
+        except ParameterError as error:
+            self.refused += 1
+            return str(error)
+        request = _Request(changes)
+        self._queue.append(request)
+        self.wake()
+        if wait and not request.done.wait(_PATIENCE_S):
+            return 'the lock-step thread does not answer'
+        return request.refusal
+
+    def apply(self) -> dict[str, Value]:
+        """Apply what was asked for; called by the lock-step thread between two steps."""
+        applied: dict[str, Value] = {}
+        while self._queue:
+            request = self._queue.popleft()
+            try:
+                self._unit.tune(request.changes)
+                applied.update(request.changes)
+            except ParameterError as error:
+                request.refusal = str(error)
+            request.done.set()
+        return applied
+
+
+class Overrides:
+    """
+    What the user said of parameters at the start, with -p or --params-file.
+
+    Each is asked for by name; what nobody asked for is misspelt or belongs elsewhere.
+    """
+
+    def __init__(self, node: Node) -> None:
+        """Read the overrides of a node made with automatically_declare_parameters_from_..."""
+        self._values: dict[str, Any] = {}
+        for name, parameter in node.get_parameters_by_prefix('').items():
+            if not name.startswith(_RCLPY_OWN):
+                self._values[name] = _plain(parameter.value)
+                node.undeclare_parameter(name)
+        self._asked: set[str] = set()
+
+    def get(self, name: str, entry: Entry, default: Value) -> Value:
+        """
+        Return the value given for a parameter, or its default.
+
+        Raises
+        ------
+        ParameterError : the value given is not allowed
+
+        """
+        self._asked.add(name)
+        if name not in self._values:
+            return default
+        return entry.check(name, self._values[name])
+
+    def names(self, name: str, default: Sequence[str]) -> list[str]:
+        """
+        Return a list of texts.
+
+        Raises
+        ------
+        ParameterError : something else was given
+
+        """
+        self._asked.add(name)
+        given = self._values.get(name, list(default))
+        texts = [given] if isinstance(given, str) else given
+        if not isinstance(texts, list) or not all(isinstance(text, str) for text in texts):
+            raise ParameterError(f'{name}: {given!r} given, allowed is a list of texts')
+        return [text for text in texts if text]
+
+    def rest(self) -> dict[str, Any]:
+        """Return what has not been asked for."""
+        return {key: value for key, value in self._values.items() if key not in self._asked}
+
+    def check_all_known(self, known: Sequence[str]) -> None:
+        """
+        Refuse what no parameter has asked for.
+
+        Raises
+        ------
+        ParameterError : a name is unknown
+
+        """
+        for name in self.rest():
+            if name not in known:
+                raise ParameterError(f'{name}: no such parameter{nearest(name, tuple(known))}')
+
+
+def declare(node: Node, settings: Settings) -> None:
+    """Declare every setting with its unit, range and meaning; constants as read-only."""
+    for name, (entry, value) in settings.items():
+        node.declare_parameter(name, _ros_value(value), describe(entry), ignore_override=True)
+
+
+def declare_names(node: Node, name: str, value: Sequence[str], description: str) -> None:
+    """Declare a read-only list of texts."""
+    descriptor = ParameterDescriptor(description=description, read_only=True)
+    node.declare_parameter(name, list(value) or [''], descriptor, ignore_override=True)
+
+
+def describe(entry: Entry) -> ParameterDescriptor:
+    """Return the descriptor of a parameter: what `ros2 param describe` shows."""
+    unit = f' [{entry.unit}]' if entry.unit not in ('', '1') else ''
+    descriptor = ParameterDescriptor(
+        description=f'{entry.description}{unit}', read_only=not entry.live,
+        additional_constraints=entry.allowed())
+    bounded = math.isfinite(entry.low) and math.isfinite(entry.high)
+    if entry.choices is None and entry.lengths is None and bounded:
+        if entry.whole:
+            descriptor.integer_range = [
+                IntegerRange(from_value=int(entry.low), to_value=int(entry.high), step=1)]
+        else:
+            descriptor.floating_point_range = [
+                FloatingPointRange(from_value=entry.low, to_value=entry.high, step=0.0)]
+    return descriptor
+
+
+def accept_changes(node: Node, entries: Mapping[str, Entry],
+                   change: Callable[[dict[str, Value]], str]) -> None:
+    """
+    Let parameters be set while the node runs.
+
+    Parameters
+    ----------
+    node : the node on which they are declared
+    entries : what may be said of each parameter
+    change : puts a set of changes in force and returns '', or refuses all and returns why
+
+    """
+    def as_floats(parameters: list[Parameter[Any]]) -> list[Parameter[Any]]:
+        # `ros2 param set ... 1` sends a whole number where 1.0 is meant
+        return [Parameter(item.name, value=_with_floats(_plain(item.value), entries[item.name]))
+                if item.name in entries else item for item in parameters]
+
+    def check_and_change(parameters: list[Parameter[Any]]) -> SetParametersResult:
+        changes = {item.name: _plain(item.value) for item in parameters if item.name in entries}
+        if not changes:
+            return SetParametersResult(successful=True)
+        try:
+            changes = {name: entries[name].check(name, value) for name, value in changes.items()}
+            reason = change(changes)
+        except ParameterError as error:
+            reason = str(error)
+        return SetParametersResult(successful=not reason, reason=reason)
+
+    if hasattr(node, 'add_pre_set_parameters_callback'):
+        node.add_pre_set_parameters_callback(as_floats)
+    node.add_on_set_parameters_callback(check_and_change)
+
+
+def _with_floats(value: Any, entry: Entry) -> Any:
+    if entry.choices is not None or entry.whole:
+        return value
+    if isinstance(value, list):
+        return [_with_floats(item, entry) for item in value]
+    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+def _plain(value: Any) -> Any:
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    return list(value)
+
+
+def _ros_value(value: Value) -> Any:
+    return list(value) if isinstance(value, tuple) else value
+
+
+def _nothing() -> None:
+    pass

@@ -1,0 +1,30 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The rate-loop plant of Fig. 4 (hub, flexible modes, axis friction, encoder) as a ROS 2 node."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import sys
+
+from antenna_drive.lockstep.entry import run_drive_unit
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node; return its exit code."""
+    return run_drive_unit('plant', ('plant',), args, description=__doc__)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,35 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The test signals, and the owner of the run: its macro-step, pace and end, as a ROS 2 node.
+
+With waveform:=external the command follows the Float64 topic test_signal/external [rad/s].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import sys
+
+from antenna_drive.lockstep.entry import run_drive_unit
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node; return its exit code."""
+    return run_drive_unit('test_signal', ('test_signal',), args, fed_by_topic=('external',),
+                          description=__doc__)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
