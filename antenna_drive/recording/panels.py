@@ -122,8 +122,7 @@ def real_amperes(recording: Recording) -> float | None:
     """Return how many real amperes one article ampere is, None if the recording tells nothing."""
     for motor in ('motor_1', 'motor_2'):
         try:
-            ratio = recording.configuration[motor]['armature'][
-                'physical_amperes_per_article_ampere']
+            ratio = recording.configuration[motor]['armature.physical_amperes_per_article_ampere']
         except (KeyError, TypeError):
             continue
         if isinstance(ratio, float):

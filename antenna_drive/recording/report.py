@@ -164,7 +164,7 @@ def _motor_rows(motor: str, own: MotorStatistics, recording: Recording,
                 kappa: float | None) -> Iterable[tuple[str, str, str]]:
     peak = own.current_peak_A
     real = f', {peak * kappa:.4g} real A' if peak is not None and kappa else ''
-    limit = _lookup(recording.configuration, motor, 'motor', 'current_limit')
+    limit = _lookup(recording.configuration, motor, 'motor.current_limit')
     limited = f'; limit {limit:g} article A' if isinstance(limit, float) else ''
     at = '' if own.current_peak_s is None else f'at {own.current_peak_s:g} s{real}{limited}'
     yield 'current peak', _number(peak, 'article&nbsp;A'), at

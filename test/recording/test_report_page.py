@@ -41,8 +41,9 @@ def some_recording(samples: int = 4000) -> Recording:
                for i, name in enumerate(n for panel in PANELS for n in panel.names)}
     return Recording.from_arrays(
         time, {**signals, 'wind/speed': 7.5 + 0.1 * np.cos(time)},
-        configuration={'motor_1': {'motor': {'current_limit': 5.049}, 'armature': {
-            'physical_amperes_per_article_ampere': 6.0}}, HOSTILE: HOSTILE},
+        configuration={'motor_1': {
+            'motor.current_limit': 5.049, 'armature.physical_amperes_per_article_ampere': 6.0},
+            HOSTILE: HOSTILE},
         changes=(Change(1200, 'torque_share', {'bias_pot': 0.892}),) * 2,
         sheet=parse_sheet({'circuit': 'new', 'elevation_deg': 45.0}), notes={'who': HOSTILE})
 

@@ -1,0 +1,82 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Drive the emulator with a recorded command, and write its recording beside the real one.
+
+The twin takes its parameters from --config if given, else from the recording itself (with its
+live changes), else from the reference set as the recording's test sheet changes it. Prints, for
+each signal of both, the root mean square of their difference and its share of the real signal's
+own.
+
+  antenna-drive replay field_bag                       writes field_bag_twin
+  antenna-drive replay field.csv --config new_circuit my_antenna.yaml --out twin
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from antenna_drive.cli.output import add_json_option, write_json
+from antenna_drive.cli.reading import add_recording_options, read
+from antenna_drive.recording.atomic import refuse_existing
+from antenna_drive.recording.mcap_format import write_bag
+from antenna_drive.recording.replay import distances, twin
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command understands."""
+    add_recording_options(parser)
+    parser.add_argument('--config', nargs='+', default=(), metavar='FILE',
+                        help='configuration files or names of sets in config/, later over earlier')
+    parser.add_argument('--out', type=Path, metavar='BAG',
+                        help='the folder to write, not there yet; RECORDING_twin if not given')
+    parser.add_argument('--step', type=_step, metavar='S',
+                        help="macro-step [s]; the recording's own if it tells, else 0.001")
+    parser.add_argument('--every', type=_whole, default=1, metavar='N',
+                        help='write every N-th macro-step only')
+    add_json_option(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compute and write the twin."""
+    source = Path(args.recording).resolve()
+    out = args.out or source.with_name(f'{source.stem}_twin')
+    refuse_existing(out)
+    real = read(args)
+    made = twin(real, args.config, args.step, args.every)
+    write_bag(made, out)
+    found = distances(real, made)
+    if args.json:
+        write_json({'twin': out, 'signals': found}, args.json)
+    if args.json != '-':
+        for name, distance in found.items():
+            share = f'{100.0 * distance["share"]:.3g} %' if distance['spread'] else '-'
+            print(f'{name:<40} {distance["rms"]:.4g} {real[name].unit}  {share}')
+        print(out)
+    return 0
+
+
+def _step(text: str) -> float:
+    value = float(text)
+    if not 1e-5 <= value <= 0.1:
+        raise argparse.ArgumentTypeError(f'{text} given, allowed is 1e-5 to 0.1 s')
+    return value
+
+
+def _whole(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f'{text} given, allowed is a whole number from 1')
+    return value
