@@ -58,8 +58,10 @@ COMMANDS = {
                             'processes'),
     'lockstep-check': Command('lockstep_check', 'compare five processes with one, sample by '
                                                 'sample'),
+    'compile': Command('compile_', 'compile the physics ahead of the first run'),
     'run': Command('run', 'run the drive in one process and write its signals'),
     'article': Command('article', "repeat the article's experiments and compare the figures"),
+    'accuracy': Command('accuracy', 'measure how far a macro-step is from the converged run'),
     'calibrate': Command('calibrate', 'fit parameters to the published figures'),
     'record': Command('record', 'record a run of the five nodes'),
     'export': Command('export', 'turn a recording into CSV'),

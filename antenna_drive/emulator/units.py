@@ -227,6 +227,22 @@ _UNITS: dict[str, type[Any]] = {
 }
 
 
+def home(parameter: str) -> tuple[str, str]:
+    """
+    Return the unit that a parameter of `Drive` belongs to, and its name there.
+
+    'torque_share.torque_share.bias_pot' is the setting bias_pot of the unit torque_share.
+
+    Raises
+    ------
+    KeyError : there is no such unit
+
+    """
+    name, _, rest = parameter.partition('.')
+    own = _UNITS[name]._own
+    return name, rest.removeprefix(f'{own}.') if own else rest
+
+
 def build(name: str, drive: Drive, overrides: Mapping[str, Value] | None = None) -> Unit:
     """
     Build one of the drive's units.

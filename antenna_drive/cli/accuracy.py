@@ -1,0 +1,79 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Measure how far the lock-step at a macro-step is from the converged reference.
+
+For each macro-step: the rms distance of the worst signal of each of the article's experiments,
+as a share of that signal's rms, and the gain k' of Filter 1 at which the torque bias becomes
+unstable, which a delay in the exchange between the units would lower (145.4 when converged).
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from antenna_drive.cli.output import add_json_option, Progress, write_json
+
+_DEFAULT_STEPS = (5e-4, 1e-3, 2e-3, 4e-3)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    parser.add_argument('--step', type=float, action='append', metavar='S',
+                        help='macro-step [s], a whole part of 4 ms; may be repeated '
+                             '(default: 0.5, 1, 2 and 4 ms)')
+    add_json_option(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure and print the table."""
+    from antenna_drive.article.accuracy import distances, stability_limit
+    from antenna_drive.article.experiments import experiments
+    from antenna_drive.errors import UserError
+
+    steps = args.step or list(_DEFAULT_STEPS)
+    for step_s in steps:
+        parts = 4e-3 / step_s if step_s > 0.0 else 0.0
+        if parts < 0.5 or abs(parts - round(parts)) > 1e-6:
+            raise UserError(f'--step {step_s:g}: allowed is a whole part of 0.004 s')
+    names = list(experiments())
+    table: list[dict[str, Any]] = []
+    with Progress('accuracy', len(steps) * len(names)) as progress:
+        for number, step_s in enumerate(steps):
+            found = []
+            for place, name in enumerate(names):
+                found += distances(step_s, [name])
+                progress.update(number * len(names) + place + 1)
+            table.append({
+                'step_s': step_s, 'stability_limit': stability_limit(step_s),
+                'worst': {name: max(((item.share, item.signal) for item in found
+                                     if item.experiment == name)) for name in names},
+                'distances': [{'experiment': item.experiment, 'signal': item.signal,
+                               'rms_share': item.share} for item in found]})
+    if args.json:
+        write_json({'reference_step_s': _reference_step(), 'steps': table}, args.json)
+        return 0
+    print('worst signal, rms distance in percent of its rms; limit of k\' [1/s]')
+    print(f'{"step [ms]":>9}  ' + '  '.join(f'{name:>6}' for name in names) + '   limit')
+    for row in table:
+        print(f'{1e3 * row["step_s"]:9.2f}  '
+              + '  '.join(f'{100 * row["worst"][name][0]:6.3f}' for name in names)
+              + f'  {row["stability_limit"]:6.1f}')
+    return 0
+
+
+def _reference_step() -> float:
+    from antenna_drive.emulator.run import FINE_STEP
+    return FINE_STEP
