@@ -86,8 +86,8 @@ class DriveNode:
         birth = float(time.time_ns() // 1000)
         settings: dict[str, tuple[Entry, Value]] = {
             name: item for name, item in unit.settings().items() if name not in fed_by_topic}
-        own: dict[str, tuple[Entry, Value]] = {
-            'publish_rate': (PUBLISH_RATE, overrides.get('publish_rate', PUBLISH_RATE, 100.0))}
+        rate_hz = overrides.number('publish_rate', PUBLISH_RATE, 100.0)
+        own: dict[str, tuple[Entry, Value]] = {'publish_rate': (PUBLISH_RATE, rate_hz)}
         self._pace: Pace | None = None
         self._member = self._make_member(birth, overrides, own)
         overrides.check_all_known([*settings, *own])
@@ -97,10 +97,8 @@ class DriveNode:
         self._own_entries = {name: entry for name, (entry, _) in own.items()}
         self._link = FrameLink(node, self._member.layouts)
         self.tuning.wake = self._link.wake
-        amperes = settings.get(_AMPERES)
-        self._readings = Readings(
-            node, unit.outputs, float(own['publish_rate'][1]), self._pace is not None,
-            float(amperes[1]) if amperes else None)
+        self._readings = Readings(node, unit.outputs, rate_hz, self._pace is not None,
+                                  _number(settings.get(_AMPERES)))
         self._record = ChangeRecord(node)
         self._report = Report(node, self._member, self._pace, self._link.publishers)
         for setting in fed_by_topic:
@@ -115,14 +113,15 @@ class DriveNode:
                      own: dict[str, tuple[Entry, Value]]) -> Member:
         if self._unit.name != TEST_SIGNAL:
             return Member(self._unit, birth)
-        for name, entry, default in (('run.step', STEP, 1e-3), ('run.pace', PACE, 1.0),
-                                     ('run.duration', DURATION, 0.0)):
-            own[name] = (entry, overrides.get(name, entry, default))
+        step_s = overrides.number('run.step', STEP, 1e-3)
+        pace = overrides.number('run.pace', PACE, 1.0)
+        duration = overrides.number('run.duration', DURATION, 0.0)
+        own['run.step'] = (STEP, step_s)
+        own['run.pace'] = (PACE, pace)
+        own['run.duration'] = (DURATION, duration)
         observers = overrides.names('run.observers', ())
         ros_parameters.declare_names(self._node, 'run.observers', observers,
                                      'names of recorders that every step waits for')
-        step_s, pace, duration = (float(own[name][1])
-                                  for name in ('run.step', 'run.pace', 'run.duration'))
         self._pace = Pace(pace)
         return Conductor(self._unit, birth, step_s, round(duration / step_s) or None,
                          observers=observers)
@@ -143,10 +142,11 @@ class DriveNode:
         if reason:
             return reason
         if 'publish_rate' in own:
-            self._readings.rate_hz = float(own['publish_rate'])
+            self._readings.rate_hz = _as_float(own['publish_rate'])
             self._every = self._readings.every(self._member.step_s or 1e-3)
         if 'run.pace' in own and self._pace is not None:
-            self._pace.change(float(own['run.pace']), time.monotonic(), self._member.step)
+            self._pace.change(_as_float(own['run.pace']), time.monotonic(),
+                              self._member.step)
             self._link.wake()
         return ''
 
@@ -258,6 +258,15 @@ class DriveNode:
         now = time.monotonic()
         if now >= self._report.next_s:
             self._report.publish(now)
+
+
+def _as_float(value: Value) -> float:
+    assert isinstance(value, (int, float))
+    return value
+
+
+def _number(setting: tuple[Entry, Value] | None) -> float | None:
+    return None if setting is None else _as_float(setting[1])
 
 
 def _serve(executor: Any) -> None:

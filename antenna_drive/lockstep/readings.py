@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The topics for people and plotters: one Float64 per signal at a decimated rate, and the clock."""
+"""What people and plotters read: one topic per signal at a decimated rate, clock, changes."""
 
 from __future__ import annotations
 

@@ -133,6 +133,12 @@ class Overrides:
             return default
         return entry.check(name, self._values[name])
 
+    def number(self, name: str, entry: Entry, default: float) -> float:
+        """Return the number given for a parameter, or its default; raise as `get` does."""
+        value = self.get(name, entry, default)
+        assert isinstance(value, (int, float))
+        return value
+
     def names(self, name: str, default: Sequence[str]) -> list[str]:
         """
         Return a list of texts.

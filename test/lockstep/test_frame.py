@@ -1,0 +1,76 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The frame's bytes, against rclpy's own serialisation where rclpy is."""
+
+from __future__ import annotations
+
+from antenna_drive.emulator.unit import Signal
+from antenna_drive.lockstep.frame import all_finite, FrameLayout
+from hypothesis import given, settings, strategies as st
+import numpy as np
+import pytest
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+names = st.text(st.characters(codec='ascii', categories=('L', 'N')), min_size=1, max_size=12)
+
+
+@st.composite
+def layouts(draw: st.DrawFn) -> FrameLayout:
+    return FrameLayout([Signal(name, 'rad/s', '') for name in draw(st.lists(names, max_size=6))])
+
+
+@given(layouts(), st.integers(1, 2**51), st.integers(0, 2**40), st.data())
+def test_what_is_encoded_is_decoded_to_the_same_bits(
+        layout: FrameLayout, run: int, step: int, data: st.DataObject) -> None:
+    count = len(layout.signals)
+    numbers = data.draw(st.lists(finite, min_size=2 * count, max_size=2 * count))
+    outputs = np.array(numbers, dtype=float).reshape(count, 2)
+    frame = layout.decode(layout.encode(float(run), step, 1e-3, outputs))
+    assert frame is not None
+    assert frame[:3] == (run, step, 1e-3)
+    assert np.array(frame[3:]).tobytes() == outputs.tobytes()
+
+
+@given(layouts(), st.data())
+def test_a_message_of_another_length_is_not_decoded(
+        layout: FrameLayout, data: st.DataObject) -> None:
+    message = layout.hello(5.0)
+    cut = data.draw(st.integers(0, len(message) - 1))
+    assert layout.decode(message[:cut]) is None
+    assert layout.decode(message + b'\0' * (cut + 1)) is None
+
+
+@settings(deadline=None)
+@given(layouts(), st.integers(1, 2**51))
+def test_rclpy_reads_our_bytes(layout: FrameLayout, run: int) -> None:
+    serialization = pytest.importorskip('rclpy.serialization', reason='rclpy is not installed')
+    messages = pytest.importorskip('std_msgs.msg', reason='std_msgs is not installed')
+    outputs = np.arange(2.0 * len(layout.signals)).reshape(-1, 2)
+    message = serialization.deserialize_message(
+        layout.encode(float(run), 7, 1e-3, outputs), messages.Float64MultiArray)
+    assert list(message.data) == [run, 7.0, 1e-3, *outputs.ravel()]
+    [dimension] = message.layout.dim
+    assert dimension.size == dimension.stride == layout.length
+    assert len(dimension.label.split(', ')) == layout.length
+
+
+def test_the_labels_name_every_number_with_its_unit() -> None:
+    layout = FrameLayout([Signal('axis_rate', 'rad/s', ''), Signal('current', 'A', '')])
+    assert layout.label == ('run, step, step_s, axis_rate [rad/s], d/dt axis_rate [rad/s^2], '
+                            'current [A], d/dt current [A/s]')
+
+
+@given(st.lists(st.floats(), max_size=8))
+def test_finite_means_every_number(numbers: list[float]) -> None:
+    assert all_finite(numbers) == bool(np.isfinite(np.array(numbers)).all())

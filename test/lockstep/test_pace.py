@@ -1,0 +1,54 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The timetable on a clock that the test holds."""
+
+from __future__ import annotations
+
+from antenna_drive.lockstep.pace import Pace
+import pytest
+
+
+def test_steps_are_due_at_the_pace_asked_for_without_drift() -> None:
+    pace = Pace(2.0)
+    pace.begin(100.0)
+    assert pace.remaining(1_000_000, 1e-3, 100.0) == pytest.approx(500.0, abs=1e-9)
+    assert pace.remaining(1_000_000, 1e-3, 600.0) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_as_fast_as_possible_is_always_due() -> None:
+    pace = Pace(0.0)
+    pace.begin(5.0)
+    assert pace.remaining(10, 1e-3, 5.0) == 0.0
+    pace.note(10, 1e-3, 1e9)
+    assert pace.late_steps == 0
+
+
+def test_late_steps_are_counted_and_the_timetable_stays() -> None:
+    pace = Pace(1.0)
+    pace.begin(0.0)
+    pace.note(1, 1e-3, 0.001)
+    pace.note(2, 1e-3, 0.0029)
+    assert pace.late_steps == 0
+    pace.note(3, 1e-3, 0.0041)
+    assert pace.late_steps == 1
+    assert pace.remaining(4, 1e-3, 0.0) == pytest.approx(0.004)
+    pace.begin(7.0)
+    assert pace.late_steps == 0
+
+
+def test_a_new_pace_goes_on_from_where_the_run_is() -> None:
+    pace = Pace(1.0)
+    pace.begin(0.0)
+    pace.change(4.0, now=10.0, step=5000)
+    assert pace.remaining(5004, 1e-3, 10.0) == pytest.approx(0.001)

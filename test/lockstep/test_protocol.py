@@ -1,0 +1,320 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The protocol without ROS: five members and a network that delivers as it pleases.
+
+Whatever the network does (any order between peers, delay, foreign frames), a run must be the
+same as the plain loop that the test writes out itself.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+import math
+
+from antenna_drive.emulator.unit import FloatArray, Signal, Unit
+from antenna_drive.lockstep.inbox import DEPTH, Inbox, Refusal
+from antenna_drive.lockstep.member import Conductor, Member
+from hypothesis import given, settings, strategies as st
+import numpy as np
+import pytest
+
+UNITS = ('test_signal', 'motor_1', 'motor_2', 'torque_share', 'plant')
+OUTPUTS = {name: (Signal('a', 'rad', ''), Signal('b', 'V', '')) for name in UNITS}
+# who reads whom: chains, rings, both motors, itself
+INPUTS = {
+    'test_signal': (),
+    'motor_1': ('test_signal/a', 'plant/b', 'torque_share/a'),
+    'motor_2': ('plant/b', 'test_signal/b'),
+    'torque_share': ('motor_1/a', 'motor_2/b'),
+    'plant': ('motor_1/b', 'motor_2/a', 'plant/a'),
+}
+
+
+class Chaotic(Unit):
+    """A unit whose every bit depends on every input it ever had."""
+
+    outputs = OUTPUTS['plant']
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.inputs = INPUTS[name]  # type: ignore[misc]
+
+    def start(self, step_s: float) -> FloatArray:
+        self.x = np.full((2, 2), 0.1 + 0.1 * UNITS.index(self.name))
+        self.step_s = step_s
+        return self.x.copy()
+
+    def step(self, k: int, inputs: FloatArray) -> FloatArray:
+        drive = float(inputs.sum()) + k * self.step_s
+        self.x = 3.7 * self.x * (1.0 - self.x) * 0.9 + 1e-3 * math.sin(drive)
+        return self.x.copy()
+
+
+def expected(steps: int, step_s: float) -> dict[str, list[FloatArray]]:
+    """Run the units in one plain loop: the law that the protocol has to keep."""
+    units = {name: Chaotic(name) for name in UNITS}
+    history = {name: [unit.start(step_s)] for name, unit in units.items()}
+    for k in range(steps):
+        now = {f'{name}/{signal.name}': history[name][k][row]
+               for name in UNITS for row, signal in enumerate(OUTPUTS[name])}
+        for name, unit in units.items():
+            inputs = np.array([now[source] for source in unit.inputs]).reshape(-1, 2)
+            history[name].append(unit.step(k, inputs))
+    return history
+
+
+class Network:
+    """Members and the frames between them; `choose` decides what happens next."""
+
+    def __init__(self, step_s: float = 1e-3, last_step: int | None = None) -> None:
+        self.members: dict[str, Member] = {}
+        self.queues: dict[tuple[str, str], deque[tuple[float, ...]]] = {}
+        self.sent: dict[tuple[str, float], list[FloatArray]] = {}
+        self.clock = 1000.0
+        self.step_s = step_s
+        self.last_step = last_step
+
+    def start(self, name: str) -> None:
+        """Start a node, or start it again after it was killed."""
+        self.clock += 1.0
+        unit = Chaotic(name)
+        if name == 'test_signal':
+            self.members[name] = Conductor(unit, self.clock, self.step_s, self.last_step, OUTPUTS)
+        else:
+            self.members[name] = Member(unit, self.clock, OUTPUTS)
+        for other in UNITS:
+            self.queues[other, name] = deque()
+            # a new reader gets what a living writer remembers: here, its last frames
+            self.queues[name, other] = self.queues.get((name, other), deque())
+        self.publish(name, (0.0, self.clock, 0.0, 0.0, 0.0, 0.0, 0.0))
+
+    def publish(self, name: str, frame: tuple[float, ...]) -> None:
+        for other in UNITS:
+            if other in self.members and other != name:
+                self.queues[name, other].append(frame)
+
+    def hello_to_late(self) -> None:
+        """Let everybody hear everybody's hello, as transient-local topics do."""
+        for name, member in self.members.items():
+            for other in self.members:
+                if other != name:
+                    self.queues[name, other].append((0.0, member.birth, *[0.0] * 5))
+
+    def deliver(self, source: str, target: str) -> None:
+        queue = self.queues.get((source, target))
+        member = self.members.get(target)
+        if queue and member is not None and source in member.peers and (
+                source in member.wanted()):
+            member.receive(source, queue.popleft())
+
+    def act(self, name: str) -> None:
+        member = self.members.get(name)
+        if member is None:
+            return
+        outputs = None
+        if isinstance(member, Conductor):
+            self.clock += 1.0
+            outputs = member.new_run(self.clock)
+        if outputs is None:
+            outputs = member.go_on()
+        if outputs is not None:
+            self.sent.setdefault((name, member.run), []).append(outputs.copy())
+            assert len(self.sent[name, member.run]) == member.step + 1
+            self.publish(name, (member.run, float(member.step), member.step_s,
+                                *outputs.ravel().tolist()))
+
+    def settle(self, rounds: int) -> None:
+        """Deliver and act in a fair order until `rounds` are over."""
+        for _ in range(rounds):
+            for target in UNITS:
+                for source in UNITS:
+                    self.deliver(source, target)
+                self.act(target)
+
+    def run_of(self, name: str) -> list[FloatArray]:
+        return self.sent[name, self.members[name].run]
+
+
+moves = st.lists(st.tuples(st.sampled_from(UNITS), st.sampled_from(UNITS), st.booleans()),
+                 max_size=300)
+
+
+def shake(network: Network, choices: Sequence[tuple[str, str, bool]]) -> None:
+    for source, target, act in choices:
+        if act:
+            network.act(target)
+        else:
+            network.deliver(source, target)
+
+
+def assert_as_expected(network: Network, at_least: int) -> None:
+    for name in UNITS:
+        frames = network.run_of(name)
+        assert len(frames) > at_least
+        law = expected(len(frames) - 1, network.step_s)[name]
+        assert all(got.tobytes() == want.tobytes() for got, want in zip(frames, law))
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.permutations(UNITS), moves)
+def test_any_order_of_start_and_delivery_gives_the_same_bits(
+        order: list[str], choices: list[tuple[str, str, bool]]) -> None:
+    network = Network()
+    for name in order:
+        network.start(name)
+    network.hello_to_late()
+    shake(network, choices)
+    network.settle(80)
+    assert_as_expected(network, at_least=10)
+    for member in network.members.values():
+        assert not set(member.inbox.refused) - {
+            (peer, Refusal.DUPLICATE) for peer in UNITS}
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.sampled_from(UNITS), moves, moves)
+def test_a_node_started_again_lets_everybody_start_afresh(
+        victim: str, before: list[tuple[str, str, bool]],
+        after: list[tuple[str, str, bool]]) -> None:
+    network = Network()
+    for name in UNITS:
+        network.start(name)
+    network.hello_to_late()
+    network.settle(40)
+    shake(network, before)
+    first_run = network.members['plant'].run
+    for key in [key for key in network.queues if key[0] == victim]:
+        network.queues[key].clear()  # what the dead had not sent yet
+    network.start(victim)
+    if victim == 'test_signal':
+        network.hello_to_late()
+    shake(network, after)
+    network.settle(80)
+    runs = {member.run for member in network.members.values()}
+    assert len(runs) == 1
+    assert runs.pop() > first_run
+    assert_as_expected(network, at_least=10)
+
+
+foreign = st.tuples(
+    st.one_of(st.sampled_from([math.nan, math.inf, -1.0, 3.0, 0.5, 1e300]),
+              st.integers(1, 2000).map(float)),
+    st.one_of(st.sampled_from([math.nan, -1.0, 0.5, 1e18]), st.integers(0, 60).map(float)),
+    st.floats())
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.lists(st.tuples(st.sampled_from(UNITS[1:]), st.sampled_from(UNITS),
+                          foreign, st.sampled_from([0, 3, 7, 8])), max_size=40))
+def test_foreign_frames_change_nothing_and_are_counted(
+        attacks: list[tuple[str, str, tuple[float, ...], int]]) -> None:
+    network = Network()
+    for name in UNITS:
+        network.start(name)
+    network.hello_to_late()
+    network.settle(10)
+    run = network.members['plant'].run
+    counted = 0
+    for source, target, head, length in attacks:
+        member = network.members[target]
+        frame = (*head, *[0.25] * 4)[:length] if length <= 7 else (*head, *[0.25] * 5)
+        if len(frame) == 7 and frame[0] == run and float(frame[1]).is_integer():
+            continue  # a frame that looks right in everything cannot be told from a right one
+        if source in member.peers:
+            member.receive(source, frame)
+            counted += 1
+        network.settle(1)
+    network.settle(40)
+    assert {member.run for member in network.members.values()} == {run}
+    assert_as_expected(network, at_least=10)
+    refused = sum(sum(member.inbox.refused.values()) for member in network.members.values())
+    assert refused >= counted
+
+
+def test_the_run_ends_when_everybody_has_used_the_last_step() -> None:
+    network = Network(last_step=12)
+    for name in UNITS:
+        network.start(name)
+    network.hello_to_late()
+    network.settle(60)
+    conductor = network.members['test_signal']
+    assert isinstance(conductor, Conductor)
+    assert conductor.ended
+    assert len(network.run_of('test_signal')) == 13
+    assert all(len(network.run_of(name)) == 14 for name in UNITS[1:])
+
+
+def test_nobody_runs_more_than_two_steps_ahead() -> None:
+    network = Network()
+    for name in UNITS:
+        network.start(name)
+    network.hello_to_late()
+    network.settle(30)
+    slow = network.members.pop('plant')  # it answers no more
+    network.settle(30)
+    assert {member.step - slow.step for member in network.members.values()} <= {0, 1, 2}
+
+
+def test_a_unit_that_puts_out_nan_stops_and_says_so() -> None:
+    class Broken(Chaotic):
+        def step(self, k: int, inputs: FloatArray) -> FloatArray:
+            outputs = super().step(k, inputs)
+            if k == 3:
+                outputs[1, 0] = math.nan
+            return outputs
+
+    network = Network()
+    for name in UNITS:
+        network.start(name)
+    network.members['plant'].unit = Broken('plant')
+    network.hello_to_late()
+    network.settle(40)
+    assert network.members['plant'].fault == 'plant: b is NaN or infinite at step 4'
+    assert len(network.run_of('plant')) == 4
+    assert network.members['test_signal'].missing() == ('plant',)
+
+
+@pytest.mark.parametrize('frame, reason', [
+    ((9.0, 0.0, 1e-3, 1.0), Refusal.WRONG_LENGTH),
+    ((9.0, 0.0, 1e-3, math.nan, 1.0), Refusal.NAN),
+    ((9.0, 0.0, 1e-3, -math.inf, 1.0), Refusal.INFINITE),
+    ((9.0, 0.5, 1e-3, 0.0, 1.0), Refusal.NOT_A_STEP),
+    ((8.0, 0.0, 1e-3, 0.0, 1.0), Refusal.WRONG_RUN),
+    ((2.0**53, 0.0, 1e-3, 0.0, 1.0), Refusal.WRONG_RUN),
+    ((9.0, 1.0, 1e-3, 0.0, 1.0), Refusal.TOO_OLD),
+    ((9.0, 2.0 + DEPTH, 1e-3, 0.0, 1.0), Refusal.TOO_FAR_AHEAD),
+    ((9.0, 2.0, 1e-3, 0.0, 2.0), Refusal.CONTRADICTION),
+    ((9.0, 2.0, 1e-3, 0.0, 1.0), Refusal.DUPLICATE),
+])
+def test_each_refusal_has_its_name(frame: tuple[float, ...], reason: Refusal) -> None:
+    inbox = Inbox({'plant': 5})
+    inbox.begin(9.0)
+    inbox.advance()
+    inbox.advance()
+    good = (9.0, 2.0, 1e-3, 0.0, 1.0)
+    assert inbox.well_formed('plant', good)
+    inbox.offer('plant', good)
+    if inbox.well_formed('plant', frame):
+        inbox.offer('plant', frame)
+    assert inbox.refused == {('plant', reason): 1}
+    assert inbox.slots['plant'][2] == good
+
+
+def test_an_input_that_nobody_puts_out_is_named() -> None:
+    unit = Chaotic('plant')
+    unit.inputs = ('motor_1/c',)  # type: ignore[misc]
+    with pytest.raises(ValueError, match='motor_1/c: no such signal'):
+        Member(unit, 0.0, OUTPUTS)
