@@ -20,7 +20,7 @@ that was not diagnosed yet is left out and counted as pending.
 
 docs/trial.md defines every figure. Exit code 1: there is no verdict to score.
 
-examples:
+For example:
   antenna-drive score trial7
   antenna-drive score trial7 --json score.json --picture score.png
 """

@@ -29,7 +29,7 @@ check later that no truth was changed. With --diagnose each case is diagnosed as
 verdict written to DIR/case_0001/verdict.json; `antenna-drive score DIR` then tells how good the
 verdicts are. Interrupted, the same command goes on where it stopped.
 
-example:
+For example:
   antenna-drive trial --cases 200 --seed 7 --out trial7 --diagnose && antenna-drive score trial7
 """
 

@@ -85,7 +85,7 @@ def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float =
                        (second, float(own.uniform(low, 1.0)))]
         truths.append({
             'case': case_name(number), 'kind': str(kind),
-            'effects': [{'id': effect.id, 'size': size, 'parameters': effect.draw(size, own)}
+            'effects': [{'id': effect.key, 'size': size, 'parameters': effect.draw(size, own)}
                         for effect, size in effects],
             'tolerance': tolerance, 'seed': [seed, number],
             'sample_rate_hz': sample_rate, 'duration_s': duration,
@@ -114,12 +114,12 @@ def _even_sizes(count: int, random: np.random.Generator) -> list[float]:
 
 def _compatible(first: Effect, second: Effect) -> bool:
     """Tell whether two effects are two: neither the same nor one inside the other."""
-    place_1, name_1 = first.id.split('.')
-    place_2, name_2 = second.id.split('.')
+    place_1, name_1 = first.key.split('.')
+    place_2, name_2 = second.key.split('.')
     if 'motors' in (place_1, place_2) and place_1.startswith('motor') and (
             place_2.startswith('motor')):
         return name_1 != name_2
-    return first.id != second.id
+    return first.key != second.key
 
 
 def build_machine(truth: Truth, recording: int) -> Machine:

@@ -178,14 +178,14 @@ def main() -> None:
     print('| effect | range of the size | beyond tolerances: smallest, middle, largest |')
     print('|---|---|---|')
     for effect in (*CATALOGUE.values(), *OUTSIDE.values()):
-        if arguments.only not in effect.id:
+        if arguments.only not in effect.key:
             continue
         size = effect.quantities[0]
         cells = []
         for part in (0.0, 0.5, 1.0):
             values = effect.draw(part, np.random.default_rng(3))
-            cells.append(f'{study.of(effect.id, values)[1]:.0f}')
-        print(f'| {effect.id} | {size.name} {size.low:g} to {size.high:g} {size.unit} '
+            cells.append(f'{study.of(effect.key, values)[1]:.0f}')
+        print(f'| {effect.key} | {size.name} {size.low:g} to {size.high:g} {size.unit} '
               f'| {", ".join(cells)} |', flush=True)
 
 

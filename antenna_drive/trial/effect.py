@@ -81,14 +81,14 @@ class Effect:
 
     Attributes
     ----------
-    id : 'component.effect', as the diagnosis names it
+    key : 'component.effect', as the diagnosis names it
     form : the form in this program, for people
     quantities : the first one is the effect's size, the others are drawn evenly
     change : sets the imperfection in a machine
 
     """
 
-    id: str
+    key: str
     form: str
     quantities: tuple[Quantity, ...]
     change: Callable[[Machine, Parameters], None]

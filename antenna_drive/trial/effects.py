@@ -102,7 +102,7 @@ _MOTOR_EFFECTS: tuple[
      _motor_field('input_offset', 'voltage')),
     ('amplifier_dead_zone', 'smooth crossover: v - d tanh(v / d) of the current demand',
      (Quantity('half_width', 'A', 0.03, 0.6),), _motor_field('dead_zone', 'half_width')),
-    ('current_limit', 'hard limit times a factor', (Quantity('factor', '1', 0.93, 0.35),),
+    ('current_limit', 'hard limit times a factor', (Quantity('factor', '1', 0.9, 0.35),),
      _motor_factor('current_limit')),
 )
 
@@ -321,7 +321,7 @@ _LOOP = (
            (Quantity('delay', 's', 8e-4, 1.2e-2),), _motor_field('delay', 'delay')(slice(0, 2))),
 )
 
-CATALOGUE: dict[str, Effect] = {effect.id: effect for effect in (
+CATALOGUE: dict[str, Effect] = {effect.key: effect for effect in (
     *(Effect(f'{motor}.{name}', form, quantities, change(which))
       for motor, which in MOTORS.items() for name, form, quantities, change in _MOTOR_EFFECTS),
     *_gearbox_effects('gearbox_1', 0), *_gearbox_effects('gearbox_2', 1),

@@ -82,7 +82,7 @@ def _warm_motor(machine: Machine, values: Parameters) -> None:
     machine.motors['warming_time'][which] = values['time']
 
 
-OUTSIDE: dict[str, Effect] = {effect.id: effect for effect in (
+OUTSIDE: dict[str, Effect] = {effect.key: effect for effect in (
     Effect('outside.damaged_tooth', 'one raised tooth on a slower shaft of a gearbox',
            (Quantity('height', 'rad', 0.04, 0.3), MOTOR,
             Quantity('ratio', 'rev/rev', 2.2, 6.3), PHASE),
@@ -109,7 +109,7 @@ OUTSIDE: dict[str, Effect] = {effect.id: effect for effect in (
            _structure_values(dahl_travel='travel', dahl='share')),
     Effect('outside.supply_sag', 'supply voltage falls with the current of both motors, '
            'as V / (1 + sag (|i_1| + |i_2|) / V)',
-           (Quantity('sag', 'V/A', 12.0, 40.0),), _structure_values(supply_sag='sag')),
+           (Quantity('sag', 'V/A', 60.0, 250.0),), _structure_values(supply_sag='sag')),
     Effect('outside.structural_friction', 'dry friction in the joints of the first mode',
            (Quantity('torque', 'N m', 4e3, 8e4), Quantity('rate', 'rad/s', 2e-5, 1e-4)),
            _structure_values(mode_friction='torque', mode_friction_rate='rate')),
@@ -129,6 +129,6 @@ OUTSIDE: dict[str, Effect] = {effect.id: effect for effect in (
     Effect('outside.mains_hum', '50 Hz on a tachometer, inside the loop',
            (Quantity('amplitude', 'rad/s', 0.02, 0.6), MOTOR), _motor_values(hum='amplitude')),
     Effect('outside.shifting_ballast', 'a load shifts once: gravity jumps',
-           (Quantity('torque', 'N m', 2e4, 2e5, turned='sign'), Quantity('at', 's', 8.0, 22.0)),
+           (Quantity('torque', 'N m', 2e4, 2e5, turned='sign'), Quantity('at', 's', 5.0, 15.0)),
            _structure_values(ballast='torque', ballast_at='at')),
 )}

@@ -94,7 +94,7 @@ def _fast_triangle(random: np.random.Generator) -> dict[str, Any]:
 
 def _broad_band(duration: float, random: np.random.Generator) -> dict[str, Any]:
     if random.uniform() < 0.3:
-        return {'type': 'chirp', 'amplitude_deg_s': _log_uniform(0.04, 0.1, 4, random),
+        return {'type': 'chirp', 'amplitude_deg_s': _log_uniform(0.05, 0.1, 4, random),
                 'f0_hz': 0.1, 'f1_hz': _rounded(random.uniform(6.0, 9.0), 1),
                 'duration_s': duration - 2.0, 'start_s': 1.0}
     count = 12
@@ -105,7 +105,7 @@ def _broad_band(duration: float, random: np.random.Generator) -> dict[str, Any]:
     frequencies = lines / 14.0
     weights = frequencies**-0.5
     weights /= math.sqrt(float(np.sum(weights**2)))
-    return {'type': 'multisine', 'amplitude_deg_s': _log_uniform(0.06, 0.2, 4, random),
+    return {'type': 'multisine', 'amplitude_deg_s': _log_uniform(0.08, 0.2, 4, random),
             'frequencies_hz': [_rounded(f, 6) for f in frequencies],
             'weights': [_rounded(w, 4) for w in weights],
             'phases': [_rounded(p, 4) for p in random.uniform(0.0, 2.0 * math.pi, len(lines))],

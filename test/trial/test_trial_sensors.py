@@ -88,7 +88,7 @@ def test_tolerances_stay_within_and_leave_teeth_alone() -> None:
     assert off.structure['gear_ratio'] == exact.structure['gear_ratio']
     for records, others in ((exact.motors, off.motors), (exact.structure, off.structure),
                             (exact.circuit, off.circuit)):
-        for name in records.dtype.names:
+        for name in records.dtype.names or ():
             before, after = records[name], others[name]
             changed = before != after
             assert np.all(np.abs(after[changed] / before[changed] - 1.0) <= 0.05)

@@ -1,0 +1,261 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Sealing, making and resuming a trial, and handing its cases to a diagnosis."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import importlib.util
+import json
+from pathlib import Path
+import shutil
+import sys
+from typing import Any
+
+from antenna_drive.cli import main
+from antenna_drive.errors import UserError
+from antenna_drive.trial import batch, sealing
+from antenna_drive.trial.cases import make_recording
+import numpy as np
+import pytest
+import yaml
+
+SETTINGS = {'count': 3, 'seed': 11, 'tolerance': 0.02, 'sample_rate': 100.0, 'duration': 3.0}
+HEADING = ('time_s,rate_command_rad_s,current_1_A,current_2_A,tach_rate_1_rad_s,'
+           'tach_rate_2_rad_s,encoder_rad,bias_voltage_V')
+
+
+def prepare(folder: Path, **changes: Any) -> dict[str, Any]:
+    """Seal a small trial."""
+    return batch.prepare(folder, **{**SETTINGS, **changes})
+
+
+@pytest.fixture(scope='module')
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a small trial with all recordings."""
+    folder = tmp_path_factory.mktemp('trial') / 'small'
+    batch.make_cases(folder, prepare(folder), jobs=1)
+    return folder
+
+
+def test_hashes_can_be_checked_by_hand(made: Path) -> None:
+    manifest = json.loads((made / 'manifest.json').read_text())
+    assert sorted(manifest['seals']) == ['case_0001', 'case_0002', 'case_0003']
+    for name, seal in manifest['seals'].items():
+        truth = json.loads((made / 'truth' / f'{name}.json').read_text())
+        text = json.dumps(truth, sort_keys=True, separators=(',', ':'))
+        assert hashlib.sha256(text.encode()).hexdigest() == seal
+        assert len(truth['salt']) == 32
+
+
+def test_same_truth_has_another_hash_in_another_trial(tmp_path: Path) -> None:
+    first, second = prepare(tmp_path / 'a'), prepare(tmp_path / 'b')
+    assert not set(first['seals'].values()) & set(second['seals'].values())
+
+
+def test_tampering_is_noticed(tmp_path: Path) -> None:
+    manifest = prepare(tmp_path)
+    path = tmp_path / 'truth' / 'case_0002.json'
+    truth = json.loads(path.read_text())
+    truth['tolerance'] = 0.021
+    path.write_text(json.dumps(truth))
+    with pytest.raises(sealing.SealError, match='case_0002.json: not the truth'):
+        sealing.open_truth(tmp_path, 'case_0002', manifest)
+    shutil.copy(tmp_path / 'truth' / 'case_0001.json', path)
+    with pytest.raises(sealing.SealError, match='not the truth'):
+        sealing.open_truth(tmp_path, 'case_0002', manifest)
+    path.unlink()
+    with pytest.raises(sealing.SealError, match='no such file'):
+        sealing.open_truth(tmp_path, 'case_0002', manifest)
+
+
+@pytest.mark.parametrize('text', [
+    '', '[]', '{}', '{"format": 1, "settings": {}, "seals": {"case_0002": ""}}',
+    '{"format": 9, "settings": {}, "seals": {}}', '\udcff'])
+def test_manifest_that_is_none_is_refused(tmp_path: Path, text: str) -> None:
+    (tmp_path / 'manifest.json').write_bytes(text.encode(errors='surrogateescape'))
+    with pytest.raises(sealing.SealError, match='manifest.json'):
+        sealing.read_manifest(tmp_path)
+
+
+def test_recordings_are_in_the_input_format(made: Path) -> None:
+    for case in ('case_0001', 'case_0002', 'case_0003'):
+        assert sorted(path.name for path in (made / case).iterdir()) == [
+            'rec_a.csv', 'rec_a.yaml', 'rec_b.csv', 'rec_b.yaml', 'rec_c.csv', 'rec_c.yaml']
+        for name in ('rec_a', 'rec_b', 'rec_c'):
+            with open(made / case / f'{name}.csv', newline='') as stream:
+                rows = list(csv.reader(stream))
+            assert ','.join(rows[0]) == HEADING
+            values = np.array(rows[1:], dtype=float)
+            assert values.shape == (301, 8)
+            assert np.all(np.isfinite(values))
+            assert np.all(np.diff(values[:, 0]) > 0.0)
+            sheet = yaml.safe_load((made / case / f'{name}.yaml').read_text())
+            assert set(sheet) == {'circuit', 'filter_1', 'bias', 'waveform', 'start',
+                                  'elevation_deg', 'sensors', 'parameter_tolerance'}
+            assert sheet['start'] == 'rest'
+            assert 'truth' not in (made / case / f'{name}.yaml').read_text()
+
+
+def test_sheet_commands_what_the_csv_holds(made: Path) -> None:
+    """The recorded command against the sheet's waveform, written anew from the format's words."""
+    for path in sorted(made.glob('case_*/rec_*.yaml')):
+        shape = yaml.safe_load(path.read_text())['waveform']
+        columns = np.loadtxt(path.with_suffix('.csv'), delimiter=',', skiprows=1)
+        t, r = columns[:, 0], np.degrees(columns[:, 1])
+        amplitude = shape['amplitude_deg_s']
+        if shape['type'] == 'square':
+            cycle = np.mod(t / shape['period_s'] + shape['phase'], 1.0)
+            expected = np.where(cycle < 0.5, amplitude, -amplitude)
+            usable = np.abs(np.mod(cycle, 0.5) - 0.25) < 0.249
+        elif shape['type'] == 'triangle':
+            cycle = t / shape['period_s'] + shape['phase']
+            expected = amplitude * 2.0 / np.pi * np.arcsin(np.sin(2.0 * np.pi * cycle))
+            usable = np.ones(len(t), dtype=bool)
+        elif shape['type'] == 'multisine':
+            tau = t - shape['start_s']
+            expected = np.zeros(len(t))
+            for f, w, p in zip(shape['frequencies_hz'], shape['weights'], shape['phases']):
+                expected += amplitude * w * np.sin(2.0 * np.pi * f * tau + p)
+            expected[tau < 0.0] = 0.0
+            usable = np.abs(tau) > 1e-3
+        else:
+            tau = t - shape['start_s']
+            rise = (shape['f1_hz'] - shape['f0_hz']) / shape['duration_s']
+            expected = amplitude * np.sin(
+                2.0 * np.pi * (shape['f0_hz'] * tau + 0.5 * rise * tau**2))
+            expected[(tau < 0.0) | (tau > shape['duration_s'])] = 0.0
+            usable = np.abs(tau - shape['duration_s']) > 1e-3
+        # The stamps are 0.05 ms off, and digits do the rest.
+        slope = np.gradient(expected, t)
+        error = np.abs(r - expected)[usable]
+        assert np.all(error < 3e-4 * np.abs(slope[usable]) + 2e-3 * amplitude)
+
+
+def test_case_can_be_made_again(made: Path) -> None:
+    truth = json.loads((made / 'truth' / 'case_0003.json').read_text())
+    again = make_recording(truth, 1)
+    stored = np.loadtxt(made / 'case_0003' / 'rec_b.csv', delimiter=',', skiprows=1)
+    assert stored[:, 2] == pytest.approx(again['current_1_A'], abs=1e-8)
+    assert stored[:, 6] == pytest.approx(again['encoder_rad'], rel=1e-10, abs=1e-15)
+
+
+def test_interrupted_trial_goes_on(made: Path, tmp_path: Path,
+                                   monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / 'trial'
+    shutil.copytree(made, folder)
+    before = (folder / 'case_0001' / 'rec_a.csv').stat().st_mtime_ns
+    original = (folder / 'case_0002' / 'rec_c.csv').read_bytes()
+    shutil.rmtree(folder / 'case_0002')
+    (folder / '.case_0002.4711').mkdir()
+    manifest = prepare(folder)
+    told: list[tuple[int, int]] = []
+    monkeypatch.setattr(batch, 'write_csv', _fails)
+    with pytest.raises(OSError, match='disk full'):
+        batch.make_cases(folder, manifest, jobs=1)
+    assert not (folder / 'case_0002').exists()
+    assert not list(folder.glob('.case*'))
+    monkeypatch.undo()
+    batch.make_cases(folder, manifest, 1, lambda done, total: told.append((done, total)))
+    assert told == [(2, 3), (3, 3)]
+    assert (folder / 'case_0001' / 'rec_a.csv').stat().st_mtime_ns == before
+    assert (folder / 'case_0002' / 'rec_c.csv').read_bytes() == original
+
+
+def _fails(*_: object) -> None:
+    raise OSError('disk full')
+
+
+def test_several_processes_make_the_same(made: Path, tmp_path: Path) -> None:
+    folder = tmp_path / 'trial'
+    shutil.copytree(made, folder, ignore=shutil.ignore_patterns('case_????'))
+    assert not list(folder.glob('case_*'))
+    batch.make_cases(folder, sealing.read_manifest(folder), jobs=2)
+    for path in made.glob('case_*/*'):
+        assert path.read_bytes() == (folder / path.parent.name / path.name).read_bytes()
+
+
+def test_other_settings_are_refused(made: Path) -> None:
+    with pytest.raises(UserError, match='seed 11, not 12'):
+        prepare(made, seed=12)
+
+
+@pytest.fixture
+def stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """Put a small program in the place of the diagnosis; it notes what it was told."""
+    program = tmp_path / 'stand_in.py'
+    program.write_text(
+        'import json, pathlib, sys\n'
+        'arguments = sys.argv[3:]\n'
+        f'with open({str(tmp_path / "told.txt")!r}, "a") as stream:\n'
+        '    stream.write(json.dumps(arguments) + "\\n")\n'
+        'case = pathlib.Path(arguments[1]).parent.name\n'
+        'target = arguments[arguments.index("--json") + 1]\n'
+        'if case == "case_0002" and "--stumble" in arguments:\n'
+        '    sys.exit("stumbled")\n'
+        'pathlib.Path(target).write_text("{}")\n')
+    launcher = tmp_path / 'launcher'
+    launcher.write_text(f'#!/bin/sh\nexec {sys.executable} {program} "$@"\n')
+    launcher.chmod(0o755)
+    monkeypatch.setattr(sys, 'executable', str(launcher))
+    monkeypatch.setattr(importlib.util, 'find_spec', lambda name: name)
+    return tmp_path / 'told.txt'
+
+
+def test_diagnosis_is_told_the_recordings_and_never_the_truth(
+        made: Path, tmp_path: Path, stand_in: Path) -> None:
+    folder = tmp_path / 'trial'
+    shutil.copytree(made, folder)
+    manifest = sealing.read_manifest(folder)
+    assert batch.diagnose_cases(folder, manifest, 2, ['--stumble'], 60.0) == 1
+    assert 'stumbled' in (folder / 'case_0002' / 'failure.txt').read_text()
+    assert not (folder / 'case_0002' / 'verdict.json').exists()
+    told = [json.loads(line) for line in stand_in.read_text().splitlines()]
+    assert len(told) == 3
+    for arguments in told:
+        assert arguments[0] == 'diagnose'
+        assert [Path(a).name for a in arguments[1:4]] == ['rec_a.csv', 'rec_b.csv', 'rec_c.csv']
+        assert not any('truth' in argument or 'manifest' in argument for argument in arguments)
+    # Once more: only the failed one is tried again.
+    assert batch.diagnose_cases(folder, manifest, 1, [], 60.0) == 0
+    assert len(stand_in.read_text().splitlines()) == 4
+    assert not (folder / 'case_0002' / 'failure.txt').exists()
+    assert (folder / 'case_0002' / 'verdict.json').exists()
+
+
+@pytest.mark.parametrize(('option', 'value'), [
+    ('--cases', '0'), ('--seed', '-1'), ('--tolerance', '0.2'), ('--sample-rate', '20'),
+    ('--jobs', '0'), ('--time-limit', '0'), ('--tolerance', 'nan')])
+def test_command_refuses_what_is_not_allowed(
+        option: str, value: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = {'--cases': '1', '--seed': '1', '--out': str(tmp_path / 'x'), option: value}
+    words = [word for pair in arguments.items() for word in pair]
+    assert main(['trial', *words]) == 2
+    told = capsys.readouterr().err.strip()
+    assert len(told.splitlines()) == 1
+    assert option in told
+    assert not (tmp_path / 'x').exists()
+
+
+def test_command_prints_the_seal_first(tmp_path: Path,
+                                       capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / 'trial'
+    assert main(['trial', '--cases', '1', '--seed', '2', '--sample-rate', '50', '--jobs', '1',
+                 '--out', str(folder)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    manifest = json.loads((folder / 'manifest.json').read_text())
+    text = json.dumps(manifest, sort_keys=True, separators=(',', ':'))
+    assert hashlib.sha256(text.encode()).hexdigest() in lines[0]
+    assert (folder / 'case_0001' / 'rec_c.yaml').exists()

@@ -1,0 +1,221 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The scorecard against verdicts made by hand, whose scores follow from counting."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from antenna_drive.cli import main
+from antenna_drive.trial import sealing
+from antenna_drive.trial.scorecard import (
+    auroc, calibration_error, Case, rate, reliability, score)
+from antenna_drive.trial.verdict import parse_verdict, Verdict, VerdictError
+import pytest
+
+KEYS = ('cases, failures, top1, top3, within_set, pairs_both, no_gap_on_none, auroc_unknown, '
+        'overconfident_outside, ece, explained_fraction_median, seconds_median').split(', ')
+
+
+def verdict(*which: tuple[str, float], confusable: list[list[str]] | None = None,
+            word: str = 'explained', fraction: float = 0.9, seconds: float = 10.0) -> Any:
+    """Return the JSON of a verdict; ids that act together are joined by a plus."""
+    return {
+        'verdict': word, 'where': [],
+        'which': [{'effects': names.split('+'), 'probability': p, 'parameters': {}}
+                  for names, p in which],
+        'confusable': confusable or [],
+        'how_far': {'explained_fraction': {'value': fraction, 'ci95': [0.0, 1.0]}},
+        'seconds': seconds}
+
+
+def truth(kind: str, *ids: str, size: float = 0.5) -> dict[str, Any]:
+    """Return as much of a truth as the scorecard reads."""
+    return {'kind': kind, 'effects': [{'id': name, 'size': size, 'parameters': {}}
+                                      for name in ids]}
+
+
+def case(kind: str, ids: list[str], content: Any) -> Case:
+    """Return a case."""
+    return Case(truth(kind, *ids), parse_verdict(content) if content else None)
+
+
+CASES = [
+    # four singles: right; right by its set; third; failed
+    case('single', ['a.x'], verdict(('a.x', 0.95), ('unknown', 0.05), seconds=4.0)),
+    case('single', ['b.x'], verdict(('b.y', 0.55), ('b.x', 0.45), confusable=[['b.x', 'b.y']],
+                                    fraction=0.8)),
+    case('single', ['c.x'], verdict(('d.x', 0.5), ('none', 0.3), ('c.x', 0.2))),
+    case('single', ['d.x'], None),
+    # two pairs: both named, one through a set; one named
+    case('pair', ['a.x', 'b.x'], verdict(('a.x+b.y', 0.85), ('unknown', 0.15), fraction=0.7,
+                                         confusable=[['b.x', 'b.y', 'b.z']])),
+    case('pair', ['a.x', 'c.x'], verdict(('a.x', 0.75), ('a.x+c.x', 0.25))),
+    # two without effect, two outside the catalogue
+    case('none', [], verdict(('none', 0.97), ('unknown', 0.03), word='no_gap')),
+    case('none', [], verdict(('a.x', 0.65), ('none', 0.35))),
+    case('outside', ['outside.o'], verdict(('unknown', 1.0), word='unknown_effect')),
+    case('outside', ['outside.o'], verdict(('c.x', 0.96), ('unknown', 0.04))),
+]
+
+
+def test_every_figure_by_hand() -> None:
+    figures = score(CASES, pending=3)
+    assert set(KEYS) <= set(figures)
+    assert figures['cases'] == 10
+    assert figures['failures'] == 1
+    assert figures['pending'] == 3
+    assert figures['top1'] == 2 / 4
+    assert figures['top1_exact'] == 1 / 4
+    assert figures['top3'] == 3 / 4
+    assert figures['top3_exact'] == 3 / 4
+    assert figures['within_set'] == 2 / 4
+    assert figures['pairs_both'] == 1 / 2
+    assert figures['pairs_one'] == 1.0
+    assert figures['no_gap_on_none'] == 1 / 2
+    assert figures['overconfident_outside'] == 1 / 2
+    # unknown: outside 1 and 0.04; the seven others with a verdict 0.05, 0.15, 0.03 and zeros
+    assert figures['auroc_unknown'] == pytest.approx((7 + 5) / 14)
+    assert figures['explained_fraction_median'] == pytest.approx(0.8)
+    assert figures['seconds_median'] == 10.0
+    # confidences: 0.95 right, 1.0 (the set's sum) right, 0.5 wrong, 0.85 right, 0.75 wrong,
+    # 0.97 right, 0.65 wrong, 1.0 right, 0.96 wrong; 0.95, 0.96, 0.97, 1, 1 share a bin
+    top_bin = abs(4 / 5 - (0.95 + 1.0 + 0.97 + 1.0 + 0.96) / 5)
+    assert figures['ece'] == pytest.approx((5 * top_bin + 0.5 + 0.15 + 0.75 + 0.65) / 9)
+    assert figures['by_kind']['single'] == {
+        'cases': 4, 'failures': 1, 'top1': 0.5, 'top3': 0.75}
+    assert figures['by_effect']['outside.o'] == {
+        'cases': 2, 'failures': 0, 'top1': 0.5, 'top3': 1.0}   # 'unknown' came second
+    assert figures['by_size']['middle']['cases'] == 4
+    assert figures['confusion']['d.x'] == {'failure': 1}
+    assert figures['confusion']['c.x'] == {'d.x': 1}
+
+
+def test_nothing_scored_is_no_number() -> None:
+    figures = score([])
+    assert figures['cases'] == 0
+    for name in KEYS[2:]:
+        assert math.isnan(figures[name])
+
+
+def test_sets_of_more_than_five_do_not_count() -> None:
+    large = verdict(('b.y', 1.0), confusable=[['b.x', 'b.y', 'b.1', 'b.2', 'b.3', 'b.4']])
+    split = verdict(('b.y', 1.0), confusable=[['b.x', 'b.y'], ['b.y', 'b.1', 'b.2'],
+                                              ['b.y', 'b.3', 'b.4']])
+    five = verdict(('b.y', 1.0), confusable=[['b.x', 'b.y', 'b.1'], ['b.y', 'b.2', 'b.3']])
+    assert [case('single', ['b.x'], content).right for content in (large, split, five)] == [
+        False, False, True]
+
+
+def test_pair_needs_two_different_members() -> None:
+    both = verdict(('b.x+b.y', 1.0), confusable=[['b.x', 'b.y', 'c.x']])
+    assert case('pair', ['b.y', 'c.x'], both).right
+    assert case('pair', ['b.x', 'b.y'], both).right
+    assert not case('pair', ['a.x', 'b.x'], both).right
+    assert not case('single', ['b.x'], both).right
+
+
+def test_unranked_verdict_is_ranked() -> None:
+    content = verdict(('a.x', 0.1), ('b.x', 0.7), ('unknown', 0.2))
+    assert case('single', ['b.x'], content).right
+
+
+@pytest.mark.parametrize(('key', 'value'), [
+    ('verdict', 'perhaps'), ('which', []), ('which', 'a.x'), ('which', [{'effects': ['a.x']}]),
+    ('which', [{'effects': [], 'probability': 1.0}]),
+    ('which', [{'effects': ['a.x'], 'probability': 0.5}]),
+    ('which', [{'effects': ['a.x'], 'probability': math.nan}]),
+    ('which', [{'effects': ['a.x'], 'probability': True}]),
+    ('which', [{'effects': 'a.x', 'probability': 1.0}]), ('which', [1]),
+    ('confusable', [['a.x', 1]]), ('confusable', 'a.x')])
+def test_verdict_that_breaks_its_promise_is_refused(key: str, value: Any) -> None:
+    with pytest.raises(VerdictError, match=key):
+        parse_verdict({**verdict(('a.x', 1.0)), key: value})
+
+
+def test_verdict_may_leave_out_what_is_not_scored_alone() -> None:
+    short = parse_verdict({'verdict': 'explained',
+                           'which': [{'effects': ['a.x'], 'probability': 1.0}]})
+    assert isinstance(short, Verdict)
+    assert math.isnan(short.explained_fraction)
+    assert math.isnan(short.seconds)
+
+
+def test_auroc_counts_pairs() -> None:
+    assert auroc([0.9, 0.4], [0.1, 0.4, 0.8]) == pytest.approx((3 + 1.5) / 6)
+    assert math.isnan(auroc([], [0.1]))
+
+
+def test_wilson_interval() -> None:
+    """Agresti and Coull's textbook case: 0 of 10 gives 0 to 0.278, 9 of 10 0.596 to 0.982."""
+    assert rate([False] * 10)[:3] == pytest.approx((0.0, 0.0, 0.2775), abs=5e-4)
+    assert rate([True] * 9 + [False])[:3] == pytest.approx((0.9, 0.596, 0.982), abs=5e-4)
+
+
+def test_reliability_of_a_calibrated_answer_is_perfect() -> None:
+    bins = reliability([0.75] * 4 + [1.0], [True, True, True, False, True])
+    assert calibration_error(bins) == 0.0
+    assert [b.cases for b in bins] == [0, 0, 0, 0, 0, 0, 0, 4, 0, 1]
+
+
+@pytest.fixture
+def scored_trial(tmp_path: Path) -> Path:
+    """Return a sealed trial of four cases: right, broken, failed, pending."""
+    truths = [{'case': f'case_{k:04d}', **truth('single', 'a.x')} for k in range(1, 5)]
+    sealing.seal(tmp_path, {'cases': 4}, truths)
+    for name in ('case_0001', 'case_0002', 'case_0003'):
+        (tmp_path / name).mkdir()
+    (tmp_path / 'case_0001' / 'verdict.json').write_text(json.dumps(verdict(('a.x', 1.0))))
+    (tmp_path / 'case_0002' / 'verdict.json').write_text('{}')
+    (tmp_path / 'case_0003' / 'failure.txt').write_text('exit code 1')
+    return tmp_path
+
+
+def test_command_scores_a_folder(scored_trial: Path, tmp_path: Path,
+                                 capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip('matplotlib')
+    picture = tmp_path / 'score.png'
+    assert main(['score', str(scored_trial), '--json', '-', '--picture', str(picture)]) == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert (figures['cases'], figures['failures'], figures['pending']) == (3, 2, 1)
+    assert figures['top1'] == pytest.approx(1 / 3)
+    assert figures['pairs_both'] is None
+    assert picture.read_bytes().startswith(b'\x89PNG')
+    assert main(['score', str(scored_trial)]) == 0
+    told = capsys.readouterr().out
+    assert 'top1' in told
+    assert '0.333' in told
+
+
+def test_command_refuses_a_changed_truth(scored_trial: Path,
+                                         capsys: pytest.CaptureFixture[str]) -> None:
+    path = scored_trial / 'truth' / 'case_0001.json'
+    path.write_text(path.read_text().replace('a.x', 'b.x'))
+    assert main(['score', str(scored_trial)]) == 2
+    assert 'case_0001.json: not the truth' in capsys.readouterr().err
+
+
+def test_command_refuses_a_picture_of_unknown_kind(scored_trial: Path,
+                                                   capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip('matplotlib')
+    assert main(['score', str(scored_trial), '--picture', str(scored_trial / 'x.abc')]) == 2
+    assert 'x.abc' in capsys.readouterr().err
+
+
+def test_command_without_verdicts_says_no(tmp_path: Path) -> None:
+    sealing.seal(tmp_path, {}, [{'case': 'case_0001', **truth('none')}])
+    assert main(['score', str(tmp_path)]) == 1
