@@ -145,7 +145,7 @@ def _draw(path: Path, runs: dict[str, Sampled]) -> None:
         axis.set(title=f'{name} circuit', ylabel='bias voltage [V]', ylim=(-0.5, 13.0),
                  xlim=(0.0, time[-1]))
         axis.grid(alpha=0.3)
-    axes[0].legend(loc='upper right', framealpha=0.9)
+    axes[-1].legend(loc='lower right', framealpha=0.9)
     axes[-1].set_xlabel('time [s]')
     figure.suptitle('Torque bias under the saw-tooth, 0.685 deg/s, 5 s')
     figure.savefig(path, dpi=150)

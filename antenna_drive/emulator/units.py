@@ -16,6 +16,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 import math
 from typing import Any, ClassVar
 
@@ -241,6 +242,25 @@ def home(parameter: str) -> tuple[str, str]:
     name, _, rest = parameter.partition('.')
     own = _UNITS[name]._own
     return name, rest.removeprefix(f'{own}.') if own else rest
+
+
+def overridden(drive: Drive, overrides: Mapping[str, Mapping[str, Value]]) -> Drive:
+    """
+    Return the drive with settings of its units changed, constants too.
+
+    Parameters
+    ----------
+    drive : the parameters of the whole drive
+    overrides : values by unit and by the name that the unit's setting has
+
+    Raises
+    ------
+    ParameterError : see `build`
+
+    """
+    sets = {name: build(name, drive, given).parameters  # type: ignore[attr-defined]
+            for name, given in overrides.items()}
+    return replace(drive, **sets)
 
 
 def build(name: str, drive: Drive, overrides: Mapping[str, Value] | None = None) -> Unit:

@@ -1,0 +1,50 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Parameters of single units on a command line: UNIT.NAME=VALUE."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from antenna_drive.emulator.wiring import UNITS
+from antenna_drive.errors import UserError
+from antenna_drive.parameters.schema import nearest
+import yaml
+
+
+def parse_settings(settings: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """
+    Return what was given, by unit and parameter name; values are YAML and not yet checked.
+
+    Raises
+    ------
+    UserError : a setting is not of the form UNIT.NAME=VALUE, or there is no such unit
+
+    """
+    found: dict[str, dict[str, Any]] = {}
+    for text in settings:
+        name, equals, value = text.partition('=')
+        unit, dot, key = name.partition('.')
+        if not equals or not dot or not key:
+            raise UserError(f'--set {text}: allowed is UNIT.NAME=VALUE, such as '
+                            'torque_share.bias_pot=0.8')
+        if unit not in UNITS:
+            raise UserError(f'--set {text}: {unit}: no such unit{nearest(unit, UNITS)}; '
+                            f'allowed are {", ".join(UNITS)}')
+        try:
+            found.setdefault(unit, {})[key] = yaml.safe_load(value)
+        except yaml.YAMLError as error:
+            raise UserError(f'--set {text}: {value!r} is no value') from error
+    return found
