@@ -113,6 +113,8 @@ class Motor:
         0.0, 'N m', 0.0, 10.0, 'friction above the Coulomb level at creep')
     stribeck_rate: float = _effect(
         5.0, 'rad/s', 1e-3, 1e3, 'rate at which the Stribeck torque has fallen to 1/e')
+    stribeck_shape: float = _effect(
+        2.0, '1', 0.1, 4.0, 'exponent of the rate in the fall of the Stribeck torque')
     friction_asymmetry: float = _effect(
         0.0, '1', -0.9, 0.9, 'share by which forward friction exceeds the mean of both ways')
     load_dependent_friction: float = _effect(
@@ -209,6 +211,8 @@ class Axis:
         0.0, 'N m', 0.0, 1e7, 'friction above the Coulomb level at creep')
     stribeck_rate: float = _effect(
         1e-4, 'rad/s', 1e-7, 1.0, 'rate at which the Stribeck torque has fallen to 1/e')
+    stribeck_shape: float = _effect(
+        2.0, '1', 0.1, 4.0, 'exponent of the rate in the fall of the Stribeck torque')
     friction_wave: float = _effect(
         0.0, '1', 0.0, 0.9, 'share by which friction varies with the angle')
     friction_wave_cycles: float = _effect(

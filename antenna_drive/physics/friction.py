@@ -45,8 +45,8 @@ def friction_torque(rate, applied, coulomb, stiction, threshold):  # type: ignor
 
 
 @inner
-def slip_level(rate, coulomb, viscous, stribeck, stribeck_rate, asymmetry):
-    # type: ignore[no-untyped-def]
+def slip_level(rate, coulomb, viscous, stribeck, stribeck_rate, stribeck_shape,
+               asymmetry):  # type: ignore[no-untyped-def]
     """
     Return the size of the friction torque of a slipping body [N m].
 
@@ -56,15 +56,15 @@ def slip_level(rate, coulomb, viscous, stribeck, stribeck_rate, asymmetry):
     coulomb : T_c [N m]
     viscous : torque per rate, zero in the article [N m s/rad]
     stribeck : how much more torque slipping begins with than it settles at, zero in the article
-        [N m]; it fades as exp(-(rate / stribeck_rate)^2)
-    stribeck_rate : [rad/s]
+        [N m]; it fades as exp(-(rate / stribeck_rate)^stribeck_shape)
+    stribeck_rate, stribeck_shape : [rad/s], [1]
     asymmetry : share by which forward friction exceeds, and backward friction falls short of,
         the mean of both, zero in the article [1]
 
     """
     level = coulomb
     if stribeck != 0.0:
-        level += stribeck * np.exp(-(rate / stribeck_rate) ** 2)
+        level += stribeck * np.exp(-(abs(rate) / stribeck_rate) ** stribeck_shape)
     if asymmetry != 0.0:
         level *= 1.0 + (asymmetry if rate >= 0.0 else -asymmetry)
     return level + viscous * abs(rate)

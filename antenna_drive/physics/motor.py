@@ -54,7 +54,7 @@ def friction_level(rate, gear_torque, p):  # type: ignore[no-untyped-def]
     if p.load_dependent_friction != 0.0:
         coulomb += p.load_dependent_friction * abs(gear_torque)
     return slip_level(rate, coulomb, p.viscous_friction, p.stribeck_torque, p.stribeck_rate,
-                      p.friction_asymmetry)
+                      p.stribeck_shape, p.friction_asymmetry)
 
 
 @inner

@@ -71,7 +71,8 @@ def _friction_level(rate, angle, p):  # type: ignore[no-untyped-def]
     if p.friction_wave != 0.0:
         coulomb *= 1.0 + p.friction_wave * np.sin(p.friction_wave_cycles * angle
                                                   + p.friction_wave_phase)
-    return slip_level(rate, coulomb, p.viscous_friction, p.stribeck_torque, p.stribeck_rate, 0.0)
+    return slip_level(rate, coulomb, p.viscous_friction, p.stribeck_torque, p.stribeck_rate,
+                      p.stribeck_shape, 0.0)
 
 
 @inner

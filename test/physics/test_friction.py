@@ -68,11 +68,12 @@ def test_a_body_that_has_just_broken_away_does_not_stick_again() -> None:
 
 def test_the_neutral_slip_level_is_the_coulomb_torque() -> None:
     for rate in (-3.0, 0.0, 1e-4, 7.0):
-        assert slip_level(rate, COULOMB, 0.0, 0.0, 1.0, 0.0) == COULOMB
+        assert slip_level(rate, COULOMB, 0.0, 0.0, 1.0, 2.0, 0.0) == COULOMB
 
 
 def test_the_terms_of_the_slip_level() -> None:
-    assert slip_level(-3.0, 2.0, 0.5, 0.0, 1.0, 0.0) == 3.5
-    assert slip_level(1.5, 2.0, 0.0, 0.8, 1.5, 0.0) == pytest.approx(2.0 + 0.8 / np.e)
-    assert slip_level(1.0, 2.0, 0.0, 0.0, 1.0, 0.1) == pytest.approx(2.2)
-    assert slip_level(-1.0, 2.0, 0.0, 0.0, 1.0, 0.1) == pytest.approx(1.8)
+    assert slip_level(-3.0, 2.0, 0.5, 0.0, 1.0, 2.0, 0.0) == 3.5
+    assert slip_level(1.5, 2.0, 0.0, 0.8, 1.5, 2.0, 0.0) == pytest.approx(2.0 + 0.8 / np.e)
+    assert slip_level(-3.0, 2.0, 0.0, 0.8, 1.5, 1.0, 0.0) == pytest.approx(2.0 + 0.8 / np.e ** 2)
+    assert slip_level(1.0, 2.0, 0.0, 0.0, 1.0, 2.0, 0.1) == pytest.approx(2.2)
+    assert slip_level(-1.0, 2.0, 0.0, 0.0, 1.0, 2.0, 0.1) == pytest.approx(1.8)
