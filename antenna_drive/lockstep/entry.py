@@ -196,7 +196,9 @@ def _bare_node(default_name: str) -> Node:
     from rclpy.exceptions import InvalidParameterTypeException
     from rclpy.node import Node
     try:
-        return Node(default_name, automatically_declare_parameters_from_overrides=True)
+        # Undeclared ones reach our own check, which says what was meant; it lets none through.
+        return Node(default_name, automatically_declare_parameters_from_overrides=True,
+                    allow_undeclared_parameters=True)
     except (RuntimeError, InvalidParameterTypeException) as error:
         raise UserError(_first_line(error)) from error
 

@@ -220,12 +220,15 @@ def accept_changes(node: Node, entries: Mapping[str, Entry],
                 if item.name in entries else item for item in parameters]
 
     def check_and_change(parameters: list[Parameter[Any]]) -> SetParametersResult:
-        changes = {item.name: _plain(item.value) for item in parameters if item.name in entries}
-        if not changes:
-            return SetParametersResult(successful=True)
+        changes: dict[str, Value] = {}
         try:
-            changes = {name: entries[name].check(name, value) for name, value in changes.items()}
-            reason = change(changes)
+            for item in parameters:
+                if item.name in entries:
+                    changes[item.name] = entries[item.name].check(item.name, _plain(item.value))
+                elif not node.has_parameter(item.name):
+                    raise ParameterError(f'{item.name}: no such parameter'
+                                         f'{nearest(item.name, tuple(entries))}')
+            reason = change(changes) if changes else ''
         except ParameterError as error:
             reason = str(error)
         return SetParametersResult(successful=not reason, reason=reason)

@@ -1,0 +1,261 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The drive in five real processes over real DDS, against the emulator in one process."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import json
+import math
+from pathlib import Path
+import random
+import signal
+import subprocess
+import sys
+from typing import Any
+
+from antenna_drive.emulator.run import simulate
+from antenna_drive.emulator.unit import FloatArray
+from antenna_drive.emulator.wiring import UNITS
+from antenna_drive.parameters import load
+from antenna_drive.parameters.sets import changed
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy', reason='rclpy is not installed: no processes to test')
+
+from antenna_drive.lockstep.processes import DriveProcesses  # noqa: E402
+from drive_watch import Recorder, Watch  # noqa: E402
+
+NAME = 'watcher'
+ENDLESS: dict[str, Any] = {'run.pace': 0.0, 'run.observers': [NAME]}
+
+
+def in_process(steps: int, step_s: float, config: tuple[str, ...] = (),
+               changes: Mapping[int, Any] | None = None,
+               given: Mapping[str, Any] | None = None) -> FloatArray:
+    drive = changed(load(*config), dict(given or {}))
+    samples = simulate(drive, steps * step_s, step_s, changes).samples
+    assert samples.shape[0] == steps + 1
+    return samples
+
+
+def assert_same_bits(got: FloatArray, want: FloatArray) -> None:
+    assert got.shape == want.shape
+    different = np.nonzero((got != want).any(axis=(1, 2)))[0]
+    assert different.size == 0, f'first difference at step {different[0]}'
+    assert got.tobytes() == want.tobytes()
+
+
+@pytest.mark.usefixtures('fresh_domain')
+def test_random_start_order_and_a_busy_machine_change_no_bit() -> None:
+    seed = random.randrange(1000)
+    order = random.Random(seed).sample(UNITS, len(UNITS))
+    print(f'seed {seed}: {order}')
+    busy = subprocess.Popen([sys.executable, '-c', 'while True: pass'])
+    try:
+        with Watch() as watch, Recorder(NAME) as recorder, DriveProcesses(
+                {'test_signal': ENDLESS}, order=order) as processes:
+            watch.until(lambda: _at_step(recorder, processes, 2000), 'step 2000')
+            samples = recorder.array()
+            codes = processes.stop(signal.SIGTERM)
+    finally:
+        busy.kill()
+        busy.wait()
+    assert_same_bits(samples, in_process(samples.shape[0] - 1, 1e-3))
+    assert codes == dict.fromkeys(UNITS, 0)
+
+
+@pytest.mark.usefixtures('fresh_domain')
+def test_changes_refusals_and_foreign_frames_in_one_run() -> None:
+    parameters = {'test_signal': {**ENDLESS, 'waveform': 'external', 'run.step': 2e-3}}
+    with Watch() as watch, Recorder(NAME) as recorder, DriveProcesses(
+            parameters) as processes:
+        watch.until(lambda: _at_step(recorder, processes, 50), 'step 50')
+        command = watch.float_publisher('test_signal/external')
+        for value in (1e-4, -2e-4, 3e-4):
+            noted = len(recorder.changes)
+            command(value)
+            watch.until(lambda noted=noted: len(recorder.changes) > noted,  # type: ignore[misc]
+                        'the command in the record')
+        _change_live(watch)
+        _attack(watch, recorder)
+        target = recorder.steps + 500
+        watch.until(lambda: _at_step(recorder, processes, target), f'step {target}')
+        told = watch.get('torque_share', 'bias_pot', 'fade_out_voltage')
+        samples, schedule = recorder.array(), recorder.schedule()
+        runs = list(recorder.runs)
+        codes = processes.stop(signal.SIGINT)
+        logs = {unit: processes.log(unit) for unit in UNITS}
+    assert len(runs) == 1, 'nothing of this begins a new run'
+    commands = [change['test_signal']['external'] for change in schedule.values()
+                if 'test_signal' in change]
+    assert commands == [1e-4, -2e-4, 3e-4]
+    shared = [change['torque_share'] for change in schedule.values() if 'torque_share' in change]
+    assert shared == [{'bias_pot': told[0], 'fade_out_voltage': told[1]}]
+    steps = samples.shape[0] - 1
+    want = in_process(steps, 2e-3, changes=schedule,
+                      given={'test_signal.rate.waveform': 'external'})
+    assert_same_bits(samples, want)
+    assert not np.array_equal(want, in_process(
+        steps, 2e-3, given={'test_signal.rate.waveform': 'external'})), 'the changes must count'
+    assert codes == dict.fromkeys(UNITS, 0)
+    assert not any('Traceback' in log for log in logs.values()), logs
+
+
+def _change_live(watch: Watch) -> None:
+    pot, fade_out = watch.get('torque_share', 'bias_pot', 'fade_out_voltage')
+    constant, unknown, beyond, bad_pair = (
+        watch.set_together('motor_1', {'armature.resistance': 2.0}),
+        watch.set_together('torque_share', {'bias_pod': 0.5}),
+        watch.set_together('torque_share', {'bias_pot': 1e9}),
+        watch.set_together('torque_share', {'bias_pot': pot * 0.5, 'fade_out_voltage': math.nan}))
+    assert not constant.successful
+    assert 'read-only' in constant.reason
+    assert not unknown.successful
+    assert 'bias_pod' in unknown.reason
+    assert not beyond.successful
+    assert 'bias_pot' in beyond.reason
+    assert not bad_pair.successful
+    assert 'fade_out_voltage' in bad_pair.reason
+    assert watch.get('torque_share', 'bias_pot', 'fade_out_voltage') == [pot, fade_out]
+    good = watch.set_together(
+        'torque_share', {'bias_pot': pot * 0.75, 'fade_out_voltage': fade_out * 0.5})
+    assert good.successful, good.reason
+    assert watch.get('torque_share', 'bias_pot', 'fade_out_voltage') == [
+        pot * 0.75, fade_out * 0.5]
+    [pot_described, resistance] = [*watch.describe('torque_share', 'bias_pot'),
+                                   *watch.describe('motor_1', 'armature.resistance')]
+    assert not pot_described.read_only
+    assert pot_described.floating_point_range
+    assert resistance.read_only
+    assert '[ohm]' in resistance.description
+
+
+def _attack(watch: Watch, recorder: Recorder) -> None:
+    length = recorder.observer.node.get_name() and 3 + 2 * sum(
+        name.startswith('plant/') for name in recorder.observer.names)
+    rest = [0.5] * (length - 3)
+    run = float(recorder.runs[-1])
+    soon = float(recorder.steps)
+    watch.publish_frames('plant/frame', [
+        [run, soon, 2e-3, math.nan, *rest[1:]],
+        [run, soon, 2e-3, *rest[1:], math.inf],
+        [run, soon, 2e-3, *rest[1:]],
+        [3.0, soon, 2e-3, *rest],
+        [run + 5.0, soon, 2e-3, *rest],
+        [run, 0.0, 2e-3, *rest],
+    ], readers=4)
+    reasons = ('NaN', 'infinite', 'wrong length', 'wrong run', 'too old')
+    for reader in ('motor_1', 'motor_2', 'test_signal'):
+        watch.until(lambda reader=reader: all(  # type: ignore[misc]
+            watch.value(reader, f'refused: plant, {reason}') not in ('', '0')
+            for reason in reasons) and watch.value(reader, 'refused: plant, wrong run') == '2',
+            f'the refusals of {reader}: {watch.reports.get(reader)}')
+
+
+@pytest.mark.usefixtures('fresh_domain')
+def test_each_node_killed_is_missed_and_started_again_begins_a_new_run() -> None:
+    with Watch() as watch, Recorder(NAME) as recorder, DriveProcesses(
+            {'test_signal': ENDLESS}) as processes:
+        watch.until(lambda: _at_step(recorder, processes, 100), 'step 100')
+        pids = {unit: processes.process(unit).pid for unit in UNITS}
+        for victim in UNITS:
+            neighbour = 'motor_1' if victim == 'test_signal' else 'test_signal'
+            processes.kill(victim)
+            watch.until(lambda: _missed(watch, neighbour, victim),
+                        f'{neighbour} to say that it waits for {victim}')
+            assert 'at step' in watch.reports[neighbour].message
+            assert f'waiting for {victim}' in processes.log(neighbour)
+            runs = len(recorder.runs)
+            processes.start(victim)
+            watch.until(lambda: len(recorder.runs) > runs and _at_step(recorder, processes, 300),
+                        f'a new run with {victim}')
+            assert 'going on at step' in processes.log(neighbour)
+        samples = recorder.array()
+        assert recorder.runs == sorted(set(recorder.runs))
+        survivors = {unit for unit in UNITS if processes.process(unit).pid == pids[unit]}
+        codes = processes.stop(signal.SIGTERM)
+    assert survivors == set(), 'each was killed once'
+    assert_same_bits(samples, in_process(samples.shape[0] - 1, 1e-3))
+    assert codes == dict.fromkeys(UNITS, 0)
+
+
+def _missed(watch: Watch, neighbour: str, victim: str) -> bool:
+    status = watch.reports.get(neighbour)
+    return status is not None and victim in watch.value(neighbour, 'waiting for').split(', ')
+
+
+def _at_step(recorder: Recorder, processes: DriveProcesses, step: int) -> bool:
+    processes.check()
+    return recorder.steps >= step
+
+
+@pytest.mark.usefixtures('fresh_domain')
+def test_two_drives_in_two_namespaces_do_not_meet() -> None:
+    circuits = {'/east': ('old_circuit',), '/west': ('new_circuit',)}
+    with Watch() as watch, Recorder(NAME, '/east') as east, Recorder(
+            NAME, '/west') as west, DriveProcesses(
+            {'test_signal': ENDLESS}, config=circuits['/east'],
+            namespace='/east') as east_processes, DriveProcesses(
+            {'test_signal': ENDLESS}, config=circuits['/west'],
+            namespace='/west') as west_processes:
+        watch.until(lambda: _at_step(east, east_processes, 1000)
+                    and _at_step(west, west_processes, 1000), 'step 1000 of both')
+        samples = {'/east': east.array(), '/west': west.array()}
+        topics = dict(watch.node.get_topic_names_and_types())
+    for namespace, config in circuits.items():
+        got = samples[namespace]
+        assert_same_bits(got, in_process(got.shape[0] - 1, 1e-3, config))
+    for topic in ('clock', 'motor_2/current', 'motor_1/armature_current', 'plant/encoder'):
+        assert f'/east/{topic}' in topics
+        assert f'/{topic}' not in topics
+
+
+@pytest.mark.usefixtures('fresh_domain')
+def test_the_nodes_end_with_the_process_that_started_them() -> None:
+    program = ('from antenna_drive.lockstep.processes import DriveProcesses\n'
+               'import sys\n'
+               'with DriveProcesses() as processes:\n'
+               '    print(*(processes.process(unit).pid for unit in processes.order))\n'
+               '    sys.stdout.flush()\n'
+               '    sys.stdin.read()\n')
+    parent = subprocess.Popen([sys.executable, '-c', program], stdin=subprocess.PIPE,
+                              stdout=subprocess.PIPE, text=True)
+    assert parent.stdout is not None
+    pids = [int(word) for word in parent.stdout.readline().split()]
+    assert len(pids) == len(UNITS)
+    parent.kill()
+    parent.wait()
+    with Watch() as watch:
+        watch.until(lambda: not any(_alive(pid) for pid in pids), 'the end of all')
+
+
+def _alive(pid: int) -> bool:
+    try:
+        state = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0]
+    except OSError:
+        return False
+    return state not in 'ZX'
+
+
+def test_the_check_command_finds_no_difference(fresh_domain: int) -> None:
+    done = subprocess.run(
+        [sys.executable, '-m', 'antenna_drive', 'lockstep-check', '--duration', '0.5',
+         '--step', '0.004', '--json', '-'], capture_output=True, text=True, timeout=120.0)
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert result['processes'] == 5
+    assert result['max_abs_difference'] == 0.0
+    assert result['samples'] == 126 * 2 * in_process(1, 4e-3).shape[1]
