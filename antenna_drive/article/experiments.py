@@ -21,7 +21,7 @@ T1 and T2 are Section IV (Figs. 8-13), T3a and T3b Section V (Figs. 18-20), T4 S
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import math
 from typing import Any
 
@@ -31,9 +31,17 @@ from antenna_drive.parameters.sets import changed
 # Table 1 gives k_ctfr / 0.73: the filter's gain in the article's Section VI is k' times tau_6.
 TAU_6_OLD = 0.73
 TAU_6_NEW = 0.1125
+# Table 1's k_ctfr, old [1/s]; Fig. 22's captions round it to 3.3 of Section VI's.
+TABLE_1_GAIN = 4.54
+# k_ctfr of Fig. 21 and tau_6 [s] of Fig. 22.
+GAINS = (3.31, 33.14, 48.67, 69.60, 106.03)
+LAGS = (0.73, 0.20, 0.1125, 0.073, 0.050)
 # The square wave of the rate-loop experiments, the saw-tooth of the torque-bias ones.
-SQUARE = {'waveform': 'square', 'amplitude': math.radians(0.013), 'period': 6.3}
-SAW_TOOTH = {'waveform': 'saw_tooth', 'amplitude': math.radians(0.685), 'period': 5.0}
+SQUARE: dict[str, Any] = {'waveform': 'square', 'amplitude': math.radians(0.013), 'period': 6.3}
+SAW_TOOTH: dict[str, Any] = {
+    'waveform': 'saw_tooth', 'amplitude': math.radians(0.685), 'period': 5.0}
+# The rate step that shows how well the rate loop is damped [rad/s].
+RATE_STEP = math.radians(0.1)
 
 
 @dataclass(frozen=True)
@@ -47,6 +55,8 @@ class Experiment:
     duration : [s]
     circuit : set in config/ that lies over the reference
     settings : what else it sets, by dotted name in `Drive`
+    bias_share : torque bias from a fixed source, as a share of the greatest current; None to
+        leave it to the circuit
 
     """
 
@@ -54,23 +64,25 @@ class Experiment:
     duration: float
     circuit: str
     settings: Mapping[str, Any] = field(default_factory=dict)
+    bias_share: float | None = None
 
     def drive(self, *configuration: str) -> Drive:
         """Return the drive of this experiment, on other files than the reference if given."""
-        return changed(load(*configuration, self.circuit), dict(self.settings))
+        return self.applied_to(load(*configuration, self.circuit))
+
+    def applied_to(self, drive: Drive) -> Drive:
+        """Return a drive, which has this experiment's circuit, with all else that it sets."""
+        settings = dict(self.settings)
+        if self.bias_share is not None:
+            settings['torque_share.torque_share.bias_source'] = 'fixed'
+            settings['torque_share.torque_share.fixed_voltage'] = (
+                self.bias_share * drive.motor_1.motor.current_limit
+                * drive.torque_share.filter_1.difference_gain)
+        return changed(drive, settings)
 
 
 def _rate(waveform: Mapping[str, Any]) -> dict[str, Any]:
     return {f'test_signal.rate.{name}': value for name, value in waveform.items()}
-
-
-def _fixed_bias(share: float) -> dict[str, Any]:
-    """Return the settings for a bias voltage from a source, as a share of the greatest."""
-    reference = load()
-    volts = (share * reference.motor_1.motor.current_limit
-             * reference.torque_share.filter_1.difference_gain)
-    return {'torque_share.torque_share.bias_source': 'fixed',
-            'torque_share.torque_share.fixed_voltage': volts}
 
 
 def filter_variant(gain: float, pole: float) -> Experiment:
@@ -87,10 +99,24 @@ def experiments() -> dict[str, Experiment]:
     steady = {'torque_share.torque_share.start': 'steady'}
     pot = 'torque_share.torque_share.bias_pot'
     return {item.name: item for item in (
-        Experiment('T1', 4 * 6.3, 'old_circuit', {**square, **_fixed_bias(0.0)}),
-        Experiment('T2', 4 * 6.3, 'old_circuit', {**square, **_fixed_bias(0.15)}),
+        Experiment('T1', 4 * 6.3, 'old_circuit', square, 0.0),
+        Experiment('T2', 4 * 6.3, 'old_circuit', square, 0.15),
         Experiment('T3a', 20.0, 'old_circuit', {**saw_tooth, **steady, pot: 0.8}),
         Experiment('T3b', 20.0, 'new_circuit', {**saw_tooth, **steady, pot: 0.892}),
         Experiment('T4a', 8.0, 'old_circuit', {pot: 0.7}),
         Experiment('T4e', 8.0, 'new_circuit', {pot: 0.7}),
     )}
+
+
+def filter_variants() -> dict[str, Experiment]:
+    """Return T4b and T4d by name: Filter 1 with the gains of Fig. 21, the lags of Fig. 22."""
+    variants = {f'T4b {gain:g}': filter_variant(gain / TAU_6_OLD, 1.0 / TAU_6_OLD)
+                for gain in GAINS}
+    variants.update({f'T4d {lag:g}': filter_variant(TABLE_1_GAIN, 1.0 / lag) for lag in LAGS})
+    return {name: replace(variant, name=name) for name, variant in variants.items()}
+
+
+def rate_step() -> Experiment:
+    """Return a step of the rate command without bias; not in the article, it shows the damping."""
+    return Experiment('step', 6.0, 'old_circuit', _rate(
+        {'waveform': 'step', 'amplitude': RATE_STEP, 'start_after': 1.0}), 0.0)

@@ -15,6 +15,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from antenna_drive.emulator.unit import FloatArray
@@ -108,3 +109,42 @@ def _half_periods(time: FloatArray, period: float) -> tuple[FloatArray, FloatArr
     half = 0.5 * period
     number = np.floor(time / half + 1e-9)
     return np.where(number % 2 == 0, 1.0, -1.0), time - number * half
+
+
+def _mean(time: FloatArray, value: FloatArray, after: float = 0.0) -> float:
+    """Return the mean over whole periods: from a time on, the very last sample left out."""
+    return float(value[time >= after][:-1].mean())
+
+
+def _largest_rise(values: Sequence[float]) -> float:
+    return float(np.diff(values).max())
+
+
+def falls(values: Sequence[float]) -> float:
+    """Return the greatest step upwards in a row of figures: below zero if it falls strictly."""
+    return _largest_rise(values)
+
+
+def falls_then_rises(values: Sequence[float]) -> float:
+    """Return the greatest step against 'falls, then rises', at the turn that suits it best."""
+    return min(max(_largest_rise(values[:turn + 1]),
+                   _largest_rise([-value for value in values[turn:]]))
+               for turn in range(1, len(values) - 1))
+
+
+# Ways to read one figure off a signal: (time, value, arguments) to a number.
+KINDS: dict[str, Callable[..., float]] = {
+    'plateau': plateau,
+    'deviation': deviation,
+    'mean': _mean,
+    'low': lambda time, value, after=0.0: bias_range(time, value, after).low_V,
+    'high': lambda time, value, after=0.0: bias_range(time, value, after).high_V,
+    'time_at_zero': lambda time, value, after=0.0: bias_range(time, value, after).zero_fraction,
+    'final': lambda time, value, tail_s=1.0: step_response(time, value, tail_s).final,
+    'overshoot': lambda time, value, tail_s=1.0: step_response(time, value, tail_s).overshoot,
+    'settling': lambda time, value, tail_s=1.0: step_response(time, value, tail_s).settling_s,
+}
+TRENDS: dict[str, Callable[[Sequence[float]], float]] = {
+    'falls': falls,
+    'falls then rises': falls_then_rises,
+}

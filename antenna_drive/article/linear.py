@@ -1,0 +1,174 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The drive without what is not linear, as matrices: where the torque bias becomes unstable (T4c).
+
+Written from the equations of docs/model.md, apart from the compiled physics, so that each
+checks the other. No gap (the teeth stay in contact), no limit; static friction either holds the
+rotors or there is none.
+"""
+
+from __future__ import annotations
+
+from antenna_drive.emulator.unit import FloatArray
+from antenna_drive.parameters import Drive
+import numpy as np
+from scipy.linalg import expm
+from scipy.optimize import brentq
+
+# The stability limit is sought between these gains k' of Filter 1 [1/s].
+_GAINS = (1.0, 1e4)
+
+
+def bias_loop(drive: Drive, gain: float, pole: float, *, rotors_held: bool) -> FloatArray:
+    """
+    Return the matrix of the loop through Filter 1, in which the motors move against each other.
+
+    The states are those of motor 2, of which motor 1 is the mirror image: x_F [V], integral and
+    lagged demand of amplifier 1 [article A], current [article A], and with free rotors also rate
+    [rad/s] and angle [rad]. The axis feels nothing of it.
+
+    Parameters
+    ----------
+    drive : parameters
+    gain, pole : k' and p of Filter 1 [1/s]
+    rotors_held : True if static friction holds the rotors
+
+    Returns
+    -------
+    matrix of shape (4, 4) or (6, 6)
+
+    """
+    x_f, integral, demand, current, rate, angle = np.eye(6)
+    motor, amplifier = drive.motor_2, drive.motor_2.amplifier
+    difference_gain = drive.torque_share.filter_1.difference_gain
+    error = amplifier.rate_gain * (amplifier.bias_command_gain * x_f
+                                   - amplifier.tach_gain * rate)
+    matrix = np.array([
+        -pole * x_f - gain * difference_gain * 2.0 * current,
+        error / amplifier.integral_time,
+        (error + integral - demand) / amplifier.lag,
+        _current_slope(drive, demand, current, rate),
+        (motor.motor.torque_constant * current - motor.gearbox.stiffness * angle
+         - motor.gearbox.contact_damping * rate) / motor.motor.rotor_inertia,
+        rate,
+    ])
+    return matrix[:4, :4] if rotors_held else matrix
+
+
+def rate_loop(drive: Drive) -> tuple[FloatArray, FloatArray]:
+    """
+    Return matrix and input of the rate loop, in which both motors move alike; no friction.
+
+    The states are: command voltage [V], integral and lagged demand of amplifier 1 [article A],
+    current [article A], motor rate [rad/s] and angle [rad], then rate and angle of the hub and
+    of each mode of the structure [rad/s], [rad]. The input is the rate command [rad/s].
+
+    Returns
+    -------
+    matrix of shape (n, n), and vector of shape (n,), n = 8 + 2 modes
+
+    """
+    axis, motor, amplifier = drive.plant.axis, drive.motor_2, drive.motor_2.amplifier
+    modes = len(axis.mode_inertias)
+    voltage, integral, demand, current, rate, angle, hub_rate, hub, *rest = np.eye(8 + 2 * modes)
+    error = amplifier.rate_gain * (voltage - amplifier.tach_gain * rate)
+    gear_torque = (motor.gearbox.stiffness * (angle - axis.gear_ratio * hub)
+                   + motor.gearbox.contact_damping * (rate - axis.gear_ratio * hub_rate))
+    on_hub = 2.0 * axis.gear_ratio * gear_torque
+    appendages = []
+    for j in range(modes):
+        mode_rate, mode = rest[2 * j], rest[2 * j + 1]
+        omega = 2.0 * np.pi * axis.mode_frequencies[j]
+        pull = (omega ** 2 * (mode - hub)
+                + 2.0 * axis.mode_damping_ratios[j] * omega * (mode_rate - hub_rate))
+        on_hub = on_hub + axis.mode_inertias[j] * pull
+        appendages += [-pull, mode_rate]
+    command = motor.rate_command
+    matrix = np.array([
+        -voltage / command.tau_1,
+        error / amplifier.integral_time,
+        (error + integral - demand) / amplifier.lag,
+        _current_slope(drive, demand, current, rate),
+        (motor.motor.torque_constant * current - gear_torque) / motor.motor.rotor_inertia,
+        rate,
+        on_hub / axis.inertia_hub,
+        hub_rate,
+        *appendages,
+    ])
+    return matrix, voltage * command.k_s * command.k_1 / command.tau_1
+
+
+def _current_slope(drive: Drive, demand: FloatArray, current: FloatArray, rate: FloatArray,
+                   ) -> FloatArray:
+    armature, gain = drive.motor_2.armature, drive.motor_2.amplifier.current_feedback_gain
+    kappa = armature.physical_amperes_per_article_ampere
+    return np.asarray(((armature.resistance + gain) * (demand - current)
+                       - armature.back_emf_constant / kappa * rate) / armature.inductance)
+
+
+def growth(matrix: FloatArray) -> float:
+    """Return the real part of the eigenvalue furthest to the right [1/s]; above 0 is unstable."""
+    return float(np.linalg.eigvals(matrix).real.max())
+
+
+def stability_limit(drive: Drive, pole: float, *, rotors_held: bool = True) -> float:
+    """
+    Return the gain k' of Filter 1 above which the torque bias is unstable [1/s].
+
+    Parameters
+    ----------
+    drive : parameters
+    pole : p of Filter 1 [1/s]
+    rotors_held : True if static friction holds the rotors
+
+    Returns
+    -------
+    gain [1/s]; NaN if the loop is unstable at once, or nowhere
+
+    """
+    def rightmost(gain: float) -> float:
+        return growth(bias_loop(drive, gain, pole, rotors_held=rotors_held))
+
+    if rightmost(_GAINS[0]) > 0.0 or rightmost(_GAINS[1]) < 0.0:
+        return float('nan')
+    return float(brentq(rightmost, *_GAINS, rtol=1e-10))
+
+
+def step_response(drive: Drive, time: FloatArray) -> FloatArray:
+    """
+    Return the motor rate after a step of the rate command, as a share of what is commanded [1].
+
+    Parameters
+    ----------
+    drive : parameters
+    time : evenly spaced from 0 [s], shape (n,)
+
+    Returns
+    -------
+    array of shape (n,)
+
+    """
+    matrix, gain = rate_loop(drive)
+    size = gain.size
+    extended = np.zeros((size + 1, size + 1))
+    extended[:size, :size] = matrix
+    extended[:size, size] = gain
+    advance = expm(extended * (time[1] - time[0]))
+    state = np.append(np.zeros(size), 1.0)
+    rates = np.empty(time.size)
+    for k in range(time.size):
+        rates[k] = state[4]
+        state = advance @ state
+    return rates / drive.plant.axis.gear_ratio

@@ -1,0 +1,261 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Figures read off runs, by name: what the article publishes, and what a calibration aims at.
+
+A `Reading` takes one experiment, a sum of its signals with weights, and a way to read it. A
+`Trend` looks at several figures in a row. A `ModelFigure` needs no run. `Results` runs each
+experiment once, however many figures are read off it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+import math
+from typing import Any, Protocol
+
+from antenna_drive.article import readings
+from antenna_drive.article.experiments import (
+    Experiment, experiments, filter_variants, GAINS, LAGS, rate_step, SAW_TOOTH, SQUARE,
+    TAU_6_NEW, TAU_6_OLD,
+)
+from antenna_drive.article.linear import stability_limit
+from antenna_drive.article.stability import simulated_limit
+from antenna_drive.emulator.run import MACRO_STEP, Run, simulate
+from antenna_drive.emulator.unit import FloatArray
+from antenna_drive.parameters import Drive, load
+import numpy as np
+
+# The circuits in config/, of the article's Table 1.
+OLD_CIRCUIT, NEW_CIRCUIT = 'old_circuit', 'new_circuit'
+# Windows after each reversal of the square wave [s]: on the plateau, and from the first swings on.
+PLATEAU = (1.5, 3.0)
+CALM = (0.25, 2.0)
+
+
+class Results:
+    """
+    What the experiments give for one parameter set: each is run when it is first asked for.
+
+    Parameters
+    ----------
+    drives : the drive with each circuit, by the circuit's name in config/
+    known : the experiments, by name
+    run : runs an experiment on its drive; the emulator in one process, unless said otherwise
+
+    """
+
+    def __init__(self, drives: Mapping[str, Drive],
+                 known: Mapping[str, Experiment] | None = None,
+                 run: Callable[[Experiment, Drive], Run] | None = None) -> None:
+        """Take the parameters; run nothing yet."""
+        self.drives = drives
+        self._known = known or article_experiments()
+        self._simulate = run or _in_one_process
+        self._runs: dict[str, Run] = {}
+
+    def experiment(self, name: str) -> Experiment:
+        """Return an experiment; KeyError if there is none of that name."""
+        return self._known[name]
+
+    def run(self, name: str) -> Run:
+        """Return the run of an experiment; KeyError if there is none of that name."""
+        if name not in self._runs:
+            experiment = self._known[name]
+            drive = experiment.applied_to(self.drives[experiment.circuit])
+            self._runs[name] = self._simulate(experiment, drive)
+        return self._runs[name]
+
+
+def _in_one_process(experiment: Experiment, drive: Drive) -> Run:
+    return simulate(drive, experiment.duration, MACRO_STEP)
+
+
+def with_circuits(*configuration: str, circuits: Iterable[str] = (OLD_CIRCUIT, NEW_CIRCUIT),
+                  ) -> dict[str, Drive]:
+    """Return the drive of a configuration with each circuit of config/, by name."""
+    return {circuit: load(*configuration, circuit) for circuit in circuits}
+
+
+def article_experiments() -> dict[str, Experiment]:
+    """Return every experiment that a figure of the article is read off, by name."""
+    step = rate_step()
+    return {**experiments(), **filter_variants(), step.name: step}
+
+
+class Measure(Protocol):
+    """A figure: its name, its unit, and how it is found."""
+
+    @property
+    def name(self) -> str:
+        """Return its name, as 'T4a.overshoot'."""
+
+    @property
+    def unit(self) -> str:
+        """Return its unit."""
+
+    def value(self, results: Results) -> float:
+        """Return the figure that a parameter set gives."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """
+    A figure read off the run of one experiment.
+
+    Attributes
+    ----------
+    name, unit : for people
+    experiment : the run to read
+    kind : how to read it, a key of `readings.KINDS`
+    signal : weight of each signal in the sum that is read
+    arguments : of that way to read
+    compared_with : another experiment; the figure is then its change from there, as a share [1]
+    scale : the figure is multiplied by it
+
+    """
+
+    name: str
+    unit: str
+    experiment: str
+    kind: str
+    signal: Mapping[str, float]
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    compared_with: str | None = None
+    scale: float = 1.0
+
+    def value(self, results: Results) -> float:
+        """Return the figure that a parameter set gives."""
+        value = self._read(results.run(self.experiment))
+        if self.compared_with is not None:
+            value = value / self._read(results.run(self.compared_with)) - 1.0
+        return self.scale * value
+
+    def _read(self, run: Run) -> float:
+        return readings.KINDS[self.kind](run.time, weighted(run, self.signal), **self.arguments)
+
+
+def weighted(run: Run, signal: Mapping[str, float]) -> FloatArray:
+    """Return a sum of signals of a run, each times its weight, shape (n,)."""
+    return np.asarray(sum(weight * run[name] for name, weight in signal.items()), np.float64)
+
+
+@dataclass(frozen=True)
+class Trend:
+    """
+    How far figures in a row are from a trend; below zero the trend holds strictly.
+
+    Attributes
+    ----------
+    name, unit : for people
+    of : the figures in their order
+    kind : 'falls', or 'falls then rises'
+
+    """
+
+    name: str
+    unit: str
+    of: tuple[Measure, ...]
+    kind: str
+
+    def value(self, results: Results) -> float:
+        """Return the greatest step against the trend, below zero if there is none."""
+        return readings.TRENDS[self.kind]([figure.value(results) for figure in self.of])
+
+
+@dataclass(frozen=True)
+class ModelFigure:
+    """
+    A figure that is not read off one of the experiments' runs.
+
+    Attributes
+    ----------
+    name, unit : for people
+    of : gives the figure of a drive
+    circuit : name of the circuit that the drive has
+
+    """
+
+    name: str
+    unit: str
+    of: Callable[[Drive], float]
+    circuit: str = OLD_CIRCUIT
+
+    def value(self, results: Results) -> float:
+        """Return the figure that a parameter set gives."""
+        return self.of(results.drives[self.circuit])
+
+
+def article_measures(drive: Drive) -> dict[str, Measure]:
+    """
+    Return every figure that the article publishes and a run or the model can give, by name.
+
+    Parameters
+    ----------
+    drive : for the gear ratio and the greatest current, which figures are shares of
+
+    """
+    ratio, most = drive.plant.axis.gear_ratio, drive.motor_1.motor.current_limit
+    degrees = 180.0 / math.pi
+    square = {'period': SQUARE['period']}
+    whole_periods = {'after': SQUARE['period']}
+    plateau = {**square, 'window': PLATEAU}
+    calm = {**square, 'window': CALM}
+    tachs = {'motor_1/tach_rate': 0.5, 'motor_2/tach_rate': 0.5}
+    bias = {'motor_2/current': 100.0 / most, 'motor_1/current': -100.0 / most}
+    voltage = {'torque_share/bias_voltage': 1.0}
+    figures: list[Measure] = [
+        Reading('T1.tach_rate', 'deg/s', 'T1', 'plateau',
+                {name: degrees * weight for name, weight in tachs.items()}, plateau),
+        *(Reading(f'T1.current_{m}', 'A', 'T1', 'plateau', {f'motor_{m}/current': 1.0}, plateau)
+          for m in (1, 2)),
+        Reading('T2a.bias', 'percent', 'T2', 'mean', bias, whole_periods),
+        *(Reading(f'T2a.current_{m}', 'A', 'T2', 'mean', {f'motor_{m}/current': 1.0},
+                  whole_periods) for m in (1, 2)),
+        Reading('T2b.tach', 'percent', 'T2', 'deviation',
+                {**tachs, 'test_signal/rate_command': -ratio}, calm, 'T1', 100.0),
+        Reading('T2b.encoder', 'percent', 'T2', 'deviation',
+                {'plant/axis_rate': 1.0, 'test_signal/rate_command': -1.0}, calm, 'T1', 100.0),
+        Reading('step.overshoot', 'percent', 'step', 'overshoot', tachs, {}, None, 100.0),
+    ]
+    greatest = drive.torque_share.torque_share.saturation_high
+    for name in ('T3a', 'T3b'):
+        figures += [Reading(f'{name}.{quantity}', unit, name, quantity.removesuffix('_share'),
+                            voltage, {'after': SAW_TOOTH['period']}, None, scale)
+                    for quantity, unit, scale in (
+                        ('low', 'V', 1.0), ('low_share', 'percent', 100.0 / greatest),
+                        ('high', 'V', 1.0), ('high_share', 'percent', 100.0 / greatest),
+                        ('time_at_zero', 'percent', 100.0))]
+    for name in ('T4a', 'T4e', *filter_variants()):
+        figures += [
+            Reading(f'{name}.final', 'percent', name, 'final', bias),
+            Reading(f'{name}.overshoot', 'percent', name, 'overshoot', bias, {}, None, 100.0),
+            Reading(f'{name}.settling', 's', name, 'settling', bias)]
+    by_name = {figure.name: figure for figure in figures}
+    for row, numbers, kinds in (('T4b', GAINS, ('falls', 'falls')),
+                                ('T4d', LAGS, ('falls', 'falls then rises'))):
+        for kind, (quantity, unit) in zip(kinds, (('overshoot', 'percent'), ('settling', 's'))):
+            name = f'{row}.{quantity}_trend'
+            by_name[name] = Trend(name, unit, tuple(
+                by_name[f'{row} {number:g}.{quantity}'] for number in numbers), kind)
+    for name, pole, held in (('T4c.limit', 1.0 / TAU_6_OLD, True),
+                             ('T4c.limit_rotors_free', 1.0 / TAU_6_OLD, False),
+                             ('literal.limit', 1.0 / TAU_6_NEW, True)):
+        by_name[name] = ModelFigure(name, '1/s', partial(stability_limit, pole=pole,
+                                                         rotors_held=held))
+    for name, pole in (('T4c.simulated', 1.0 / TAU_6_OLD), ('literal.simulated', 1.0 / TAU_6_NEW)):
+        by_name[name] = ModelFigure(name, '1/s', partial(simulated_limit, pole=pole))
+    return by_name

@@ -1,0 +1,82 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The comparison with the article, row by row."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+from antenna_drive.article.measures import article_measures, Measure, OLD_CIRCUIT, Results
+from antenna_drive.article.profile_measures import loaded_axis_measures, profile_measures
+from antenna_drive.article.published import CLAIMS
+
+
+@dataclass(frozen=True)
+class Row:
+    """
+    One published figure beside what the model gives.
+
+    Attributes
+    ----------
+    id : 'T4a.overshoot'
+    published : the figure, or what is said; by origin where the article gives field and analysis
+    obtained : what the model gives
+    tolerance : how far from the published figure (the analysis', if there are two) still passes
+    unit : of all three
+    passed : whether it does
+    note : where it is in the article, and how it is read off
+
+    """
+
+    id: str  # noqa: A003
+    published: float | str | Mapping[str, float]
+    obtained: float
+    tolerance: float
+    unit: str
+    passed: bool
+    note: str
+
+
+def all_measures(results: Results) -> dict[str, Measure]:
+    """Return every figure that a row can be about, by name."""
+    return {**article_measures(results.drives[OLD_CIRCUIT]), **profile_measures(),
+            **loaded_axis_measures()}
+
+
+def rows(results: Results, experiments: Iterable[str] = (),
+         progress: Callable[[int, int], None] | None = None) -> list[Row]:
+    """
+    Compare every claim of the article with what a parameter set gives.
+
+    Parameters
+    ----------
+    results : of the parameter set
+    experiments : only rows of these, 'T3a'; all if there are none
+    progress : told how many rows are done, of how many
+
+    """
+    wanted = tuple(experiments)
+    claims = [claim for claim in CLAIMS
+              if not wanted or claim.measure.partition('.')[0] in wanted]
+    measures = all_measures(results)
+    found = []
+    for done, claim in enumerate(claims):
+        if progress:
+            progress(done, len(claims))
+        measure = measures[claim.measure]
+        obtained = measure.value(results)
+        found.append(Row(claim.measure, claim.says, obtained, claim.tolerance, measure.unit,
+                         claim.holds(obtained), claim.note))
+    return found

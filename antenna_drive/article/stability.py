@@ -1,0 +1,105 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Where the torque bias becomes unstable, by simulation: the sign of a small disturbance's growth.
+
+The amplitude of what follows is no measure: friction and limits bound it. `linear` gives the same
+limit from eigenvalues.
+"""
+
+from __future__ import annotations
+
+from antenna_drive.article.experiments import filter_variant
+from antenna_drive.article.linear import stability_limit
+from antenna_drive.emulator.run import Emulator, MACRO_STEP
+from antenna_drive.emulator.unit import FloatArray
+from antenna_drive.parameters import Drive
+import numpy as np
+
+# A gain k' [1/s] at which the bias settles, on its way to the state that is then disturbed.
+_SETTLING_GAIN = 45.4
+# The disturbance [V], so small that static friction keeps on holding the rotors.
+_DISTURBANCE = 1e-3
+# The limit is sought this share to either side of the linear one, and to this width [1/s]. Far
+# beyond the limit the disturbance is grown up before it is watched.
+_SHARE = 0.1
+_GAIN_WIDTH = 0.05
+
+
+def growth_rate(drive: Drive, gain: float, pole: float, step_s: float = MACRO_STEP,
+                settled_s: float = 12.0, watched_s: float = 6.0) -> float:
+    """
+    Return how fast a small disturbance of the steady torque bias grows [1/s].
+
+    Parameters
+    ----------
+    drive : with the old circuit
+    gain, pole : k' and p of Filter 1 [1/s]
+    step_s : macro-step [s]
+    settled_s : time given to the loop, at a gain that is stable, to become steady [s]
+    watched_s : time over which the disturbance is watched [s]
+
+    """
+    emulator = Emulator(filter_variant(_SETTLING_GAIN, pole).applied_to(drive), step_s)
+    emulator.advance(round(settled_s / step_s))
+    # the voltage at which the present state would be steady at the new gain
+    difference_gain = drive.torque_share.filter_1.difference_gain
+    counter_torque = emulator.now[emulator.names.index('torque_share/counter_torque'), 0]
+    steady = (difference_gain * _difference(emulator, emulator.now[np.newaxis])[0]
+              + pole * counter_torque / gain)
+    emulator.tune({'torque_share': {'filter_1.gain': gain, 'bias_source': 'fixed',
+                                    'fixed_voltage': float(steady + _DISTURBANCE)}})
+    _, samples = emulator.advance(round(watched_s / step_s))
+    difference = _difference(emulator, samples)
+    swing = difference - difference.mean()
+    # the swing in the second and in the last third, once the quick transients are gone
+    third = swing.size // 3
+    middle, last = swing[third:2 * third], swing[2 * third:]
+    if last.std() == 0.0:
+        return float('-inf')
+    return float(np.log(last.std() / middle.std()) / (third * step_s))
+
+
+def _difference(emulator: Emulator, samples: FloatArray) -> FloatArray:
+    """Return i_2 - i_1 [article A], shape (n,), of samples of shape (n, signals, 2)."""
+    first, second = (emulator.names.index(f'motor_{m}/current') for m in (1, 2))
+    return np.asarray(samples[:, second, 0] - samples[:, first, 0], np.float64)
+
+
+def simulated_limit(drive: Drive, pole: float, step_s: float = MACRO_STEP) -> float:
+    """
+    Return the gain k' of Filter 1 above which a small disturbance grows [1/s].
+
+    Parameters
+    ----------
+    drive : with the old circuit
+    pole : p of Filter 1 [1/s]
+    step_s : macro-step [s]
+
+    Returns
+    -------
+    gain [1/s]; NaN if it is not within a tenth of the linear one
+
+    """
+    linear = stability_limit(drive, pole)
+    low, high = (1.0 - _SHARE) * linear, (1.0 + _SHARE) * linear
+    if not growth_rate(drive, low, pole, step_s) < 0.0 < growth_rate(drive, high, pole, step_s):
+        return float('nan')
+    while high - low > _GAIN_WIDTH:
+        gain = 0.5 * (low + high)
+        if growth_rate(drive, gain, pole, step_s) > 0.0:
+            high = gain
+        else:
+            low = gain
+    return 0.5 * (low + high)

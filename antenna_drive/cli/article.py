@@ -1,0 +1,94 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Repeat the article's experiments and put every published figure beside what the model gives.
+
+  antenna-drive article                        the rows, for people
+  antenna-drive article --json -               rows and contradictions, for programs
+  antenna-drive article --figures figures      the figures, drawn anew from runs
+  antenna-drive article --config reference     the same for another parameter set
+
+A row passes if the obtained figure is within the tolerance of the published one; where the
+article gives a figure of the field and one of its analysis, of the analysis'. Currents are
+in the article's amperes. The exit code is 1 if a row does not pass.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict
+from pathlib import Path
+import sys
+
+from antenna_drive import cli
+from antenna_drive.article.contradictions import Contradiction, contradictions
+from antenna_drive.article.measures import Results, with_circuits
+from antenna_drive.article.rows import Row, rows
+from antenna_drive.cli.output import add_json_option, Progress, STANDARD_OUTPUT, write_json
+
+# The parameter set that the article is compared with unless another is asked for.
+CONFIGURATION = 'reference'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    add_json_option(parser)
+    parser.add_argument('--figures', metavar='DIR', type=Path,
+                        help='draw the figures into DIR, one file each and figures.html')
+    parser.add_argument('--config', metavar='SET', nargs='+', default=[CONFIGURATION],
+                        help='parameter set: a name in config/ or a file; further ones lie over '
+                             'the first (default: %(default)s)')
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Do what the arguments say; return the exit code."""
+    results = Results(with_circuits(*arguments.config))
+    with Progress('experiments', 1.0) as shown:
+        found = rows(results, progress=lambda done, total: shown.update(done / total))
+    disagreements = contradictions(results)
+    if arguments.figures is not None:
+        from antenna_drive.article.figures import draw_all
+        draw_all(results, arguments.figures)
+    if arguments.json is not None:
+        write_json({'configuration': list(arguments.config),
+                    'rows': [asdict(row) for row in found],
+                    'contradictions': [asdict(entry) for entry in disagreements]},
+                   arguments.json)
+    if arguments.json != STANDARD_OUTPUT:
+        _write(found, disagreements)
+    return cli.OK if all(row.passed for row in found) else cli.NEGATIVE
+
+
+def _write(found: list[Row], disagreements: list[Contradiction]) -> None:
+    lines = [_LINE.format('', 'row', 'obtained', 'published', 'tolerance', 'unit')]
+    lines += [_LINE.format('' if row.passed else 'FAILS', row.id, f'{row.obtained:.4g}',
+                           _published(row), f'{row.tolerance:.3g}' if row.tolerance else '',
+                           row.unit) for row in found]
+    lines.append(f'\n{sum(row.passed for row in found)} of {len(found)} rows pass\n')
+    for entry in disagreements:
+        lines.append(f'{entry.id}: {entry.passages}')
+        lines += [f'  {"fits" if item.fits else "    "}  {item.reading}: '
+                  + ', '.join(f'{name} {value:.4g}' for name, value in item.gives.items())
+                  for item in entry.readings]
+        lines.append(f'  {entry.conclusion}\n')
+    sys.stdout.write('\n'.join(lines) + '\n')
+
+
+_LINE = '{:<6}{:<22}{:>10}  {:<32}{:>10}  {}'
+
+
+def _published(row: Row) -> str:
+    if isinstance(row.published, (str, float)):
+        return str(row.published)
+    return ', '.join(f'{value:g} ({origin})' for origin, value in row.published.items())
