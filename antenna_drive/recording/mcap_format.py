@@ -200,9 +200,18 @@ class BagWriter:
             the time is negative; what was written before stays readable
 
         """
-        for i, value in enumerate(values):
-            if not math.isnan(value):
-                self.add(i, step, time_ns, value)
+        if not 0 <= time_ns < 2**63 or any(map(math.isinf, values)):
+            for i, value in enumerate(values):
+                self._check(i, time_ns, value)
+        pack, sequence = _CDR_FLOAT64.pack, step & 0xFFFFFFFF
+        with self._guarded() as writer:
+            for i, value in enumerate(values):
+                if value == value:
+                    writer.add_message(self._topics[i], time_ns, pack(_CDR_HEADER, value),
+                                       time_ns, sequence)
+                    self._counts[i] += 1
+        self._first_ns = min(time_ns, self._first_ns)
+        self._last_ns = max(time_ns, self._last_ns)
         if (time_ns - self._flushed_ns >= self._flush_ns
                 or self._clock() - self._flushed_at >= self._flush_s):
             self.flush()
@@ -216,10 +225,7 @@ class BagWriter:
         RecordingError : see `write`
 
         """
-        if math.isinf(value) or not 0 <= time_ns < 2**63:
-            name = list(self._signals)[signal]
-            raise RecordingError(f'{name}: {value} at {time_ns} ns cannot be recorded; allowed '
-                                 'are finite numbers and times that are not negative')
+        self._check(signal, time_ns, value)
         with self._guarded() as writer:
             writer.add_message(self._topics[signal], time_ns,
                                _CDR_FLOAT64.pack(_CDR_HEADER, value), time_ns, step & 0xFFFFFFFF)
@@ -228,6 +234,28 @@ class BagWriter:
             self._first_ns = time_ns
         if time_ns > self._last_ns:
             self._last_ns = time_ns
+
+    def _check(self, signal: int, time_ns: int, value: float) -> None:
+        if math.isinf(value) or not 0 <= time_ns < 2**63:
+            name = list(self._signals)[signal]
+            raise RecordingError(f'{name}: {value} at {time_ns} ns cannot be recorded; allowed '
+                                 'are finite numbers and times that are not negative')
+
+    def know(self, configuration: Mapping[str, Any]) -> None:
+        """
+        Write down the configuration, in the place of what was known of it before.
+
+        Raises
+        ------
+        RecordingError : the file cannot be written, or it is no plain data
+
+        """
+        try:
+            text = to_json(freeze(dict(configuration)))
+        except PlainDataError as error:
+            raise RecordingError(str(error)) from None
+        with self._guarded() as writer:
+            writer.add_attachment(0, 0, CONFIGURATION, 'application/json', text.encode())
 
     def change(self, step: int, unit: str, values: Mapping[str, Any]) -> None:
         """

@@ -1,0 +1,150 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Start a drive in its five processes and record it: every signal at every macro-step.
+
+The drive waits for the recorder, so nothing is lost at any pace. The bag holds the configuration
+in force too. Without --config it is the reference set at rest; give the test signal a waveform:
+
+  antenna-drive record --duration 20 --out run --config old_circuit
+      --set test_signal.waveform=saw_tooth test_signal.amplitude=0.01196 test_signal.period=5
+
+To record a drive that runs already: ros2 run antenna_drive recorder --ros-args -p out:=run
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+import time
+from typing import Any
+
+from antenna_drive.cli.output import Progress
+from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL, UNITS
+from antenna_drive.errors import UserError
+from antenna_drive.recording.recorder import RunRecorder
+from antenna_drive.recording.sheet import load_sheet
+import yaml
+
+_NAME = 'recorder'
+_PATIENCE_S = 60.0  # until the drive begins, and from step to step
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command understands."""
+    parser.add_argument('--duration', type=_positive, required=True, metavar='S',
+                        help='simulated time to record [s]')
+    parser.add_argument('--out', type=Path, required=True, metavar='BAG',
+                        help='the folder to write; it must not be there yet')
+    parser.add_argument('--config', nargs='+', default=(), metavar='FILE',
+                        help='configuration files or names of sets in config/, later over earlier')
+    parser.add_argument('--set', nargs='+', default=(), metavar='UNIT.NAME=VALUE', dest='settings',
+                        help='parameters of single nodes, such as torque_share.bias_pot=0.8')
+    parser.add_argument('--sheet', type=Path, metavar='FILE', help='a test sheet for the bag')
+    parser.add_argument('--step', type=_positive, default=0.001, metavar='S',
+                        help='macro-step [s]; 0.001 if not given')
+    parser.add_argument('--pace', type=float, default=0.0, metavar='K',
+                        help='times real time; 0, as fast as possible, if not given')
+    parser.add_argument('--quiet', action='store_true', help='show no progress')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Start, record, end."""
+    parameters = _parameters(args.settings)
+    recorder = RunRecorder(
+        args.out, {f'{unit}/{s.name}': s.unit for unit, own in OUTPUTS.items() for s in own},
+        load_sheet(args.sheet) if args.sheet else None, recorded_by=_NAME)
+    from antenna_drive.lockstep.observer import Observer
+    from antenna_drive.lockstep.processes import DriveProcesses
+    last = round(args.duration / args.step)
+    parameters.setdefault(TEST_SIGNAL, {}).update({
+        'run.step': args.step, 'run.pace': args.pace, 'run.duration': last * args.step,
+        'run.observers': [_NAME]})
+    watch = _Watch(recorder, last)
+    try:
+        with Observer(_NAME, watch.step, on_begin=watch.begin,
+                      on_change=recorder.told) as observer:
+            with DriveProcesses(parameters, config=args.config) as processes:
+                with Progress('recording', last, quiet=args.quiet) as progress:
+                    observer.spin(lambda: watch.complete(processes, observer, progress))
+    finally:
+        recorder.close()
+    print(f'{recorder.steps} steps, {last * args.step:g} s: {recorder.path}')
+    return 0
+
+
+class _Watch:
+    """What has been recorded, and whether the drive still goes on."""
+
+    def __init__(self, recorder: RunRecorder, last: int) -> None:
+        self._recorder = recorder
+        self._last = last
+        self._done = -1
+        self._seen = -1
+        self._next_look = 0.0
+        self._deadline = time.monotonic() + _PATIENCE_S
+
+    def begin(self, run_id: int, step_s: float) -> None:
+        """Begin a bag."""
+        self._recorder.begin(run_id, step_s)
+
+    def step(self, number: int, time_s: float, samples: Any) -> None:
+        """Write a step."""
+        if number <= self._last:
+            self._recorder.step(number, samples[:, 0].tolist())
+            self._done = number
+
+    def complete(self, processes: Any, observer: Any, progress: Progress) -> bool:
+        """Tell whether everything is recorded; UserError if it will never be."""
+        now = time.monotonic()
+        if now < self._next_look and self._done < self._last:
+            return False
+        self._next_look = now + 0.1
+        progress.update(max(0, self._done))
+        if self._done >= self._last:
+            self._recorder.idle()
+            # what is in force comes by another way than the steps
+            return self._recorder.knows_configuration or now > self._deadline
+        processes.check()
+        if self._done != self._seen:
+            self._seen, self._deadline = self._done, now + _PATIENCE_S
+        if now > self._deadline:
+            raise UserError(f'the drive does not go on at step {self._done + 1}: waiting for '
+                            f'{", ".join(observer.missing)}')
+        return False
+
+
+def _parameters(settings: tuple[str, ...]) -> dict[str, dict[str, Any]]:
+    parameters: dict[str, dict[str, Any]] = {}
+    for item in settings:
+        name, equals, text = item.partition('=')
+        unit, _, key = name.partition('.')
+        if not equals or not key or unit not in UNITS:
+            raise UserError(f'--set {item}: allowed is UNIT.NAME=VALUE, with a unit of '
+                            f'{", ".join(UNITS)}')
+        try:
+            value = yaml.safe_load(text)
+        except yaml.YAMLError:
+            value = text
+        # ROS 2 tells whole numbers from others, the drive's parameters are nearly all others
+        whole = isinstance(value, int) and not isinstance(value, bool)
+        parameters.setdefault(unit, {})[key] = float(value) if whole else value
+    return parameters
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value <= 1e9:
+        raise argparse.ArgumentTypeError(f'{text} given, allowed is a number above 0')
+    return value

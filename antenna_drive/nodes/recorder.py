@@ -1,0 +1,65 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Records a running drive to a bag: every lock-step sample of every signal, nothing lost.
+
+It may come and go while the drive runs, and the drive does not wait for it: enough at real-time
+pace. At full speed, start test_signal with `-p run.observers:=[recorder]`: then no step is made
+before the recorder has the last.
+
+  ros2 run antenna_drive recorder --ros-args -p out:=my_run -p sheet:=my_sheet.yaml
+
+out    folder to write, not there yet; recording_DATE_TIME if not given. A drive that begins a
+       new run gets a new folder, my_run_run_2 and so on.
+sheet  a test sheet, which goes into the bag.
+
+Ctrl-C completes the bag. A recorder that is killed loses the last half second at most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import sys
+
+from antenna_drive.errors import UserError
+
+OK, FAILED, BAD_INPUT, NOT_INSTALLED = 0, 1, 2, 3
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node; return its exit code."""
+    arguments = list(sys.argv[1:] if args is None else args)
+    if '-h' in arguments or '--help' in arguments:
+        print(__doc__.strip())
+        return OK
+    try:
+        from antenna_drive.nodes.recorder_node import run
+        return run(arguments)
+    except UserError as error:
+        return _say(str(error), BAD_INPUT)
+    except ModuleNotFoundError as error:
+        from antenna_drive.cli import REMEDIES
+        missing = (error.name or '').partition('.')[0]
+        if missing not in REMEDIES:
+            raise
+        return _say(f'needs {missing}: {REMEDIES[missing]}', NOT_INSTALLED)
+
+
+def _say(message: str, status: int) -> int:
+    print(f'recorder: {" ".join(message.split())}', file=sys.stderr)
+    return status
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,199 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The recorder on ROS 2: frames and changes in, bags out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+import json
+import os
+from pathlib import Path
+import signal
+from threading import Thread
+import time
+from types import FrameType
+from typing import Any
+
+from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
+from antenna_drive.errors import UserError
+from antenna_drive.lockstep.entry import choose_transport
+from antenna_drive.lockstep.frame import FrameLayout
+from antenna_drive.lockstep.readings import CHANGES_QOS
+from antenna_drive.lockstep.ros_link import FrameLink
+from antenna_drive.recording.following import Follower, Step
+from antenna_drive.recording.recorder import RunRecorder
+from antenna_drive.recording.recording import RecordingError
+from antenna_drive.recording.sheet import load_sheet
+import numpy as np
+import rclpy
+from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+from std_msgs.msg import String
+
+NAME = 'recorder'
+OK, FAILED = 0, 1
+# No wait is longer than this [s]; then what was written is made safe.
+_LONGEST_WAIT_S = 0.25
+# How long a new run may take to tell its configuration before its absence is told [s].
+_PATIENCE_S = 5.0
+
+
+def run(arguments: Sequence[str]) -> int:
+    """
+    Record until SIGINT or SIGTERM.
+
+    Parameters
+    ----------
+    arguments : command line without the program's name
+
+    Returns
+    -------
+    0 if everything was recorded, 1 if a bag could not be written or steps were lost
+
+    Raises
+    ------
+    UserError : wrong arguments, an existing target, a wrong test sheet
+
+    """
+    choose_transport(os.environ)
+    left = remove_ros_args([NAME, *arguments])[1:]
+    if left:
+        raise UserError(f'{left[0]}: no such option; ROS 2 arguments follow --ros-args, as in '
+                        '--ros-args -p out:=my_run')
+    try:
+        rclpy.init(args=[NAME, *arguments], signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:
+        raise UserError(str(error).splitlines()[0]) from error
+    node = Node(NAME)
+    try:
+        return _RecorderNode(node).spin()
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+class _RecorderNode:
+    """Follows the drive's frames and hands its steps to a RunRecorder."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._log = node.get_logger()
+        default = f'recording_{datetime.now():%Y-%m-%d_%H-%M-%S}'
+        out = str(node.declare_parameter('out', default).value)
+        sheet = str(node.declare_parameter('sheet', '').value or '')
+        self._recorder = RunRecorder(
+            out, {f'{unit}/{s.name}': s.unit for unit, own in OUTPUTS.items() for s in own},
+            load_sheet(Path(sheet)) if sheet else None, recorded_by=NAME)
+        layouts = {unit: FrameLayout(signals) for unit, signals in OUTPUTS.items()}
+        self._follower = Follower({u: layout.length for u, layout in layouts.items()}, TEST_SIGNAL)
+        self._own = FrameLayout(())
+        self._link = FrameLink(node, layouts)
+        self._run = 0
+        self._failed = False
+        self._stop = False
+        self._told_lost = 0
+        self._ask_by = float('inf')
+        for unit in OUTPUTS:
+            node.create_subscription(String, f'{unit}/changes', self._listener(unit), CHANGES_QOS)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._end)
+
+    def _listener(self, unit: str) -> Any:
+        def listen(message: String) -> None:
+            try:
+                record = json.loads(message.data)
+            except ValueError:
+                return
+            if isinstance(record, dict):
+                self._recorder.told(unit, record)
+        return listen
+
+    def _end(self, number: int, frame: FrameType | None) -> None:
+        self._stop = True
+
+    def spin(self) -> int:
+        """Record until told to stop; return the exit code."""
+        executor = SingleThreadedExecutor()
+        executor.add_node(self._node)
+        listening = Thread(target=_serve, args=(executor,), daemon=True)
+        listening.start()
+        peers = tuple(OUTPUTS)
+        self._link.publish(self._own.hello(float(time.time_ns() // 1000)))
+        try:
+            while not self._stop:
+                came = self._link.wait(peers, _LONGEST_WAIT_S)
+                for peer in came:
+                    while (frame := self._link.take(peer)) is not None:
+                        self._follower.receive(peer, frame)
+                for step in self._follower.steps():
+                    self._take(step)
+                if not came:
+                    self._guarded(self._recorder.idle)
+                self._look()
+            self._guarded(self._recorder.close)
+        finally:
+            executor.shutdown(timeout_sec=0.5)
+            listening.join(0.5)
+        if self._recorder.steps and not self._failed:
+            self._log.info(f'{self._recorder.steps} steps recorded to {self._recorder.path}')
+        return FAILED if self._failed or self._told_lost else OK
+
+    def _take(self, step: Step) -> None:
+        if step.run != self._run:
+            self._run = step.run
+            self._failed = False
+            self._ask_by = time.monotonic() + _PATIENCE_S
+            if self._guarded(self._recorder.begin, step.run, step.step_s):
+                self._log.info(f'run {step.run}: recording from step {step.number} on to '
+                               f'{self._recorder.path}')
+            self._publish(step, step.number)
+        if not self._failed:
+            self._guarded(self._recorder.step, step.number, step.values)
+        # a drive that waits for us goes on even if the disk is full
+        self._publish(step, step.number + 1)
+
+    def _publish(self, step: Step, number: int) -> None:
+        self._link.publish(self._own.encode(step.run, number, step.step_s, np.zeros((0, 2))))
+
+    def _guarded(self, write: Any, *arguments: Any) -> bool:
+        if self._failed:
+            return False
+        try:
+            write(*arguments)
+        except RecordingError as error:
+            self._failed = True
+            self._log.error(f'{error}; the drive goes on without being recorded')
+            return False
+        return True
+
+    def _look(self) -> None:
+        lost = self._follower.lost
+        if lost > self._told_lost:
+            self._log.error(f'{lost} steps lost: the recorder or the machine is too slow; '
+                            '-p run.observers:=[recorder] on test_signal makes the drive wait')
+        self._told_lost = lost
+        if time.monotonic() > self._ask_by:
+            self._ask_by = float('inf')
+            if not self._recorder.knows_configuration:
+                self._log.warning('not every node tells its parameters: the bag lacks them')
+
+
+def _serve(executor: SingleThreadedExecutor) -> None:
+    try:
+        executor.spin()
+    except (ExternalShutdownException, ShutdownException):
+        pass

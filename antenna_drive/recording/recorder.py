@@ -1,0 +1,176 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Writes the runs of a drive to bags while it runs, one bag for each run.
+
+Whoever listens to the drive calls `begin`, `step` and `idle` from one thread; `told`, what the
+nodes say of their parameters, may come from another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from antenna_drive.recording.atomic import refuse_existing
+from antenna_drive.recording.mcap_format import BagWriter
+from antenna_drive.recording.recording import nanoseconds
+from antenna_drive.recording.runs import STEP
+from antenna_drive.recording.sheet import TestSheet
+
+
+class RunRecorder:
+    """
+    Records a drive: every step of every signal, the configuration in force, live changes.
+
+    Attributes
+    ----------
+    path : folder of the run in progress, or of the first
+    steps : how many steps of it were written
+
+    """
+
+    def __init__(self, path: str | Path, signals: Mapping[str, str],
+                 sheet: TestSheet | None = None, **notes: Any) -> None:
+        """
+        Prepare to record.
+
+        Parameters
+        ----------
+        path : folder that is not there yet; later runs go to PATH_run_2, PATH_run_3 ...
+        signals : name -> unit of every signal, in the order in which `step` gives them
+        sheet, notes : see Recording
+
+        Raises
+        ------
+        RecordingError : the folder exists already
+
+        """
+        self.path = self._base = Path(path)
+        self.steps = 0
+        self._signals = dict(signals)
+        self._sheet = sheet
+        self._notes = notes
+        self._bag: BagWriter | None = None
+        self._count = 0
+        self._run = 0
+        self._step_s = 0.0
+        self._told: SimpleQueue[tuple[str, Mapping[str, Any]]] = SimpleQueue()
+        # by run: nodes tell what is in force before or after the first step gets here
+        self._settings: dict[int, dict[str, Any]] = {}
+        self._changes: list[tuple[int, int, str, Mapping[str, Any]]] = []
+        self._units = {name.partition('/')[0] for name in self._signals}
+        refuse_existing(self.path)
+
+    def begin(self, run: int, step_s: float) -> None:
+        """
+        Begin a new bag, for a run with macro-steps of `step_s` [s].
+
+        Raises
+        ------
+        RecordingError : the folder exists already, or it or the last bag cannot be written
+
+        """
+        self.close()
+        self._count += 1
+        if self._count > 1:
+            self.path = self._base.with_name(f'{self._base.name}_run_{self._count}')
+        self._run, self.steps = run, 0
+        self._step_s = step_s
+        self._bag = BagWriter(self.path, self._signals, sheet=self._sheet,
+                              notes={**self._notes, STEP: step_s, 'run': run})
+        self._catch_up()
+
+    def step(self, number: int, values: list[float]) -> None:
+        """
+        Write one step of the run that has begun.
+
+        Parameters
+        ----------
+        number : of the macro-step
+        values : one for each signal, NaN where there is no sample
+
+        Raises
+        ------
+        RecordingError : the disk is full, or the bag cannot be written
+
+        """
+        assert self._bag is not None
+        self._bag.write(number, nanoseconds(number * self._step_s), values)
+        self.steps += 1
+        if not self._told.empty():
+            self._catch_up()
+
+    def told(self, unit: str, record: Mapping[str, Any]) -> None:
+        """Take what a node says on `<unit>/changes`; from any thread."""
+        self._told.put((unit, record))
+
+    def idle(self) -> None:
+        """
+        Make safe what was written, when no step comes for a while.
+
+        Raises
+        ------
+        RecordingError : the disk is full, or the bag cannot be written
+
+        """
+        self._catch_up()
+        if self._bag is not None and not self._bag.closed:
+            self._bag.flush()
+
+    def close(self) -> None:
+        """
+        Complete the bag.
+
+        Raises
+        ------
+        RecordingError : the disk is full, or the bag cannot be written
+
+        """
+        self._catch_up()
+        if self._bag is not None and not self._bag.closed:
+            self._bag.close()
+        self._bag = None
+
+    @property
+    def knows_configuration(self) -> bool:
+        """Tell whether every unit has said what is in force in this run."""
+        return set(self._settings.get(self._run, {})) >= self._units
+
+    def _catch_up(self) -> None:
+        fresh = False
+        while True:
+            try:
+                unit, record = self._told.get_nowait()
+            except Empty:
+                break
+            run, step = int(record.get('run', 0)), int(record.get('step', 0))
+            if isinstance(record.get('settings'), dict):
+                self._settings.setdefault(run, {})[unit] = record['settings']
+                fresh = fresh or run == self._run
+            elif isinstance(record.get('changes'), dict):
+                self._changes.append((run, step, unit, record['changes']))
+        if self._bag is None or self._bag.closed:
+            return
+        if fresh or (self._run in self._settings and not self.steps):
+            self._bag.know(self._settings[self._run])
+        later = []
+        for run, step, unit, values in self._changes:
+            if run == self._run:
+                self._bag.change(step, unit, values)
+            elif run > self._run:
+                later.append((run, step, unit, values))
+        self._changes = later
