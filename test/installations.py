@@ -29,7 +29,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 NOT_SOURCE = ('.*', '__pycache__', '*.egg-info', 'build', 'dist', 'install', 'log', 'out')
-NODES = sorted(path.stem for path in (ROOT / 'antenna_drive' / 'nodes').glob('[a-z]*.py'))
+NODES = sorted(path.stem for path in (ROOT / 'antenna_drive' / 'nodes').glob('*.py')
+               if 'def main(' in path.read_text(encoding='utf-8'))
 # An interpreter of the ROS 2 wheels leaves this to its children, for whom it may be wrong.
 WHEELS_MARK = '_ROS_WHEELS_BOOTSTRAP_COMPLETE'
 
