@@ -22,8 +22,13 @@ from pathlib import Path
 import tempfile
 from typing import IO
 
+from hypothesis import settings
 from installations import install_with_colcon, install_with_pip, Installation
 import pytest
+
+# Nothing here is judged by how long it takes: the first call of compiled code compiles.
+settings.register_profile('antenna_drive', deadline=None)
+settings.load_profile('antenna_drive')
 
 # Domains 0 to 101 use ports that no operating system hands out; 0 is where people work.
 DOMAINS = range(1, 102)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-How far the lock-step at a macro-step is from the converged reference, on the article's experiments.
+How far the lock-step is from the converged reference, on the article's experiments.
 
 The reference is the same drive at a macro-step of `FINE_STEP`. Two things are measured: the rms
 distance of every signal of T1 to T4, as a share of that signal's rms, and the gain of Filter 1

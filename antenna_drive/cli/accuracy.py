@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         write_json({'reference_step_s': _reference_step(), 'steps': table}, args.json)
         return 0
-    print('worst signal, rms distance in percent of its rms; limit of k\' [1/s]')
+    print("worst signal, rms distance in percent of its rms; limit of k' [1/s]")
     print(f'{"step [ms]":>9}  ' + '  '.join(f'{name:>6}' for name in names) + '   limit')
     for row in table:
         print(f'{1e3 * row["step_s"]:9.2f}  '

@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     for name, (test, circuit, analysis, field) in _TESTS.items():
         print(f'{name} circuit, in five processes', flush=True)
         runs[name] = _through_processes(experiments()[test], circuit)
-        time = np.arange(runs[name].samples.shape[0]) * _STEP_S
+        time = np.arange(runs[name].samples.shape[0], dtype=np.float64) * _STEP_S
         voltage = runs[name].samples[:, runs[name].names.index(_BIAS), 0]
         ranges[name] = found = bias_range(time, voltage, _AFTER_S)
         print(f'  published, analysis  {analysis[0]:4.1f} to {analysis[1]:4.1f} V\n'

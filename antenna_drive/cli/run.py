@@ -11,10 +11,10 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""
+r"""
 Run the drive in one process and write every signal.
 
-  antenna-drive run --duration 20 --out run.csv --config old_circuit \\
+  antenna-drive run --duration 20 --out run.csv --config old_circuit \
       --set test_signal.waveform=saw_tooth test_signal.amplitude=0.01196 test_signal.period=5
 
 The numbers are those of the five nodes, to the last bit, and come hundreds of times faster than

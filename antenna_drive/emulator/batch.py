@@ -190,7 +190,9 @@ def run(record: np.ndarray[Any, np.dtype[Any]], schedule: Schedule) -> FloatArra
     """
     states = _PLANT + structure.states(int(record[0]['plant']['axis']['mode_inertias_count']))
     out = np.empty((schedule.rows, len(CHANNELS), 2))
-    _run(record.copy(), schedule.steps, schedule.keep, np.zeros(states), np.zeros(states),
+    record = record.copy()
+    record['torque_share']['torque_share']['fixed_voltage'] = schedule.steps[0, FIXED_BIAS]
+    _run(record, schedule.steps, schedule.keep, np.zeros(states), np.zeros(states),
          np.zeros(_MODES, np.int64), np.zeros((motor_drive.INPUTS, 2)),
          np.zeros((torque_share.INPUTS, 2)), np.zeros((structure.INPUTS, 2)), work_space(states),
          np.zeros((motor_drive.OUTPUTS, 2)), np.zeros((torque_share.OUTPUTS, 2)),

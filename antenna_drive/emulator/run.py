@@ -15,8 +15,8 @@
 The drive in one process: the same units in the same lock-step as the nodes, bit for bit.
 
 Every unit advances by one macro-step from what all of them put out at its start: value and time
-derivative of each signal, which the receiver extrapolates (first-order hold). A run at a macro-step
-of `FINE_STEP` is the converged reference that longer macro-steps are measured against.
+derivative of each signal, which the receiver extrapolates (first-order hold). A run at a
+macro-step of `FINE_STEP` is the converged reference that longer ones are measured against.
 """
 
 from __future__ import annotations

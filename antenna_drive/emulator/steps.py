@@ -21,31 +21,34 @@ from antenna_drive.emulator import wiring
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.emulator.units import inner_steps
 from antenna_drive.physics import motor_drive, structure, torque_share
+from antenna_drive.physics.arrays import IntArray
 from antenna_drive.physics.compiling import compiled, inner
 import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from antenna_drive.emulator.run import Emulator
 
 
 @inner
-def _gather(now, columns, u):  # type: ignore[no-untyped-def]
+def _gather(now: FloatArray, columns: IntArray, u: FloatArray) -> None:
     for j in range(columns.size):
         u[j, 0] = now[columns[j], 0]
         u[j, 1] = now[columns[j], 1]
 
 
 @inner
-def _scatter(y, first, after):  # type: ignore[no-untyped-def]
+def _scatter(y: FloatArray, first: int, after: FloatArray) -> None:
     for j in range(y.shape[0]):
         after[first + j, 0] = y[j, 0]
         after[first + j, 1] = y[j, 1]
 
 
 @compiled
-def _advance(k, h, steps, every, commands, now, after, kept, columns, firsts,
-             motor_1, motor_2, share, plant):  # type: ignore[no-untyped-def]
+def _advance(
+        k: int, h: float, steps: int, every: int, commands: FloatArray, now: FloatArray,
+        after: FloatArray, kept: FloatArray, columns: tuple[IntArray, ...], firsts: IntArray,
+        motor_1: Any, motor_2: Any, share: Any, plant: Any,
+) -> None:
     """
     Advance the drive by one macro-step for each row of `commands`.
 
@@ -86,7 +89,7 @@ def _advance(k, h, steps, every, commands, now, after, kept, columns, firsts,
             row += 1
 
 
-def advance(emulator: Emulator, count: int, every: int) -> tuple[NDArray[np.int64], FloatArray]:
+def advance(emulator: Emulator, count: int, every: int) -> tuple[IntArray, FloatArray]:
     """Advance an emulator of our own units by `count` macro-steps; see `Emulator.advance`."""
     units: Any = emulator.units
     k = emulator.k

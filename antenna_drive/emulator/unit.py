@@ -26,10 +26,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from antenna_drive.parameters.schema import check_changes, Entry, Value
-import numpy as np
-from numpy.typing import NDArray
+from antenna_drive.physics.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
+__all__ = ['FloatArray', 'Signal', 'Unit']
 
 
 @dataclass(frozen=True)

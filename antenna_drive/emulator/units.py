@@ -119,7 +119,7 @@ class MotorDriveUnit(_SteppedUnit):
 
     inputs: ClassVar[tuple[str, ...]] = wiring.MOTOR_INPUTS
     outputs: ClassVar[tuple[Signal, ...]] = wiring.MOTOR_OUTPUTS
-    _physics = motor_drive
+    _physics: ClassVar[Any] = motor_drive
 
     def __init__(self, name: str, drive: Drive) -> None:
         """Take motor_1's or motor_2's parameters, whichever `name` says."""
@@ -131,7 +131,7 @@ class TorqueShareUnit(_SteppedUnit):
 
     inputs: ClassVar[tuple[str, ...]] = wiring.INPUTS[wiring.TORQUE_SHARE]
     outputs: ClassVar[tuple[Signal, ...]] = wiring.TORQUE_SHARE_OUTPUTS
-    _physics = torque_share
+    _physics: ClassVar[Any] = torque_share
     _own = 'torque_share'
 
     def __init__(self, name: str, drive: Drive) -> None:
@@ -144,7 +144,7 @@ class PlantUnit(_SteppedUnit):
 
     inputs: ClassVar[tuple[str, ...]] = wiring.INPUTS[wiring.PLANT]
     outputs: ClassVar[tuple[Signal, ...]] = wiring.PLANT_OUTPUTS
-    _physics = structure
+    _physics: ClassVar[Any] = structure
     _own = 'axis'
 
     def __init__(self, name: str, drive: Drive) -> None:

@@ -245,8 +245,9 @@ def _drive(given: _Given, source: str) -> Drive:
     torque_share = _set(TorqueShare, ('torque_share',), given, source)
     if torque_share.saturation_low > torque_share.saturation_high:
         raise ParameterError(f'{given["torque_share.saturation_low"][1]}: '
-                             f'torque_share.saturation_low: {torque_share.saturation_low:g} given, '
-                             f'allowed is at most saturation_high '
+                             'torque_share.saturation_low: '
+                             f'{torque_share.saturation_low:g} given, '
+                             'allowed is at most saturation_high '
                              f'({torque_share.saturation_high:g} V)')
     parts = {part: _set(Waveform, (f'test_signal.{part}',), given, source)
              for part in TEST_SIGNAL_PARTS}

@@ -15,9 +15,10 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, is_dataclass
+from dataclasses import fields
 from typing import Any, get_type_hints
 
+from antenna_drive.parameters.schema import Entry
 import numpy as np
 
 
@@ -54,8 +55,8 @@ def record_of(parameters: Any) -> np.ndarray[Any, np.dtype[Any]]:
 def _fill(record: Any, parameters: Any) -> None:
     for item in fields(parameters):
         value = getattr(parameters, item.name)
-        entry = item.metadata.get('entry')
-        if is_dataclass(value):
+        entry: Entry | None = item.metadata.get('entry')
+        if entry is None:
             _fill(record[item.name], value)
         elif entry.lengths is not None:
             record[item.name][..., :len(value)] = value

@@ -29,6 +29,8 @@ from typing import Any, TypeVar
 from antenna_drive.parameters.schema import Entry, Value
 
 Set = TypeVar('Set')
+# A choice is a text in a set; in the set's record it is the text's place among the choices.
+Choice = Any
 
 # The greatest numbers of flexible modes and of sines in a multisine that a set can hold.
 MODES_LIMIT = 6
@@ -222,6 +224,11 @@ class Axis:
         0.0, 'N m', -1e7, 1e7, 'imbalance: torque at zero elevation, pulling down')
     steady_wind_torque: float = _effect(0.0, 'N m', -1e7, 1e7, 'torque of a steady wind')
 
+    @property
+    def mode_inertias_count(self) -> int:
+        """Return the number of flexible modes."""
+        return len(self.mode_inertias)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Encoder:
@@ -257,11 +264,11 @@ class TorqueShare:
     s_2: float = _given('1/s', 1e-3, 100.0, 'pole of transfer functions 2 and 4')
     k_3: float = _given('1/s', 1e-3, 100.0, 'gain and pole of transfer function 3')
     g_4: float = _given('1', 0.0, 100.0, 'transfer function 4 over transfer function 2')
-    bias_source: str = _option('circuit', Entry(
+    bias_source: Choice = _option('circuit', Entry(
         '', description='where the bias voltage comes from', live=True, choices=BIAS_SOURCES))
     fixed_voltage: float = _option(0.0, Entry(
         'V', -50.0, 50.0, 'bias voltage of a fixed source', live=True))
-    start: str = _option('zero', Entry(
+    start: Choice = _option('zero', Entry(
         '', description='state of the circuit at the start', choices=SHARE_STARTS))
     voltmeter_gain: float = _effect(1.0, '1', 0.1, 10.0, 'reading per bias voltage')
 
@@ -288,7 +295,7 @@ class Share:
 class Waveform:
     """A test signal over time; amplitude in the unit of what it commands."""
 
-    waveform: str = _option('zero', Entry(
+    waveform: Choice = _option('zero', Entry(
         '', description='shape of the signal', live=True, choices=WAVEFORMS))
     amplitude: float = _option(0.0, Entry(
         'SI', -1e9, 1e9, 'greatest value, rad/s or N m', live=True))
@@ -309,6 +316,11 @@ class Waveform:
     bit_time: float = _option(0.2, Entry('s', 1e-3, 1e3, 'time of one bit of a PRBS', live=True))
     external: float = _option(0.0, Entry(
         'SI', -1e9, 1e9, 'value commanded from outside', live=True))
+
+    @property
+    def frequencies_count(self) -> int:
+        """Return the number of sines of a multisine."""
+        return len(self.frequencies)
 
 
 @dataclass(frozen=True, kw_only=True)

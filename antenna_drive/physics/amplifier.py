@@ -22,11 +22,14 @@ companion papers.
 
 from __future__ import annotations
 
+from antenna_drive.parameters.sets import Amplifier, Armature
 from antenna_drive.physics.compiling import inner
 
 
 @inner
-def rate_error(command_voltage, tach_rate, bias_command, p):  # type: ignore[no-untyped-def]
+def rate_error(
+        command_voltage: float, tach_rate: float, bias_command: float, p: Amplifier,
+) -> float:
     """
     Return the error e of amplifier 1 [article A].
 
@@ -50,7 +53,7 @@ def rate_error(command_voltage, tach_rate, bias_command, p):  # type: ignore[no-
 
 
 @inner
-def limit_centre(rate, p, armature):  # type: ignore[no-untyped-def]
+def limit_centre(rate: float, p: Amplifier, armature: Armature) -> float:
     """
     Return k_e w, about which the demand is limited [article A].
 
@@ -69,7 +72,7 @@ def limit_centre(rate, p, armature):  # type: ignore[no-untyped-def]
 
 
 @inner
-def limited(demand, centre, current_limit):  # type: ignore[no-untyped-def]
+def limited(demand: float, centre: float, current_limit: float) -> float:
     """Return the demand kept within the current limit about `centre`; all in article A."""
     return min(max(demand, centre - current_limit), centre + current_limit)
 
@@ -81,7 +84,9 @@ FREE, FROZEN, HELD = range(3)
 
 
 @inner
-def error_slope(error, command_slope, tach_slope, bias_slope, p):  # type: ignore[no-untyped-def]
+def error_slope(
+        error: float, command_slope: float, tach_slope: float, bias_slope: float, p: Amplifier,
+) -> float:
     """
     Return the time derivative of `rate_error` [article A/s].
 
@@ -98,7 +103,7 @@ def error_slope(error, command_slope, tach_slope, bias_slope, p):  # type: ignor
 
 
 @inner
-def next_winding(winding, error, excess, needed, p):  # type: ignore[no-untyped-def]
+def next_winding(winding: int, error: float, excess: float, needed: float, p: Amplifier) -> int:
     """
     Return what the integral does next: it must not wind up while the demand is limited.
 
@@ -126,7 +131,7 @@ def next_winding(winding, error, excess, needed, p):  # type: ignore[no-untyped-
 
 
 @inner
-def integral_rate(winding, error, needed, p):  # type: ignore[no-untyped-def]
+def integral_rate(winding: int, error: float, needed: float, p: Amplifier) -> float:
     """Return the time derivative of the integral of amplifier 1 [article A/s]."""
     if winding == FREE:
         return error / p.integral_time
@@ -137,7 +142,9 @@ def integral_rate(winding, error, needed, p):  # type: ignore[no-untyped-def]
 
 
 @inner
-def armature_voltage(lagged_demand, current, p, armature):  # type: ignore[no-untyped-def]
+def armature_voltage(
+        lagged_demand: float, current: float, p: Amplifier, armature: Armature,
+) -> float:
     """
     Return the voltage of amplifier 2 at the armature [V], limited to +- V_max.
 

@@ -15,11 +15,12 @@
 
 from __future__ import annotations
 
+from antenna_drive.parameters.sets import Armature
 from antenna_drive.physics.compiling import inner
 
 
 @inner
-def current_rate(voltage, current, rate, p):  # type: ignore[no-untyped-def]
+def current_rate(voltage: float, current: float, rate: float, p: Armature) -> float:
     """
     Return the time derivative of the current [article A/s]: L i' = V/kappa - R i - (k_b/kappa) w.
 

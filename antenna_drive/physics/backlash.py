@@ -19,7 +19,7 @@ from antenna_drive.physics.compiling import inner
 
 
 @inner
-def dead_zone(twist, half_gap):  # type: ignore[no-untyped-def]
+def dead_zone(twist: float, half_gap: float) -> float:
     """
     Return how far the teeth are pressed into each other, Eq. (1) with k = 1.
 
@@ -37,7 +37,9 @@ def dead_zone(twist, half_gap):  # type: ignore[no-untyped-def]
 
 
 @inner
-def contact_side(twist, twist_rate, half_gap, stiffness, damping):  # type: ignore[no-untyped-def]
+def contact_side(
+        twist: float, twist_rate: float, half_gap: float, stiffness: float, damping: float,
+) -> int:
     """
     Return which flank pushes: +1, -1, or 0 for none; arguments as in `contact_torque`.
 
@@ -51,8 +53,10 @@ def contact_side(twist, twist_rate, half_gap, stiffness, damping):  # type: igno
 
 
 @inner
-def contact_torque(side, twist, twist_rate, half_gap, stiffness, damping):
-    # type: ignore[no-untyped-def]
+def contact_torque(
+        side: int, twist: float, twist_rate: float, half_gap: float, stiffness: float,
+        damping: float,
+) -> float:
     """
     Return the torque of the touching flanks, Eq. (1) with a contact damping beside the spring.
 
@@ -77,8 +81,10 @@ def contact_torque(side, twist, twist_rate, half_gap, stiffness, damping):
 
 
 @inner
-def contact_torque_rate(torque, twist_rate, twist_acceleration, stiffness, damping):
-    # type: ignore[no-untyped-def]
+def contact_torque_rate(
+        torque: float, twist_rate: float, twist_acceleration: float, stiffness: float,
+        damping: float,
+) -> float:
     """Return the time derivative of `contact_torque` [N m/s]: zero while nothing is pushed."""
     if torque == 0.0:
         return 0.0

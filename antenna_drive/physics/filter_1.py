@@ -15,12 +15,15 @@
 
 from __future__ import annotations
 
+from antenna_drive.parameters.sets import Filter1
 from antenna_drive.physics.compiling import inner
 
 
 @inner
-def counter_torque_rate(counter_torque, bias_voltage, current_1, current_2, p):
-    # type: ignore[no-untyped-def]
+def counter_torque_rate(
+        counter_torque: float, bias_voltage: float, current_1: float, current_2: float,
+        p: Filter1,
+) -> float:
     """
     Return the time derivative of x_F [V/s]; the filter acts on the error of the torque bias.
 

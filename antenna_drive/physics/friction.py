@@ -22,12 +22,15 @@ torque. `friction_torque` is the law of Eq. (2) itself, as Fig. 3 draws it.
 
 from __future__ import annotations
 
+import math
+
 from antenna_drive.physics.compiling import inner
-import numpy as np
 
 
 @inner
-def friction_torque(rate, applied, coulomb, stiction, threshold):  # type: ignore[no-untyped-def]
+def friction_torque(
+        rate: float, applied: float, coulomb: float, stiction: float, threshold: float,
+) -> float:
     """
     Return the friction torque on the body [N m], Eq. (2).
 
@@ -40,13 +43,15 @@ def friction_torque(rate, applied, coulomb, stiction, threshold):  # type: ignor
 
     """
     if abs(rate) > threshold:
-        return -coulomb * np.sign(rate)
-    return -min(abs(applied), stiction) * np.sign(applied)
+        return -coulomb * ((rate > 0.0) - (rate < 0.0))
+    return -min(abs(applied), stiction) * ((applied > 0.0) - (applied < 0.0))
 
 
 @inner
-def slip_level(rate, coulomb, viscous, stribeck, stribeck_rate, stribeck_shape,
-               asymmetry):  # type: ignore[no-untyped-def]
+def slip_level(
+        rate: float, coulomb: float, viscous: float, stribeck: float, stribeck_rate: float,
+        stribeck_shape: float, asymmetry: float,
+) -> float:
     """
     Return the size of the friction torque of a slipping body [N m].
 
@@ -64,14 +69,17 @@ def slip_level(rate, coulomb, viscous, stribeck, stribeck_rate, stribeck_shape,
     """
     level = coulomb
     if stribeck != 0.0:
-        level += stribeck * np.exp(-(abs(rate) / stribeck_rate) ** stribeck_shape)
+        level += stribeck * math.exp(-(abs(rate) / stribeck_rate) ** stribeck_shape)
     if asymmetry != 0.0:
         level *= 1.0 + (asymmetry if rate >= 0.0 else -asymmetry)
     return level + viscous * abs(rate)
 
 
 @inner
-def next_slip(slip, rate, applied, coulomb, stiction, threshold):  # type: ignore[no-untyped-def]
+def next_slip(
+        slip: int, rate: float, applied: float, coulomb: float, stiction: float,
+        threshold: float,
+) -> int:
     """
     Return the mode that follows: +1 and -1 slip forward and backward, 0 sticks.
 

@@ -15,13 +15,15 @@
 
 from __future__ import annotations
 
+import math
+
+from antenna_drive.parameters.sets import Gearbox
 from antenna_drive.physics.backlash import contact_torque
 from antenna_drive.physics.compiling import inner
-import numpy as np
 
 
 @inner
-def twist(motor_angle, axis_angle, gear_ratio, p):  # type: ignore[no-untyped-def]
+def twist(motor_angle: float, axis_angle: float, gear_ratio: float, p: Gearbox) -> float:
     """
     Return the angle between motor and axis at the motor shaft [rad].
 
@@ -34,25 +36,26 @@ def twist(motor_angle, axis_angle, gear_ratio, p):  # type: ignore[no-untyped-de
     """
     angle = motor_angle - gear_ratio * axis_angle
     if p.transmission_error != 0.0:
-        angle += p.transmission_error * np.sin(p.transmission_error_cycles * motor_angle
-                                               + p.transmission_error_phase)
+        angle += p.transmission_error * math.sin(
+            p.transmission_error_cycles * motor_angle + p.transmission_error_phase)
     return angle
 
 
 @inner
-def twist_rate(motor_angle, motor_rate, axis_rate, gear_ratio, p):
-    # type: ignore[no-untyped-def]
+def twist_rate(
+        motor_angle: float, motor_rate: float, axis_rate: float, gear_ratio: float, p: Gearbox,
+) -> float:
     """Return the time derivative of `twist` [rad/s]; rates in rad/s, otherwise as there."""
     rate = motor_rate - gear_ratio * axis_rate
     if p.transmission_error != 0.0:
         rate += (p.transmission_error * p.transmission_error_cycles * motor_rate
-                 * np.cos(p.transmission_error_cycles * motor_angle
-                          + p.transmission_error_phase))
+                 * math.cos(
+            p.transmission_error_cycles * motor_angle + p.transmission_error_phase))
     return rate
 
 
 @inner
-def gear_torque(side, angle, rate, presliding, p):  # type: ignore[no-untyped-def]
+def gear_torque(side: int, angle: float, rate: float, presliding: float, p: Gearbox) -> float:
     """
     Return T_g, the torque of the gearbox at the motor shaft; positive drives the axis [N m].
 
@@ -72,7 +75,7 @@ def gear_torque(side, angle, rate, presliding, p):  # type: ignore[no-untyped-de
 
 
 @inner
-def presliding_rate(side, rate, presliding, p):  # type: ignore[no-untyped-def]
+def presliding_rate(side: int, rate: float, presliding: float, p: Gearbox) -> float:
     """
     Return the time derivative of the hysteresis' state [1/s].
 

@@ -25,9 +25,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from antenna_drive.physics.arrays import FloatArray, IntArray
 from antenna_drive.physics.compiling import inner
 import numpy as np
-from numpy.typing import NDArray
 
 # Halvings of a step in the search for a switching: 1 ms is narrowed down to less than 1 ns.
 _HALVINGS = 21
@@ -38,7 +38,7 @@ _SWITCHINGS_LIMIT = 40
 _WORK_ROWS = 7
 
 
-def work_space(states: int) -> NDArray[np.float64]:
+def work_space(states: int) -> FloatArray:
     """Return the scratch memory that `advance` needs for a unit of so many states."""
     return np.zeros((_WORK_ROWS, states))
 
@@ -64,14 +64,16 @@ def located_runge_kutta(
 
     """
     @inner
-    def settle(t, x, mode, u, p):  # type: ignore[no-untyped-def]
+    def settle(t: float, x: FloatArray, mode: IntArray, u: Any, p: Any) -> None:
         # one switching may call for another: a body that stops may break away at once
         for _ in range(4):
             if not switch(t, x, mode, u, p, True):
                 break
 
     @inner
-    def advance(x, mode, u, p, h, steps, work):  # type: ignore[no-untyped-def]
+    def advance(
+            x: FloatArray, mode: IntArray, u: Any, p: Any, h: float, steps: int, work: FloatArray,
+    ) -> None:
         n = x.size
         k1, k2, k3, k4 = work[0], work[1], work[2], work[3]
         k5, y, z = work[4], work[5], work[6]
@@ -128,7 +130,10 @@ def located_runge_kutta(
 
 
 @inner
-def _cubic(x, dx, y, dy, dt, s, z):  # type: ignore[no-untyped-def]
+def _cubic(
+        x: FloatArray, dx: FloatArray, y: FloatArray, dy: FloatArray, dt: float, s: float,
+        z: FloatArray,
+) -> None:
     """Write the cubic Hermite interpolation between x and y at the fraction s of dt into z."""
     s2 = s * s
     s3 = s2 * s

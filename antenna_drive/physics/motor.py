@@ -15,13 +15,15 @@
 
 from __future__ import annotations
 
+import math
+
+from antenna_drive.parameters.sets import Ammeter, Motor, Tachometer
 from antenna_drive.physics.compiling import inner
 from antenna_drive.physics.friction import slip_level
-import numpy as np
 
 
 @inner
-def driving_torque(current, angle, p):  # type: ignore[no-untyped-def]
+def driving_torque(current: float, angle: float, p: Motor) -> float:
     """
     Return the torque of the armature on the rotor [N m].
 
@@ -34,12 +36,13 @@ def driving_torque(current, angle, p):  # type: ignore[no-untyped-def]
     """
     torque = p.torque_constant * current
     if p.torque_ripple != 0.0:
-        torque += p.torque_ripple * np.sin(p.torque_ripple_cycles * angle + p.torque_ripple_phase)
+        torque += p.torque_ripple * math.sin(p.torque_ripple_cycles * angle
+                                             + p.torque_ripple_phase)
     return torque
 
 
 @inner
-def friction_level(rate, gear_torque, p):  # type: ignore[no-untyped-def]
+def friction_level(rate: float, gear_torque: float, p: Motor) -> float:
     """
     Return the size of the rotor's friction torque while it slips [N m].
 
@@ -58,7 +61,7 @@ def friction_level(rate, gear_torque, p):  # type: ignore[no-untyped-def]
 
 
 @inner
-def tachometer(rate, angle, p):  # type: ignore[no-untyped-def]
+def tachometer(rate: float, angle: float, p: Tachometer) -> float:
     """
     Return what the tachometer says [rad/s].
 
@@ -70,11 +73,11 @@ def tachometer(rate, angle, p):  # type: ignore[no-untyped-def]
     """
     reading = p.gain * rate + p.offset
     if p.ripple != 0.0:
-        reading += p.ripple * rate * np.sin(p.ripple_cycles * angle + p.ripple_phase)
+        reading += p.ripple * rate * math.sin(p.ripple_cycles * angle + p.ripple_phase)
     return reading
 
 
 @inner
-def ammeter(current, p):  # type: ignore[no-untyped-def]
+def ammeter(current: float, p: Ammeter) -> float:
     """Return what the ammeter says [article A]; p : Ammeter, gain 1, offset 0 in the article."""
     return p.gain * current + p.offset

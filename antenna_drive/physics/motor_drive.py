@@ -26,11 +26,13 @@ ammeter [article A].
 
 from __future__ import annotations
 
+from antenna_drive.parameters.sets import MotorDrive
 from antenna_drive.physics.amplifier import (
     armature_voltage, error_slope, FREE, HELD, integral_rate, limit_centre, limited,
     next_winding, rate_error,
 )
 from antenna_drive.physics.armature import current_rate
+from antenna_drive.physics.arrays import FloatArray, IntArray
 from antenna_drive.physics.backlash import contact_side, contact_torque_rate
 from antenna_drive.physics.compiling import compiled, inner, shared
 from antenna_drive.physics.friction import next_slip
@@ -51,19 +53,21 @@ _AT_REST = np.zeros((INPUTS, 2))
 
 
 @inner
-def _held(u, signal, t):  # type: ignore[no-untyped-def]
+def _held(u: FloatArray, signal: int, t: float) -> float:
     """Return an input at t after the start of the macro-step: the first-order hold."""
     return u[signal, 0] + u[signal, 1] * t
 
 
 @inner
-def _axis_angle(u, t):  # type: ignore[no-untyped-def]
+def _axis_angle(u: FloatArray, t: float) -> float:
     """Return the axis angle at t; its second derivative is known, so the hold is a parabola."""
     return u[AXIS_ANGLE, 0] + (u[AXIS_RATE, 0] + 0.5 * u[AXIS_RATE, 1] * t) * t
 
 
 @inner
-def _gear(t, x, mode, u, p):  # type: ignore[no-untyped-def]
+def _gear(
+        t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: MotorDrive,
+) -> tuple[float, float]:
     """Return twist rate [rad/s] and gear torque [N m] at t."""
     angle = twist(x[ANGLE], _axis_angle(u, t), p.gear_ratio, p.gearbox)
     rate = twist_rate(x[ANGLE], x[RATE], _held(u, AXIS_RATE, t), p.gear_ratio, p.gearbox)
@@ -71,7 +75,7 @@ def _gear(t, x, mode, u, p):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _demand(t, x, u, p):  # type: ignore[no-untyped-def]
+def _demand(t: float, x: FloatArray, u: FloatArray, p: MotorDrive) -> tuple[float, float, float]:
     """Return error, demand before its limit, and centre of the limit [article A] at t."""
     bias_command = p.sign * p.amplifier.bias_command_gain * _held(u, COUNTER_TORQUE, t)
     tach_rate = tachometer(x[RATE], x[ANGLE], p.tachometer)
@@ -80,7 +84,7 @@ def _demand(t, x, u, p):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _acceleration(x, mode, torque, p):  # type: ignore[no-untyped-def]
+def _acceleration(x: FloatArray, mode: IntArray, torque: float, p: MotorDrive) -> float:
     """Return the rotor's acceleration [rad/s^2] against the gear torque [N m], Eq. (2)."""
     if mode[SLIP] == 0:
         return 0.0
@@ -89,7 +93,9 @@ def _acceleration(x, mode, torque, p):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _needed(t, x, u, error, acceleration, p):  # type: ignore[no-untyped-def]
+def _needed(
+        t: float, x: FloatArray, u: FloatArray, error: float, acceleration: float, p: MotorDrive,
+) -> float:
     """Return the rate at which the integral would keep the demand at its limit [article A/s]."""
     slope = error_slope(
         error, command_voltage_rate(x[VOLTAGE], _held(u, RATE_COMMAND, t), p.rate_command),
@@ -100,13 +106,15 @@ def _needed(t, x, u, error, acceleration, p):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _current_rate(x, p):  # type: ignore[no-untyped-def]
+def _current_rate(x: FloatArray, p: MotorDrive) -> float:
     volts = armature_voltage(x[DEMAND], x[CURRENT], p.amplifier, p.armature)
     return current_rate(volts, x[CURRENT], x[RATE], p.armature)
 
 
 @shared
-def _rates(t, x, mode, u, p, dx):  # type: ignore[no-untyped-def]
+def _rates(
+        t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: MotorDrive, dx: FloatArray,
+) -> None:
     error, demand, centre = _demand(t, x, u, p)
     rate, torque = _gear(t, x, mode, u, p)
     dx[VOLTAGE] = command_voltage_rate(x[VOLTAGE], _held(u, RATE_COMMAND, t), p.rate_command)
@@ -122,7 +130,9 @@ def _rates(t, x, mode, u, p, dx):  # type: ignore[no-untyped-def]
 
 
 @shared
-def _switch(t, x, mode, u, p, commit):  # type: ignore[no-untyped-def]
+def _switch(
+        t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: MotorDrive, commit: bool,
+) -> bool:
     gear = p.gearbox
     side = contact_side(
         twist(x[ANGLE], _axis_angle(u, t), p.gear_ratio, gear),
@@ -156,7 +166,9 @@ _advance = located_runge_kutta(_rates, _switch)
 
 
 @compiled
-def outputs(x, mode, u, t, p, y):  # type: ignore[no-untyped-def]
+def outputs(
+        x: FloatArray, mode: IntArray, u: FloatArray, t: float, p: MotorDrive, y: FloatArray,
+) -> None:
     """
     Write the outputs at t after the start of a macro-step, with their time derivatives.
 
@@ -187,7 +199,7 @@ def outputs(x, mode, u, t, p, y):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def start(p, x, mode, y):  # type: ignore[no-untyped-def]
+def start(p: MotorDrive, x: FloatArray, mode: IntArray, y: FloatArray) -> None:
     """
     Write the state at rest into x and mode, and its outputs into y; shapes as in `outputs`.
 
@@ -200,7 +212,10 @@ def start(p, x, mode, y):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def step(x, mode, u, p, h, steps, work, y):  # type: ignore[no-untyped-def]
+def step(
+        x: FloatArray, mode: IntArray, u: FloatArray, p: MotorDrive, h: float, steps: int,
+        work: FloatArray, y: FloatArray,
+) -> None:
     """
     Advance the motor drive over one macro-step.
 

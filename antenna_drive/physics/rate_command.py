@@ -15,11 +15,12 @@
 
 from __future__ import annotations
 
+from antenna_drive.parameters.sets import RateCommand
 from antenna_drive.physics.compiling import inner
 
 
 @inner
-def command_voltage_rate(voltage, rate_command, p):  # type: ignore[no-untyped-def]
+def command_voltage_rate(voltage: float, rate_command: float, p: RateCommand) -> float:
     """
     Return the time derivative of the command voltage [V/s]: k_s k_1 / (1 + tau_1 s), Table 1.
 

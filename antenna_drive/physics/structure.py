@@ -24,6 +24,10 @@ in elevation and cross-elevation [rad].
 
 from __future__ import annotations
 
+import math
+
+from antenna_drive.parameters.sets import Axis, Encoder, Plant
+from antenna_drive.physics.arrays import FloatArray, IntArray
 from antenna_drive.physics.compiling import compiled, inner, shared
 from antenna_drive.physics.friction import next_slip, slip_level
 from antenna_drive.physics.integrator import located_runge_kutta
@@ -43,40 +47,40 @@ def states(mode_count: int) -> int:
 
 
 @inner
-def _mode_torque(x, j, p):  # type: ignore[no-untyped-def]
+def _mode_torque(x: FloatArray, j: int, p: Axis) -> float:
     """Return the torque of mode j on the hub [N m]."""
-    omega = 2.0 * np.pi * p.mode_frequencies[j]
+    omega = 2.0 * math.pi * p.mode_frequencies[j]
     return p.mode_inertias[j] * (
         omega * omega * (x[2 + 2 * j] - x[ANGLE])
         + 2.0 * p.mode_damping_ratios[j] * omega * (x[3 + 2 * j] - x[RATE]))
 
 
 @inner
-def _applied_torque(t, x, u, p):  # type: ignore[no-untyped-def]
+def _applied_torque(t: float, x: FloatArray, u: FloatArray, p: Axis) -> float:
     """Return T_o of Eq. (8): every torque on the hub but friction [N m], at t."""
     torque = p.gear_ratio * (u[GEAR_TORQUE_1, 0] + u[GEAR_TORQUE_2, 0]
                              + (u[GEAR_TORQUE_1, 1] + u[GEAR_TORQUE_2, 1]) * t)
     torque += u[EXTERNAL_TORQUE, 0] + u[EXTERNAL_TORQUE, 1] * t + p.steady_wind_torque
     if p.gravity_torque != 0.0:
-        torque -= p.gravity_torque * np.cos(p.start_elevation + x[ANGLE])
+        torque -= p.gravity_torque * math.cos(p.start_elevation + x[ANGLE])
     for j in range(p.mode_inertias_count):
         torque += _mode_torque(x, j, p)
     return torque
 
 
 @inner
-def _friction_level(rate, angle, p):  # type: ignore[no-untyped-def]
+def _friction_level(rate: float, angle: float, p: Axis) -> float:
     """Return the size of the axis friction while it slips [N m]."""
     coulomb = p.coulomb_torque * p.friction_torque_per_ampere * p.gear_ratio
     if p.friction_wave != 0.0:
-        coulomb *= 1.0 + p.friction_wave * np.sin(p.friction_wave_cycles * angle
+        coulomb *= 1.0 + p.friction_wave * math.sin(p.friction_wave_cycles * angle
                                                   + p.friction_wave_phase)
     return slip_level(rate, coulomb, p.viscous_friction, p.stribeck_torque, p.stribeck_rate,
                       p.stribeck_shape, 0.0)
 
 
 @inner
-def _acceleration(t, x, mode, u, p):  # type: ignore[no-untyped-def]
+def _acceleration(t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: Axis) -> float:
     """Return the hub's acceleration [rad/s^2] at t, Eq. (2)."""
     if mode[0] == 0:
         return 0.0
@@ -85,7 +89,9 @@ def _acceleration(t, x, mode, u, p):  # type: ignore[no-untyped-def]
 
 
 @shared
-def _rates(t, x, mode, u, p, dx):  # type: ignore[no-untyped-def]
+def _rates(
+        t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: Axis, dx: FloatArray,
+) -> None:
     dx[ANGLE] = x[RATE]
     dx[RATE] = _acceleration(t, x, mode, u, p)
     for j in range(p.mode_inertias_count):
@@ -94,7 +100,7 @@ def _rates(t, x, mode, u, p, dx):  # type: ignore[no-untyped-def]
 
 
 @shared
-def _switch(t, x, mode, u, p, commit):  # type: ignore[no-untyped-def]
+def _switch(t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: Axis, commit: bool) -> bool:
     slip = mode[0]
     if slip != 0 and slip * x[RATE] > p.velocity_threshold:
         return False
@@ -113,7 +119,7 @@ _advance = located_runge_kutta(_rates, _switch)
 
 
 @inner
-def encoder(angle, p):  # type: ignore[no-untyped-def]
+def encoder(angle: float, p: Encoder) -> float:
     """
     Return what the elevation encoder says [rad].
 
@@ -125,14 +131,16 @@ def encoder(angle, p):  # type: ignore[no-untyped-def]
     """
     reading = angle + p.offset
     if p.cyclic_error != 0.0:
-        reading += p.cyclic_error * np.sin(p.cyclic_error_cycles * angle + p.cyclic_error_phase)
+        reading += p.cyclic_error * math.sin(p.cyclic_error_cycles * angle + p.cyclic_error_phase)
     if p.step != 0.0:
-        reading = p.step * np.floor(reading / p.step + 0.5)
+        reading = p.step * math.floor(reading / p.step + 0.5)
     return reading
 
 
 @compiled
-def outputs(x, mode, u, t, p, y):  # type: ignore[no-untyped-def]
+def outputs(
+        x: FloatArray, mode: IntArray, u: FloatArray, t: float, p: Plant, y: FloatArray,
+) -> None:
     """
     Write the outputs of Fig. 4 at t after the start of a macro-step, with their derivatives.
 
@@ -167,7 +175,7 @@ def outputs(x, mode, u, t, p, y):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def start(p, x, mode, y):  # type: ignore[no-untyped-def]
+def start(p: Plant, x: FloatArray, mode: IntArray, y: FloatArray) -> None:
     """Write the state at rest, at angle zero, into x and mode, and its outputs into y."""
     x[:] = 0.0
     mode[:] = 0
@@ -175,7 +183,10 @@ def start(p, x, mode, y):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def step(x, mode, u, p, h, steps, work, y):  # type: ignore[no-untyped-def]
+def step(
+        x: FloatArray, mode: IntArray, u: FloatArray, p: Plant, h: float, steps: int,
+        work: FloatArray, y: FloatArray,
+) -> None:
     """
     Advance the structure over one macro-step.
 

@@ -20,6 +20,10 @@ its right, so that nobody ever takes a difference across it.
 
 from __future__ import annotations
 
+import math
+
+from antenna_drive.parameters.sets import TestSignal, Waveform
+from antenna_drive.physics.arrays import FloatArray
 from antenna_drive.physics.compiling import compiled, inner
 import numpy as np
 from numpy.typing import NDArray
@@ -40,14 +44,14 @@ def prbs_bits() -> NDArray[np.float64]:
 
 
 @inner
-def _cycle(t, p):  # type: ignore[no-untyped-def]
+def _cycle(t: float, p: Waveform) -> float:
     """Return where in its period the waveform is, from 0 up to but not including 1."""
     turns = t / p.period + p.phase
-    return max(0.0, turns - np.floor(turns + _ON_TIME))
+    return max(0.0, turns - math.floor(turns + _ON_TIME))
 
 
 @inner
-def _saw_tooth(s):  # type: ignore[no-untyped-def]
+def _saw_tooth(s: float) -> tuple[float, float]:
     """Return a symmetric triangle that begins at zero and rises, and its slope per period."""
     if s < 0.25 - _ON_TIME:
         return 4.0 * s, 4.0
@@ -57,10 +61,10 @@ def _saw_tooth(s):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _shape(t, p, bits):  # type: ignore[no-untyped-def]
+def _shape(t: float, p: Waveform, bits: FloatArray) -> tuple[float, float]:
     """Return value and slope of the waveform of amplitude 1, t seconds after its start."""
     kind = p.waveform
-    two_pi = 2.0 * np.pi
+    two_pi = 2.0 * math.pi
     if kind == SQUARE:
         return (1.0 if _cycle(t, p) < 0.5 - _ON_TIME else -1.0), 0.0
     if kind == SAW_TOOTH:
@@ -73,20 +77,20 @@ def _shape(t, p, bits):  # type: ignore[no-untyped-def]
         return 1.0, 0.0
     if kind == SINE:
         angle = two_pi * (t / p.period + p.phase)
-        return np.sin(angle), two_pi / p.period * np.cos(angle)
+        return math.sin(angle), two_pi / p.period * math.cos(angle)
     if kind == CHIRP:
         if t > p.sweep_time:
             return 0.0, 0.0
         growth = (p.sweep_to - p.sweep_from) / p.sweep_time
         angle = two_pi * (p.sweep_from + 0.5 * growth * t) * t
-        return np.sin(angle), two_pi * (p.sweep_from + growth * t) * np.cos(angle)
+        return math.sin(angle), two_pi * (p.sweep_from + growth * t) * math.cos(angle)
     if kind == MULTISINE:
         value = 0.0
         slope = 0.0
         for j in range(p.frequencies_count):
             omega = two_pi * p.frequencies[j]
-            value += p.weights[j] * np.sin(omega * t + p.phases[j])
-            slope += p.weights[j] * omega * np.cos(omega * t + p.phases[j])
+            value += p.weights[j] * math.sin(omega * t + p.phases[j])
+            slope += p.weights[j] * omega * math.cos(omega * t + p.phases[j])
         return value, slope
     if kind == PRBS:
         return bits[int(t / p.bit_time + _ON_TIME) % bits.size], 0.0
@@ -94,7 +98,7 @@ def _shape(t, p, bits):  # type: ignore[no-untyped-def]
 
 
 @inner
-def waveform(t, p, bits):  # type: ignore[no-untyped-def]
+def waveform(t: float, p: Waveform, bits: FloatArray) -> tuple[float, float]:
     """
     Return value and slope of a test signal at a time.
 
@@ -115,7 +119,10 @@ def waveform(t, p, bits):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def sample(first, count, h, origins, p, bits, y):  # type: ignore[no-untyped-def]
+def sample(
+        first: int, count: int, h: float, origins: FloatArray, p: TestSignal, bits: FloatArray,
+        y: FloatArray,
+) -> None:
     """
     Write both test signals at so many macro-steps.
 

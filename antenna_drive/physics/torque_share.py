@@ -21,6 +21,8 @@ Inputs: currents of both motors [article A]. Outputs: counter torque x_F [V], bi
 
 from __future__ import annotations
 
+from antenna_drive.parameters.sets import Share, TorqueShare
+from antenna_drive.physics.arrays import FloatArray, IntArray
 from antenna_drive.physics.compiling import compiled, inner, shared
 from antenna_drive.physics.filter_1 import counter_torque_rate
 from antenna_drive.physics.integrator import located_runge_kutta
@@ -41,13 +43,13 @@ ZERO, STEADY = range(2)
 
 
 @inner
-def saturated(voltage, low, high):  # type: ignore[no-untyped-def]
+def saturated(voltage: float, low: float, high: float) -> float:
     """Return the voltage kept between two limits, Eq. (10); all in V."""
     return min(max(voltage, low), high)
 
 
 @inner
-def steady_bias_voltage(current_sum, p):  # type: ignore[no-untyped-def]
+def steady_bias_voltage(current_sum: float, p: TorqueShare) -> float:
     """
     Return v_b of a current that does not change [V], Eq. (14).
 
@@ -63,13 +65,13 @@ def steady_bias_voltage(current_sum, p):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _share_rate(x, p):  # type: ignore[no-untyped-def]
+def _share_rate(x: FloatArray, p: TorqueShare) -> float:
     """Return the time derivative of x_2 [V/s], transfer functions 2 and 4."""
     return -p.s_2 * x[SHARE] + p.k_2 * (p.fade_out_voltage + p.g_4 * abs(x[LOAD]))
 
 
 @inner
-def _bias_voltage(x, p):  # type: ignore[no-untyped-def]
+def _bias_voltage(x: FloatArray, p: TorqueShare) -> float:
     """Return v_b [V], Eq. (9), or the voltage of the source that is connected in its place."""
     if p.bias_source == FIXED:
         return p.fixed_voltage
@@ -77,14 +79,16 @@ def _bias_voltage(x, p):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _counter_torque_rate(t, x, u, p):  # type: ignore[no-untyped-def]
+def _counter_torque_rate(t: float, x: FloatArray, u: FloatArray, p: Share) -> float:
     return counter_torque_rate(
         x[COUNTER_TORQUE], _bias_voltage(x, p.torque_share),
         u[CURRENT_1, 0] + u[CURRENT_1, 1] * t, u[CURRENT_2, 0] + u[CURRENT_2, 1] * t, p.filter_1)
 
 
 @shared
-def _rates(t, x, mode, u, p, dx):  # type: ignore[no-untyped-def]
+def _rates(
+        t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: Share, dx: FloatArray,
+) -> None:
     share = p.torque_share
     current_sum = u[CURRENT_1, 0] + u[CURRENT_2, 0] + (u[CURRENT_1, 1] + u[CURRENT_2, 1]) * t
     dx[LOAD] = -share.k_3 * (x[LOAD] + share.current_to_voltage * current_sum)
@@ -93,7 +97,9 @@ def _rates(t, x, mode, u, p, dx):  # type: ignore[no-untyped-def]
 
 
 @shared
-def _switch(t, x, mode, u, p, commit):  # type: ignore[no-untyped-def]
+def _switch(
+        t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: Share, commit: bool,
+) -> bool:
     negative = 1 if x[LOAD] < 0.0 else 0
     saturation = 0
     if x[SHARE] > p.torque_share.saturation_high:
@@ -111,7 +117,9 @@ _advance = located_runge_kutta(_rates, _switch)
 
 
 @compiled
-def outputs(x, mode, u, t, p, y):  # type: ignore[no-untyped-def]
+def outputs(
+        x: FloatArray, mode: IntArray, u: FloatArray, t: float, p: Share, y: FloatArray,
+) -> None:
     """
     Write the outputs at t after the start of a macro-step, with their time derivatives.
 
@@ -134,7 +142,7 @@ def outputs(x, mode, u, t, p, y):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def start(p, x, mode, y):  # type: ignore[no-untyped-def]
+def start(p: Share, x: FloatArray, mode: IntArray, y: FloatArray) -> None:
     """
     Write the initial state into x and mode, and its outputs into y; shapes as in `outputs`.
 
@@ -150,7 +158,10 @@ def start(p, x, mode, y):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def step(x, mode, u, p, h, steps, work, y):  # type: ignore[no-untyped-def]
+def step(
+        x: FloatArray, mode: IntArray, u: FloatArray, p: Share, h: float, steps: int,
+        work: FloatArray, y: FloatArray,
+) -> None:
     """
     Advance torque share and Filter 1 over one macro-step.
 

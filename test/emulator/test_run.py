@@ -23,12 +23,13 @@ from antenna_drive.emulator.run import Emulator, FINE_STEP, simulate
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.units import build
 from antenna_drive.parameters import load, ParameterError
+from antenna_drive.parameters.schema import Value
 from antenna_drive.parameters.sets import changed, Drive
 from antenna_drive.physics import motor_drive, structure, torque_share
 import numpy as np
 import pytest
 
-CHANGES = {
+CHANGES: dict[int, dict[str, dict[str, Value]]] = {
     300: {'test_signal': {'waveform': 'saw_tooth', 'amplitude': 0.01, 'period': 0.9}},
     701: {'torque_share': {'bias_pot': 0.9, 'filter_1.gain': 20.0}},
     950: {'test_signal': {'amplitude': 0.004}, 'torque_share': {'fade_out_voltage': -9.0}},
