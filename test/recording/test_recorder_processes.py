@@ -1,0 +1,267 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The recorder with a real drive: five processes, real DDS, other libraries to read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+import signal
+import struct
+import subprocess
+import sys
+from threading import Thread
+from typing import Any
+
+from antenna_drive.cli import main
+import pytest
+
+pytest.importorskip('rclpy', reason='there is no ROS 2 here')
+
+from antenna_drive.emulator.run import Emulator  # noqa: E402, I100
+from antenna_drive.emulator.wiring import signal_names, UNITS  # noqa: E402
+from antenna_drive.lockstep.observer import Observer  # noqa: E402
+from antenna_drive.lockstep.processes import DriveProcesses  # noqa: E402
+from antenna_drive.parameters.loading import load  # noqa: E402
+from antenna_drive.parameters.sets import changed  # noqa: E402
+from antenna_drive.recording.mcap_format import read_bag  # noqa: E402
+from antenna_drive.recording.recording import RecordingWarning  # noqa: E402
+from antenna_drive.recording.replay import twin  # noqa: E402
+from mcap.exceptions import EndOfFile  # noqa: E402
+from mcap.reader import NonSeekingReader  # noqa: E402
+import numpy as np  # noqa: E402
+from rcl_interfaces.srv import SetParameters  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
+from rosbags.highlevel import AnyReader  # noqa: E402
+
+SQUARE: dict[str, Any] = {'waveform': 'square', 'amplitude': 0.001, 'period': 1.0}
+
+
+def steps_by_rosbags(path: Path) -> dict[str, list[int]]:
+    """Return the log times of every topic, in steps of 1 ms, as the rosbags library reads them."""
+    found: dict[str, list[int]] = {f'/{name}': [] for name in signal_names()}
+    with AnyReader([path]) as reader:
+        for connection, stamp, _ in reader.messages():
+            assert stamp % 1_000_000 == 0
+            found[connection.topic].append(stamp // 1_000_000)
+    return found
+
+
+class Drive:
+    """A running drive, watched by a guest who knows how far it is."""
+
+    def __init__(self, **run: Any) -> None:
+        self.step = -1
+        self.runs: list[int] = []
+        self._observer = Observer('watcher', self._on_step, on_begin=self._on_begin, guest=True)
+        self.node = self._observer.node
+        self.processes = DriveProcesses({'test_signal': {**SQUARE, **{
+            f'run.{name}': value for name, value in run.items()}}})
+
+    def _on_begin(self, run: int, step_s: float) -> None:
+        self.runs.append(run)
+        self.step = -1
+
+    def _on_step(self, k: int, time_s: float, samples: Any) -> None:
+        self.step = k
+
+    def until(self, reached: Callable[[], bool]) -> None:
+        """Follow the drive until something is so."""
+        def is_so() -> bool:
+            self.processes.check()
+            return reached()
+        self._observer.spin(is_so)
+
+    def __enter__(self) -> Drive:
+        self.processes.__enter__()
+        return self
+
+    def __exit__(self, *failure: Any) -> None:
+        self.processes.__exit__(*failure)
+        self._observer.close()
+
+
+class RecorderProcess:
+    """The recorder's process, as ros2 run starts it, and what it has said so far."""
+
+    def __init__(self, *arguments: str, program: tuple[str, ...] = (
+            '-m', 'antenna_drive.nodes.recorder')) -> None:
+        self.lines: list[str] = []
+        self.process = subprocess.Popen([sys.executable, *program, *arguments],
+                                        stderr=subprocess.PIPE, text=True)
+        self._reader = Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self.process.stderr is not None
+        for line in self.process.stderr:
+            self.lines.append(line)
+
+    def said(self, words: str) -> bool:
+        assert self.process.poll() is None or not self._reader.is_alive() or self.lines
+        return any(words in line for line in self.lines)
+
+    def end(self, number: signal.Signals = signal.SIGINT) -> int:
+        """Send a signal; return the exit code once everything said has been read."""
+        self.process.send_signal(number)
+        return self.wait()
+
+    def wait(self) -> int:
+        code = self.process.wait()
+        self._reader.join()
+        return code
+
+    def __enter__(self) -> RecorderProcess:
+        return self
+
+    def __exit__(self, *failure: Any) -> None:
+        self.process.kill()
+        self.wait()
+        assert self.process.stderr is not None
+        self.process.stderr.close()
+
+
+def recorder(*parameters: str, **more: Any) -> RecorderProcess:
+    return RecorderProcess('--ros-args', *(item for p in parameters for item in ('-p', p)), **more)
+
+
+def test_the_record_command_loses_nothing_and_changes_nothing(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str], fresh_domain: int) -> None:
+    out = tmp_path / 'run'
+    assert main(['record', '--duration', '2', '--out', str(out), '--config', 'old_circuit',
+                 '--set', *(f'test_signal.{k}={v}' for k, v in SQUARE.items())]) == 0
+    assert capsys.readouterr().out == f'2001 steps, 2 s: {out}\n'
+    for topic, steps in steps_by_rosbags(out).items():
+        assert steps == list(range(2001)), topic
+    recording = read_bag(out)
+    # the same drive in one process, by what the recording knows of it, and by the configuration
+    again = twin(recording)
+    assert again.channels == recording.channels
+    drive = changed(load('old_circuit'), {f'test_signal.rate.{k}': v for k, v in SQUARE.items()})
+    run = Emulator(drive).run(2.0)
+    for name in recording:
+        assert np.array_equal(recording[name].values, run[name]), name
+    assert set(recording.configuration) == set(UNITS)
+    assert recording.configuration['test_signal']['waveform'] == 'square'
+    assert recording.configuration['torque_share']['k_2'] == -3.502
+
+
+def test_a_recorder_joins_a_running_drive_and_keeps_every_step(
+        tmp_path: Path, fresh_domain: int) -> None:
+    (tmp_path / 'sheet.yaml').write_text('circuit: new\n')
+    with Drive(pace=1.0) as drive:
+        drive.until(lambda: drive.step > 1500)  # longer than the nodes remember
+        with recorder(f'out:={tmp_path}/run', f'sheet:={tmp_path}/sheet.yaml') as process:
+            drive.until(lambda: process.said('recording from step'))
+            began = drive.step
+            client: Any = drive.node.create_client(SetParameters, 'torque_share/set_parameters')
+            drive.until(client.service_is_ready)
+            client.call_async(SetParameters.Request(parameters=[
+                Parameter('bias_pot', value=0.5).to_parameter_msg()]))
+            drive.until(lambda: drive.step > began + 1500)
+            assert process.end() == 0
+            assert process.said('steps recorded to')
+    for topic, steps in steps_by_rosbags(tmp_path / 'run').items():
+        assert len(steps) > 1000
+        assert steps == list(range(steps[0], steps[-1] + 1)), topic
+    recording = read_bag(tmp_path / 'run')
+    assert recording.sheet.circuit == 'new'
+    assert set(recording.configuration) == set(UNITS)
+    assert [(c.unit, dict(c.values)) for c in recording.changes] == [
+        ('torque_share', {'bias_pot': 0.5})]
+
+
+def test_a_killed_recorder_loses_a_second_at_most(tmp_path: Path, fresh_domain: int) -> None:
+    with Drive(pace=1.0) as drive:
+        with recorder(f'out:={tmp_path}/run') as process:
+            drive.until(lambda: process.said('recording from step'))
+            begun = drive.step
+            drive.until(lambda: drive.step > begun + 2500)
+            killed = drive.step
+            process.process.kill()
+            process.wait()
+            drive.until(lambda: drive.step > killed + 100)  # the drive goes on
+    found: dict[str, list[int]] = {f'/{name}': [] for name in signal_names()}
+    with (tmp_path / 'run' / 'run_0.mcap').open('rb') as file, pytest.raises(EndOfFile):
+        for _, topic, message in NonSeekingReader(file).iter_messages(log_time_order=False):
+            assert len(struct.unpack('<4sd', message.data)) == 2
+            found[topic.topic].append(message.sequence)
+    for steps in found.values():
+        assert steps == list(range(steps[0], steps[-1] + 1))
+        assert steps[-1] >= killed - 1000
+    with pytest.warns(RecordingWarning, match='read up to'):
+        assert set(read_bag(tmp_path / 'run', partial=True).configuration) == set(UNITS)
+
+
+def test_a_new_run_gets_a_new_bag(tmp_path: Path, fresh_domain: int) -> None:
+    with Drive(pace=1.0) as drive, recorder(f'out:={tmp_path}/run') as process:
+        drive.until(lambda: process.said('recording from step'))
+        drive.processes.kill('motor_1')
+        drive.processes.start('motor_1')
+        drive.until(lambda: process.said('run_run_2') and drive.step > 300)
+        assert process.end(signal.SIGTERM) == 0
+    assert len(drive.runs) == 2
+    for name in ('run', 'run_run_2'):
+        for steps in steps_by_rosbags(tmp_path / name).values():
+            assert steps == list(range(steps[0], steps[-1] + 1))
+    assert read_bag(tmp_path / 'run_run_2').start_ns == 0
+
+
+def test_an_existing_target_is_refused_at_once(tmp_path: Path, fresh_domain: int) -> None:
+    (tmp_path / 'run').mkdir()
+    with recorder(f'out:={tmp_path}/run') as process:
+        assert process.wait() == 2
+        assert process.lines == [f'recorder: {tmp_path}/run: exists already; remove it or choose '
+                                 'another name\n']
+    assert list((tmp_path / 'run').iterdir()) == []
+
+
+FULL_DISK = """
+import resource, signal, sys
+from antenna_drive.nodes.recorder import main
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def test_a_full_disk_is_told_and_stops_nothing_else(tmp_path: Path, fresh_domain: int) -> None:
+    # even a drive that waits for the recorder at every step goes on
+    with Drive(pace=0.0, observers=['recorder']) as drive, recorder(
+            f'out:={tmp_path}/run', program=('-c', FULL_DISK)) as process:
+        drive.until(lambda: process.said('cannot be written'))
+        told = drive.step
+        drive.until(lambda: drive.step > told + 500)
+        assert process.end() == 1
+        assert process.said('File too large; recorded up to')
+    with pytest.warns(RecordingWarning, match='read up to'):
+        assert len(read_bag(tmp_path / 'run', partial=True)['plant/encoder']) > 100
+
+
+def test_wrong_arguments_are_refused_in_one_line(tmp_path: Path,
+                                                 capsys: pytest.CaptureFixture[str]) -> None:
+    for arguments, words in ((['--out', 'x'], 'ROS 2 arguments follow --ros-args'),
+                             (['--ros-args', '-p', f'sheet:={tmp_path}/no.yaml'], 'No such file')):
+        with RecorderProcess(*arguments) as process:
+            assert process.wait() == 2
+            assert len(process.lines) == 1
+            assert words in process.lines[0]
+    for arguments, words in (
+            (['--set', 'motor_3.x=1'], '--set motor_3.x=1: allowed is UNIT.NAME=VALUE'),
+            (['--sheet', 'none.yaml'], 'none.yaml: No such file'),
+            (['--set', 'motor_1.gear=1'], 'motor_1 has ended with status 2')):
+        assert main(['record', '--duration', '1', '--out', str(tmp_path / 'run'),
+                     *arguments]) == 2
+        assert words in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
