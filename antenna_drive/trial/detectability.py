@@ -44,17 +44,10 @@ UNIFORM_SPREAD = 1.0 / math.sqrt(3.0)
 RATE_HZ, DURATION_S = 200.0, 30.0
 
 
-class _NoNoise(np.random.Generator):
-    """A source that draws the middle of everything, for noiseless sensors."""
-
-    def __init__(self) -> None:
-        super().__init__(np.random.PCG64(0))
-
-    def normal(self, *_: object, **__: object) -> FloatArray:  # type: ignore[override]
-        return np.zeros(1)
-
-    def uniform(self, *_: object, **__: object) -> float:  # type: ignore[override]
-        return 0.0
+# Sensors without noise or digits: the study puts both in by their statistics.
+PERFECT = SensorGrade(current_noise_A=0.0, current_step_A=0.0, tach_noise_rad_s=0.0,
+                      tach_noise_relative=0.0, tach_step_rad_s=0.0, encoder_bits=40,
+                      bias_noise_V=0.0, bias_step_V=0.0)
 
 
 class Study:
@@ -132,9 +125,7 @@ class Study:
                    place: tuple[float, float]) -> FloatArray:
         sheet = sheet_of(self._truth, recording)
         history = simulate(machine, sheet, self._times, place)
-        fine = SensorGrade(current_step_A=0.0, tach_step_rad_s=0.0, bias_step_V=0.0,
-                           encoder_bits=40)
-        columns = record(history, machine, fine, self._times, _NoNoise())
+        columns = record(history, machine, PERFECT, self._times, np.random.default_rng(0))
         grade = sheet.sensors
         scaled = []
         for name, noise, step in (

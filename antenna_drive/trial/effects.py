@@ -158,7 +158,7 @@ def _fade_out(machine: Machine, values: Parameters) -> None:
 
 
 _TORQUE_SHARE = (
-    Effect('torque_share.bias_pot', 'k_p times a factor', (_factor(1.07, 1.8),),
+    Effect('torque_share.bias_pot', 'k_p times a factor', (_factor(1.07, 1.5),),
            _circuit_factor('bias_pot')),
     Effect('torque_share.fade_out_voltage', 'f_o shifted',
            (Quantity('shift', 'V', 0.5, 5.0, turned='sign'),), _fade_out),

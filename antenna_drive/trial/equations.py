@@ -105,7 +105,7 @@ def stribeck_torque(rise: float, rate: float, half_rate: float) -> float:
 
 
 @compiled
-def motor_friction(motor: Any, rate: float, direction: float, gear: float, t: float,
+def motor_friction(motor: Any, rate: float, direction: float, gear: float,
                    middle: float) -> tuple[float, float]:
     """Return kinetic friction (its size) and stiction of a motor in one direction [N m]."""
     level = motor.coulomb * (1.0 + motor.asymmetry * direction)
@@ -191,7 +191,7 @@ def bias_voltage(circuit: Any, test: Any, x_2: float, middle: float, switch: int
 @compiled
 def motor_derivative(motor: Any, machine: Machine, y: FloatArray, dy: FloatArray, at: int,
                      which: int, t: float, middle: float, mode: ModeArray,
-                     margin: FloatArray, sag: float) -> float:
+                     margin: FloatArray) -> float:
     """Fill the derivatives and margins of one motor with its gear; return its gear torque."""
     structure = machine.structure[0]
     circuit = machine.circuit[0]
@@ -251,8 +251,10 @@ def motor_derivative(motor: Any, machine: Machine, y: FloatArray, dy: FloatArray
     # Amplifier 2 and armature
     if motor.dead_zone > 0.0:
         v -= motor.dead_zone * math.tanh(v / motor.dead_zone)
+    if motor.bridge_error != 0.0:
+        v *= 1.0 + motor.bridge_error * math.tanh(v / 0.3)
     voltage = motor.loop_gain * v - motor.feedback_gain * i
-    limit = motor.voltage_limit / (1.0 + sag / motor.voltage_limit)
+    limit = motor.voltage_limit
     rail = mode[VOLTAGE + which]
     if rail == 0:
         margin[VOLTAGE + which] = limit - abs(voltage)
@@ -276,11 +278,11 @@ def motor_derivative(motor: Any, machine: Machine, y: FloatArray, dy: FloatArray
     slip = mode[FRICTION + which]
     if slip == 0:
         direction = 1.0 if applied >= 0.0 else -1.0
-        stiction = motor_friction(motor, 0.0, direction, gear, t, middle)[1]
+        stiction = motor_friction(motor, 0.0, direction, gear, middle)[1]
         margin[FRICTION + which] = stiction - abs(applied)
         dy[at + W] = 0.0
     else:
-        kinetic = motor_friction(motor, w, slip * 1.0, gear, t, middle)[0]
+        kinetic = motor_friction(motor, w, slip * 1.0, gear, middle)[0]
         drag = slip * kinetic + viscous_torque(motor.viscous, w, 20.0)
         margin[FRICTION + which] = slip * w
         dy[at + W] = (applied - drag) / motor.inertia
@@ -379,12 +381,11 @@ def derivative(t: float, middle: float, y: FloatArray, mode: ModeArray, machine:
     bias = bias_voltage(circuit, test, x_2, middle, saturation)
     dy[X_F] = -circuit.filter_pole * y[X_F] + circuit.filter_gain * (
         bias - circuit.difference_gain * (second - first))
-    sag = machine.structure[0].supply_sag * (abs(first) + abs(second))
     gears = 0.0
     for which in range(2):
         gears += motor_derivative(
             machine.motors[which], machine, y, dy, MOTOR_AT + which * MOTOR_SIZE, which, t,
-            middle, mode, margin, sag)
+            middle, mode, margin)
     structure_derivative(machine.structure[0], y, dy, t, middle, test.elevation, gears, mode,
                          margin)
 

@@ -70,6 +70,7 @@ MOTOR = np.dtype([(name, np.float64) for name in (
     'delay',                    # of the rate error [s]
     # imperfections outside the catalogue
     'slew_limit',               # largest slope of the current demand [A/s], 0: none
+    'bridge_error',             # gain of the power stage times 1 + this * sign of the demand
     'windup',                   # share of the integration that the clamp fails to stop
     'integrator_leak',          # [1/s]
     'current_ripple',           # relative ripple of the torque constant
@@ -105,7 +106,6 @@ STRUCTURE = np.dtype([(name, np.float64) for name in (
     'warming', 'warming_time',                        # loss of Coulomb friction, [s]
     'mode_friction',            # dry friction in the structure [N m]
     'mode_friction_rate',       # [rad/s]
-    'supply_sag',               # at low current [V per article A of both]
     'ballast', 'ballast_at',    # load that shifts [N m], [s]
 )] + [
     ('mode_inertia', np.float64, (3,)),

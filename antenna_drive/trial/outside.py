@@ -107,9 +107,10 @@ OUTSIDE: dict[str, Effect] = {effect.key: effect for effect in (
     Effect('outside.dahl_friction', 'part of the axis friction acts as a spring before it slides',
            (Quantity('travel', 'rad', 1.5e-5, 4e-4), Quantity('share', '1', 0.5, 0.9, 'even')),
            _structure_values(dahl_travel='travel', dahl='share')),
-    Effect('outside.supply_sag', 'supply voltage falls with the current of both motors, '
-           'as V / (1 + sag (|i_1| + |i_2|) / V)',
-           (Quantity('sag', 'V/A', 60.0, 250.0),), _structure_values(supply_sag='sag')),
+    Effect('outside.unequal_bridges', 'gain of a power stage differs with the direction of '
+           'the current, v (1 + error tanh(v / 0.3 A))',
+           (Quantity('error', '1', 0.05, 0.5, turned='sign'), MOTOR),
+           _motor_values(bridge_error='error')),
     Effect('outside.structural_friction', 'dry friction in the joints of the first mode',
            (Quantity('torque', 'N m', 4e3, 8e4), Quantity('rate', 'rad/s', 2e-5, 1e-4)),
            _structure_values(mode_friction='torque', mode_friction_rate='rate')),

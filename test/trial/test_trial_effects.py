@@ -53,7 +53,7 @@ OTHER_EFFECTS = {
 
 
 def signals(effect: Effect | None, size: float) -> NDArray[np.float64]:
-    """Return fourteen seconds of recorded signals, all noises alike, with and without an effect."""
+    """Return fourteen seconds of recorded signals, with an effect and all noises alike."""
     machine = reference_machine('new', 'new', 0.8)
     if effect is not None:
         effect.change(machine, effect.draw(size, np.random.default_rng(5)))
