@@ -67,9 +67,12 @@ def distances(step_s: float, names: Iterable[str] | None = None,
 
     Parameters
     ----------
-    step_s : macro-step [s], a whole part of 4 ms
-    names : of the experiments, all of T1 to T4 if left out
-    progress : told the name of each experiment as it begins
+    step_s
+        macro-step [s], a whole part of 4 ms
+    names
+        of the experiments, all of T1 to T4 if left out
+    progress
+        told the name of each experiment as it begins
 
     """
     found = []
@@ -97,7 +100,8 @@ def stability_limit(step_s: float) -> float:
 
     Parameters
     ----------
-    step_s : macro-step [s]
+    step_s
+        macro-step [s]
 
     """
     low, high = _GAINS
@@ -117,10 +121,14 @@ def growth_rate(gain: float, step_s: float, settled_s: float = 12.0, watched_s: 
 
     Parameters
     ----------
-    gain : k' of Filter 1 [1/s]
-    step_s : macro-step [s]
-    settled_s : time given to the loop, at a stable gain, to become steady [s]
-    watched_s : time over which the disturbance is watched [s]
+    gain
+        k' of Filter 1 [1/s]
+    step_s
+        macro-step [s]
+    settled_s
+        time given to the loop, at a stable gain, to become steady [s]
+    watched_s
+        time over which the disturbance is watched [s]
 
     """
     emulator = Emulator(filter_variant(_SETTLING_GAIN, _OLD_POLE).drive(), step_s)

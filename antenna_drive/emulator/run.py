@@ -88,9 +88,12 @@ class Emulator:
 
     Parameters
     ----------
-    drive : parameters of the whole drive
-    step_s : macro-step [s]
-    replaced : units of your own, by the name of the unit that each replaces
+    drive
+        parameters of the whole drive
+    step_s
+        macro-step [s]
+    replaced
+        units of your own, by the name of the unit that each replaces
 
     Raises
     ------
@@ -185,8 +188,10 @@ class Emulator:
 
         Parameters
         ----------
-        count : macro-steps
-        every : keep the samples of the steps that this number divides
+        count
+            macro-steps
+        every
+            keep the samples of the steps that this number divides
 
         Returns
         -------
@@ -213,10 +218,13 @@ class Emulator:
 
         Parameters
         ----------
-        duration : [s], rounded to macro-steps
-        changes : live changes by the step at which each takes effect: a change at step k is in
+        duration
+            [s], rounded to macro-steps
+        changes
+            live changes by the step at which each takes effect: a change at step k is in
             force when the units go from k to k + 1
-        every : keep the samples of the steps that this number divides
+        every
+            keep the samples of the steps that this number divides
 
         """
         self.restart()
@@ -238,8 +246,10 @@ class Emulator:
 
         Parameters
         ----------
-        duration, changes, every : as in `chunks`
-        progress : called with the share that is done, from 0 to 1
+        duration, changes, every
+            as in `chunks`
+        progress
+            called with the share that is done, from 0 to 1
 
         """
         steps, samples = [], []
@@ -259,11 +269,16 @@ def simulate(drive: Drive, duration: float, step_s: float = MACRO_STEP,
 
     Parameters
     ----------
-    drive : parameters of the whole drive
-    duration : [s]
-    step_s : macro-step [s]
-    changes : live changes by the step at which each takes effect
-    every : keep the samples of the steps that this number divides
+    drive
+        parameters of the whole drive
+    duration
+        [s]
+    step_s
+        macro-step [s]
+    changes
+        live changes by the step at which each takes effect
+    every
+        keep the samples of the steps that this number divides
 
     """
     return Emulator(drive, step_s).run(duration, changes, every)

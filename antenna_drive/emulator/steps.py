@@ -54,14 +54,22 @@ def _advance(
 
     Parameters
     ----------
-    k : number of the macro-step to begin with
-    h, steps, every : macro-step [s], inner steps in it, and which steps to keep
-    commands : test signals at each step's end, shape (count, 2, 2)
-    now, after : samples at the step's start and end, shape (signals, 2); now holds the last ones
-    kept : receives the kept samples
-    columns : rows of `now` that each of the four units reads, a tuple of index arrays
-    firsts : row of the first output of each of the five units
-    motor_1, motor_2, share, plant : each unit's record, states, mode, inputs, work, outputs
+    k
+        number of the macro-step to begin with
+    h, steps, every
+        macro-step [s], inner steps in it, and which steps to keep
+    commands
+        test signals at each step's end, shape (count, 2, 2)
+    now, after
+        samples at the step's start and end, shape (signals, 2); now holds the last ones
+    kept
+        receives the kept samples
+    columns
+        rows of `now` that each of the four units reads, a tuple of index arrays
+    firsts
+        row of the first output of each of the five units
+    motor_1, motor_2, share, plant
+        each unit's record, states, mode, inputs, work, outputs
 
     """
     row = 0

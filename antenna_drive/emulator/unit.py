@@ -79,7 +79,8 @@ class Unit(ABC):
 
         Parameters
         ----------
-        step_s : length of one macro-step [s]
+        step_s
+            length of one macro-step [s]
 
         Returns
         -------
@@ -94,8 +95,10 @@ class Unit(ABC):
 
         Parameters
         ----------
-        k : number of the macro-step; t_k = k * step_s
-        inputs : array of shape (len(inputs), 2), value and time derivative of each input
+        k
+            number of the macro-step; t_k = k * step_s
+        inputs
+            array of shape (len(inputs), 2), value and time derivative of each input
             at t_k; between t_k and t_k+1 an input is value + derivative * (t - t_k)
 
         Returns

@@ -250,8 +250,10 @@ def overridden(drive: Drive, overrides: Mapping[str, Mapping[str, Value]]) -> Dr
 
     Parameters
     ----------
-    drive : the parameters of the whole drive
-    overrides : values by unit and by the name that the unit's setting has
+    drive
+        the parameters of the whole drive
+    overrides
+        values by unit and by the name that the unit's setting has
 
     Raises
     ------
@@ -269,9 +271,12 @@ def build(name: str, drive: Drive, overrides: Mapping[str, Value] | None = None)
 
     Parameters
     ----------
-    name : one of wiring.UNITS
-    drive : the parameters of the whole drive
-    overrides : settings of the unit, constants too, that differ from the drive's
+    name
+        one of wiring.UNITS
+    drive
+        the parameters of the whole drive
+    overrides
+        settings of the unit, constants too, that differ from the drive's
 
     Raises
     ------

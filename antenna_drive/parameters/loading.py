@@ -58,7 +58,8 @@ def load(*sources: str | Path) -> Drive:
 
     Parameters
     ----------
-    sources : paths, or names of the sets in config/ ('new_circuit'); none is the reference set
+    sources
+        paths, or names of the sets in config/ ('new_circuit'); none is the reference set
 
     Raises
     ------

@@ -35,10 +35,14 @@ def rate_error(
 
     Parameters
     ----------
-    command_voltage : v_c [V]
-    tach_rate : tachometer reading [rad/s]
-    bias_command : s s_F x_F, the counter-torque with the sign of this motor [V]
-    p : Amplifier
+    command_voltage
+        v_c [V]
+    tach_rate
+        tachometer reading [rad/s]
+    bias_command
+        s s_F x_F, the counter-torque with the sign of this motor [V]
+    p
+        Amplifier
 
     """
     volts = command_voltage - p.tach_gain * tach_rate + bias_command + p.offset
@@ -61,9 +65,12 @@ def limit_centre(rate: float, p: Amplifier, armature: Armature) -> float:
 
     Parameters
     ----------
-    rate : w of the motor [rad/s]
-    p : Amplifier
-    armature : Armature
+    rate
+        w of the motor [rad/s]
+    p
+        Amplifier
+    armature
+        Armature
 
     """
     kappa = armature.physical_amperes_per_article_ampere
@@ -92,9 +99,12 @@ def error_slope(
 
     Parameters
     ----------
-    error : e [article A], zero within the dead zone
-    command_slope, tach_slope, bias_slope : derivatives of its arguments [V/s], [rad/s^2], [V/s]
-    p : Amplifier
+    error
+        e [article A], zero within the dead zone
+    command_slope, tach_slope, bias_slope
+        derivatives of its arguments [V/s], [rad/s^2], [V/s]
+    p
+        Amplifier
 
     """
     if p.dead_zone > 0.0 and error == 0.0:
@@ -109,11 +119,16 @@ def next_winding(winding: int, error: float, excess: float, needed: float, p: Am
 
     Parameters
     ----------
-    winding : FREE, FROZEN or HELD so far
-    error : e [article A]
-    excess : how far the demand is beyond the limit, in the direction of the error [article A]
-    needed : rate of the integral, in that direction, that keeps the excess as it is [article A/s]
-    p : Amplifier
+    winding
+        FREE, FROZEN or HELD so far
+    error
+        e [article A]
+    excess
+        how far the demand is beyond the limit, in the direction of the error [article A]
+    needed
+        rate of the integral, in that direction, that keeps the excess as it is [article A/s]
+    p
+        Amplifier
 
     """
     free = abs(error) / p.integral_time
@@ -150,10 +165,14 @@ def armature_voltage(
 
     Parameters
     ----------
-    lagged_demand : v, the demand behind the lag T_a [article A]
-    current : i [article A]
-    p : Amplifier
-    armature : Armature
+    lagged_demand
+        v, the demand behind the lag T_a [article A]
+    current
+        i [article A]
+    p
+        Amplifier
+    armature
+        Armature
 
     """
     kappa = armature.physical_amperes_per_article_ampere

@@ -26,10 +26,14 @@ def current_rate(voltage: float, current: float, rate: float, p: Armature) -> fl
 
     Parameters
     ----------
-    voltage : V at the armature [V]
-    current : i [article A]
-    rate : w of the motor [rad/s]
-    p : Armature
+    voltage
+        V at the armature [V]
+    current
+        i [article A]
+    rate
+        w of the motor [rad/s]
+    p
+        Armature
 
     """
     kappa = p.physical_amperes_per_article_ampere

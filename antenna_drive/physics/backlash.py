@@ -25,8 +25,10 @@ def dead_zone(twist: float, half_gap: float) -> float:
 
     Parameters
     ----------
-    twist : angle between the two gears, at the shaft of the stiffness [rad]
-    half_gap : b, the gap reaches from -b to b [rad]
+    twist
+        angle between the two gears, at the shaft of the stiffness [rad]
+    half_gap
+        b, the gap reaches from -b to b [rad]
 
     """
     if twist > half_gap:
@@ -62,11 +64,16 @@ def contact_torque(
 
     Parameters
     ----------
-    side : the flank that pushes, from `contact_side`
-    twist, twist_rate : angle and rate between the two gears [rad], [rad/s]
-    half_gap : b [rad]
-    stiffness : k [N m/rad]
-    damping : torque per rate of approach while in contact [N m s/rad]; not in the article
+    side
+        the flank that pushes, from `contact_side`
+    twist, twist_rate
+        angle and rate between the two gears [rad], [rad/s]
+    half_gap
+        b [rad]
+    stiffness
+        k [N m/rad]
+    damping
+        torque per rate of approach while in contact [N m s/rad]; not in the article
 
     Returns
     -------

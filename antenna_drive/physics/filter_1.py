@@ -29,10 +29,14 @@ def counter_torque_rate(
 
     Parameters
     ----------
-    counter_torque : x_F, state [V]
-    bias_voltage : v_b, the bias asked for [V]
-    current_1, current_2 : of the motors [article A]
-    p : Filter1
+    counter_torque
+        x_F, state [V]
+    bias_voltage
+        v_b, the bias asked for [V]
+    current_1, current_2
+        of the motors [article A]
+    p
+        Filter1
 
     """
     error = bias_voltage - p.difference_gain * (current_2 - current_1)

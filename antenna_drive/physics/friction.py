@@ -36,10 +36,14 @@ def friction_torque(
 
     Parameters
     ----------
-    rate : v [rad/s]
-    applied : T_o, the torque on the body but for friction [N m]
-    coulomb, stiction : T_c and T_s [N m]
-    threshold : v_t, below which the rate counts as zero [rad/s]
+    rate
+        v [rad/s]
+    applied
+        T_o, the torque on the body but for friction [N m]
+    coulomb, stiction
+        T_c and T_s [N m]
+    threshold
+        v_t, below which the rate counts as zero [rad/s]
 
     """
     if abs(rate) > threshold:
@@ -57,13 +61,19 @@ def slip_level(
 
     Parameters
     ----------
-    rate : [rad/s]; where it is zero the level of forward slip is given
-    coulomb : T_c [N m]
-    viscous : torque per rate, zero in the article [N m s/rad]
-    stribeck : how much more torque slipping begins with than it settles at, zero in the article
+    rate
+        [rad/s]; where it is zero the level of forward slip is given
+    coulomb
+        T_c [N m]
+    viscous
+        torque per rate, zero in the article [N m s/rad]
+    stribeck
+        how much more torque slipping begins with than it settles at, zero in the article
         [N m]; it fades as exp(-(rate / stribeck_rate)^stribeck_shape)
-    stribeck_rate, stribeck_shape : [rad/s], [1]
-    asymmetry : share by which forward friction exceeds, and backward friction falls short of,
+    stribeck_rate, stribeck_shape
+        [rad/s], [1]
+    asymmetry
+        share by which forward friction exceeds, and backward friction falls short of,
         the mean of both, zero in the article [1]
 
     """
@@ -88,11 +98,16 @@ def next_slip(
 
     Parameters
     ----------
-    slip : the mode so far
-    rate : v [rad/s]
-    applied : T_o [N m]
-    coulomb, stiction : T_c and T_s [N m]
-    threshold : v_t [rad/s]
+    slip
+        the mode so far
+    rate
+        v [rad/s]
+    applied
+        T_o [N m]
+    coulomb, stiction
+        T_c and T_s [N m]
+    threshold
+        v_t [rad/s]
 
     """
     if slip == 0:

@@ -29,9 +29,12 @@ def twist(motor_angle: float, axis_angle: float, gear_ratio: float, p: Gearbox) 
 
     Parameters
     ----------
-    motor_angle, axis_angle : [rad]
-    gear_ratio : N [1]
-    p : Gearbox; transmission_error is the unmodelled effect of eccentric or uneven teeth
+    motor_angle, axis_angle
+        [rad]
+    gear_ratio
+        N [1]
+    p
+        Gearbox; transmission_error is the unmodelled effect of eccentric or uneven teeth
 
     """
     angle = motor_angle - gear_ratio * axis_angle
@@ -48,9 +51,8 @@ def twist_rate(
     """Return the time derivative of `twist` [rad/s]; rates in rad/s, otherwise as there."""
     rate = motor_rate - gear_ratio * axis_rate
     if p.transmission_error != 0.0:
-        rate += (p.transmission_error * p.transmission_error_cycles * motor_rate
-                 * math.cos(
-            p.transmission_error_cycles * motor_angle + p.transmission_error_phase))
+        rate += p.transmission_error * p.transmission_error_cycles * motor_rate * math.cos(
+            p.transmission_error_cycles * motor_angle + p.transmission_error_phase)
     return rate
 
 
@@ -61,10 +63,14 @@ def gear_torque(side: int, angle: float, rate: float, presliding: float, p: Gear
 
     Parameters
     ----------
-    side : the flank that touches: +1, -1 or 0 for none
-    angle, rate : `twist` and `twist_rate` [rad], [rad/s]
-    presliding : state of the hysteresis, from -1 to 1
-    p : Gearbox
+    side
+        the flank that touches: +1, -1 or 0 for none
+    angle, rate
+        `twist` and `twist_rate` [rad], [rad/s]
+    presliding
+        state of the hysteresis, from -1 to 1
+    p
+        Gearbox
 
     """
     torque = contact_torque(side, angle, rate, p.half_gap, p.stiffness, p.contact_damping)

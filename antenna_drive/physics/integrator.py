@@ -51,10 +51,12 @@ def located_runge_kutta(
 
     Parameters
     ----------
-    rates : compiled function (t, x, mode, u, p, dx): writes the time derivative of the states x
+    rates
+        compiled function (t, x, mode, u, p, dx): writes the time derivative of the states x
         for a frozen mode into dx; t [s] runs from the start of the macro-step, u are the inputs
         of shape (n, 2), value and time derivative at t = 0, p the unit's parameters
-    switch : compiled function (t, x, mode, u, p, commit) -> bool: tells whether the mode no
+    switch
+        compiled function (t, x, mode, u, p, commit) -> bool: tells whether the mode no
         longer holds; if commit is true it also writes the new mode and resets states
 
     Returns

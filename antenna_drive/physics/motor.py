@@ -29,9 +29,12 @@ def driving_torque(current: float, angle: float, p: Motor) -> float:
 
     Parameters
     ----------
-    current : i [article A]
-    angle : of the rotor [rad]
-    p : Motor; torque_ripple is the unmodelled effect of a rotor with poles and slots
+    current
+        i [article A]
+    angle
+        of the rotor [rad]
+    p
+        Motor; torque_ripple is the unmodelled effect of a rotor with poles and slots
 
     """
     torque = p.torque_constant * current
@@ -48,9 +51,12 @@ def friction_level(rate: float, gear_torque: float, p: Motor) -> float:
 
     Parameters
     ----------
-    rate : w of the rotor [rad/s]
-    gear_torque : T_g on the shaft, for the effect of a friction that grows with load [N m]
-    p : Motor
+    rate
+        w of the rotor [rad/s]
+    gear_torque
+        T_g on the shaft, for the effect of a friction that grows with load [N m]
+    p
+        Motor
 
     """
     coulomb = p.coulomb_torque * p.friction_torque_per_ampere
@@ -67,8 +73,10 @@ def tachometer(rate: float, angle: float, p: Tachometer) -> float:
 
     Parameters
     ----------
-    rate, angle : of the rotor [rad/s], [rad]
-    p : Tachometer; gain 1, offset 0 and ripple 0 in the article
+    rate, angle
+        of the rotor [rad/s], [rad]
+    p
+        Tachometer; gain 1, offset 0 and ripple 0 in the article
 
     """
     reading = p.gain * rate + p.offset

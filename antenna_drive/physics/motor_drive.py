@@ -89,7 +89,8 @@ def _acceleration(x: FloatArray, mode: IntArray, torque: float, p: MotorDrive) -
     if mode[SLIP] == 0:
         return 0.0
     applied = driving_torque(x[CURRENT], x[ANGLE], p.motor) - torque
-    return (applied - mode[SLIP] * friction_level(x[RATE], torque, p.motor)) / p.motor.rotor_inertia
+    friction = mode[SLIP] * friction_level(x[RATE], torque, p.motor)
+    return (applied - friction) / p.motor.rotor_inertia
 
 
 @inner
@@ -174,11 +175,16 @@ def outputs(
 
     Parameters
     ----------
-    x, mode : states and mode at t, shapes (8,) and (3,)
-    u : inputs at the start of the macro-step, shape (4, 2)
-    t : [s]
-    p : record of MotorDrive
-    y : receives value and derivative of each output, shape (5, 2)
+    x, mode
+        states and mode at t, shapes (8,) and (3,)
+    u
+        inputs at the start of the macro-step, shape (4, 2)
+    t
+        [s]
+    p
+        record of MotorDrive
+    y
+        receives value and derivative of each output, shape (5, 2)
 
     """
     rate, torque = _gear(t, x, mode, u, p)
@@ -221,13 +227,20 @@ def step(
 
     Parameters
     ----------
-    x, mode : states and mode, advanced in place, shapes (8,) and (3,)
-    u : inputs, value and time derivative at the start of the macro-step, shape (4, 2)
-    p : record of MotorDrive
-    h : macro-step [s]
-    steps : inner steps in it
-    work : from `integrator.work_space`
-    y : receives the outputs at the end, shape (5, 2); still holds those at the start
+    x, mode
+        states and mode, advanced in place, shapes (8,) and (3,)
+    u
+        inputs, value and time derivative at the start of the macro-step, shape (4, 2)
+    p
+        record of MotorDrive
+    h
+        macro-step [s]
+    steps
+        inner steps in it
+    work
+        from `integrator.work_space`
+    y
+        receives the outputs at the end, shape (5, 2); still holds those at the start
 
     """
     held = (y[1, 0] + 0.5 * y[1, 1] * h) * h

@@ -26,9 +26,12 @@ def command_voltage_rate(voltage: float, rate_command: float, p: RateCommand) ->
 
     Parameters
     ----------
-    voltage : v_c, state [V]
-    rate_command : r, axis rate command [rad/s]
-    p : RateCommand
+    voltage
+        v_c, state [V]
+    rate_command
+        r, axis rate command [rad/s]
+    p
+        RateCommand
 
     """
     return (p.k_s * p.k_1 * rate_command - voltage) / p.tau_1

@@ -73,8 +73,8 @@ def _friction_level(rate: float, angle: float, p: Axis) -> float:
     """Return the size of the axis friction while it slips [N m]."""
     coulomb = p.coulomb_torque * p.friction_torque_per_ampere * p.gear_ratio
     if p.friction_wave != 0.0:
-        coulomb *= 1.0 + p.friction_wave * math.sin(p.friction_wave_cycles * angle
-                                                  + p.friction_wave_phase)
+        coulomb *= 1.0 + p.friction_wave * math.sin(
+            p.friction_wave_cycles * angle + p.friction_wave_phase)
     return slip_level(rate, coulomb, p.viscous_friction, p.stribeck_torque, p.stribeck_rate,
                       p.stribeck_shape, 0.0)
 
@@ -125,8 +125,10 @@ def encoder(angle: float, p: Encoder) -> float:
 
     Parameters
     ----------
-    angle : of the hub [rad]
-    p : Encoder; offset, cyclic error and step are zero in the article
+    angle
+        of the hub [rad]
+    p
+        Encoder; offset, cyclic error and step are zero in the article
 
     """
     reading = angle + p.offset
@@ -146,11 +148,16 @@ def outputs(
 
     Parameters
     ----------
-    x, mode : states and mode at t, shapes (2 + 2 modes,) and (1,)
-    u : inputs at the start of the macro-step, shape (5, 2)
-    t : [s]
-    p : record of Plant
-    y : receives value and derivative of each output, shape (6, 2)
+    x, mode
+        states and mode at t, shapes (2 + 2 modes,) and (1,)
+    u
+        inputs at the start of the macro-step, shape (5, 2)
+    t
+        [s]
+    p
+        record of Plant
+    y
+        receives value and derivative of each output, shape (6, 2)
 
     """
     axis = p.axis
@@ -192,13 +199,20 @@ def step(
 
     Parameters
     ----------
-    x, mode : states and mode, advanced in place, shapes (2 + 2 modes,) and (1,)
-    u : inputs, value and time derivative at the start of the macro-step, shape (5, 2)
-    p : record of Plant
-    h : macro-step [s]
-    steps : inner steps in it
-    work : from `integrator.work_space`
-    y : receives the outputs at the end, shape (6, 2)
+    x, mode
+        states and mode, advanced in place, shapes (2 + 2 modes,) and (1,)
+    u
+        inputs, value and time derivative at the start of the macro-step, shape (5, 2)
+    p
+        record of Plant
+    h
+        macro-step [s]
+    steps
+        inner steps in it
+    work
+        from `integrator.work_space`
+    y
+        receives the outputs at the end, shape (6, 2)
 
     """
     # teeth that met within the last macro-step pushed in a way that nobody could extrapolate

@@ -104,9 +104,12 @@ def waveform(t: float, p: Waveform, bits: FloatArray) -> tuple[float, float]:
 
     Parameters
     ----------
-    t : time since the waveform was chosen [s]
-    p : Waveform
-    bits : from `prbs_bits`
+    t
+        time since the waveform was chosen [s]
+    p
+        Waveform
+    bits
+        from `prbs_bits`
 
     """
     if p.waveform == EXTERNAL:
@@ -128,12 +131,18 @@ def sample(
 
     Parameters
     ----------
-    first, count : number of the first macro-step, and how many
-    h : macro-step [s]
-    origins : time at which the rate's and the torque's waveform were chosen [s], shape (2,)
-    p : record of TestSignal
-    bits : from `prbs_bits`
-    y : receives value and derivative of rate command [rad/s] and external torque [N m],
+    first, count
+        number of the first macro-step, and how many
+    h
+        macro-step [s]
+    origins
+        time at which the rate's and the torque's waveform were chosen [s], shape (2,)
+    p
+        record of TestSignal
+    bits
+        from `prbs_bits`
+    y
+        receives value and derivative of rate command [rad/s] and external torque [N m],
         shape (count, 2, 2)
 
     """

@@ -55,8 +55,10 @@ def steady_bias_voltage(current_sum: float, p: TorqueShare) -> float:
 
     Parameters
     ----------
-    current_sum : i_1 + i_2 [article A]
-    p : TorqueShare
+    current_sum
+        i_1 + i_2 [article A]
+    p
+        TorqueShare
 
     """
     share = p.k_2 / p.s_2 * (p.fade_out_voltage
@@ -125,11 +127,16 @@ def outputs(
 
     Parameters
     ----------
-    x, mode : states and mode at t, shapes (3,) and (2,)
-    u : inputs at the start of the macro-step, shape (2, 2)
-    t : [s]
-    p : record of TorqueShareUnit
-    y : receives value and derivative of each output, shape (2, 2)
+    x, mode
+        states and mode at t, shapes (3,) and (2,)
+    u
+        inputs at the start of the macro-step, shape (2, 2)
+    t
+        [s]
+    p
+        record of TorqueShareUnit
+    y
+        receives value and derivative of each output, shape (2, 2)
 
     """
     share = p.torque_share
@@ -167,13 +174,20 @@ def step(
 
     Parameters
     ----------
-    x, mode : states and mode, advanced in place, shapes (3,) and (2,)
-    u : inputs, value and time derivative at the start of the macro-step, shape (2, 2)
-    p : record of TorqueShareUnit
-    h : macro-step [s]
-    steps : inner steps in it
-    work : from `integrator.work_space`
-    y : receives the outputs at the end, shape (2, 2)
+    x, mode
+        states and mode, advanced in place, shapes (3,) and (2,)
+    u
+        inputs, value and time derivative at the start of the macro-step, shape (2, 2)
+    p
+        record of TorqueShareUnit
+    h
+        macro-step [s]
+    steps
+        inner steps in it
+    work
+        from `integrator.work_space`
+    y
+        receives the outputs at the end, shape (2, 2)
 
     """
     _advance(x, mode, u, p, h, steps, work)

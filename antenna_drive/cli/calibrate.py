@@ -1,0 +1,74 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Fit parameters to published or measured figures, and say what these figures determine.
+
+  antenna-drive calibrate calibration_targets --out fitted.yaml
+  antenna-drive calibrate my_antenna.yaml --start my_drive.yaml --out fitted.yaml --log fit.log
+
+TARGETS names the free parameters with their bounds, and the figures aimed at with tolerances
+and weights; docs/calibration.md tells its form. The search is global, and repeats with its
+seed; with --log an interrupted one goes on where it stopped. The exit code is 1 if a target
+is missed by more than its tolerance.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+import sys
+from typing import Any
+
+from antenna_drive import cli
+from antenna_drive.calibration.configuration import write_configuration
+from antenna_drive.calibration.problem import read_problem
+from antenna_drive.calibration.report import report
+from antenna_drive.calibration.search import Candidate, search
+from antenna_drive.cli.output import add_json_option, Progress, STANDARD_OUTPUT, write_json
+
+COUNT = 2000
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument('targets', metavar='TARGETS',
+                        help='what is free and what is aimed at: a file, or a name in config/')
+    parser.add_argument('--start', metavar='CONFIG', default='reference',
+                        help='configuration to start from (default: %(default)s)')
+    parser.add_argument('--out', metavar='FILE', type=Path, required=True,
+                        help='configuration to write')
+    parser.add_argument('--log', metavar='FILE', type=Path,
+                        help='keep every candidate in FILE, and go on from it if it is there')
+    parser.add_argument('--seed', type=int, default=1, help='default: %(default)s')
+    parser.add_argument('--count', type=int, default=COUNT,
+                        help='candidates to try (default: %(default)s)')
+    parser.add_argument('--trade-off', metavar='FIGURE', nargs='+', default=[],
+                        help='also show what each of these figures costs the others')
+    add_json_option(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Do what the arguments say; return the exit code."""
+    problem = read_problem(arguments.targets, [arguments.start])
+    with Progress('candidates', max(1, arguments.count)) as shown:
+        found = search(problem, arguments.count, seed=arguments.seed, log=arguments.log,
+                       progress=lambda done, best: shown.update(done))
+    write_configuration(problem, found.best.shares, arguments.start, arguments.out)
+    with Progress('what is determined', 1.0) as shown:
+        told = report(problem, found, arguments.trade_off, shown.update)
+    if arguments.json is not None:
+        write_json(told, arguments.json)
+    if arguments.json != STANDARD_OUTPUT:
+        _write(told)
+    return cli.OK if all(item['met'] for item in told['targets']) else cli.NEGATIVE
