@@ -14,9 +14,9 @@
 """
 How far the lock-step is from the converged reference, on the article's experiments.
 
-The reference is the same drive at a macro-step of `FINE_STEP`. Two things are measured: the rms
-distance of every signal of T1 to T4, as a share of that signal's rms, and the gain of Filter 1
-at which the torque bias becomes unstable (T4c), which a delay in the exchange would lower.
+The reference is the same drive at a macro-step of `FINE_STEP`. Measured is the rms distance of every
+signal of T1 to T4, as a share of that signal's rms. `stability` measures the other thing that
+the exchange between units may change: the gain at which the torque bias becomes unstable.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
-from antenna_drive.article.experiments import Experiment, experiments, filter_variant
-from antenna_drive.emulator.run import Emulator, FINE_STEP, Run, simulate
+from antenna_drive.article.experiments import Experiment, experiments
+from antenna_drive.emulator.run import FINE_STEP, Run, simulate
 import numpy as np
 
 STEPS = (5e-4, 1e-3, 2e-3, 4e-3)
@@ -34,11 +34,6 @@ STEPS = (5e-4, 1e-3, 2e-3, 4e-3)
 _LEFT_OUT = ('test_signal/external_torque', 'missed_impulse')
 # Both runs are compared at these times [s]: a multiple of every macro-step above.
 _GRID = 4e-3
-
-_OLD_POLE = 1.369863
-# The limit is sought between these gains k' [1/s], to this width.
-_GAINS = (120.0, 160.0)
-_GAIN_WIDTH = 0.02
 
 
 @dataclass(frozen=True)
@@ -89,73 +84,3 @@ def distances(step_s: float, names: Iterable[str] | None = None,
             if size > 0.0:
                 found.append(Distance(name, signal, error / size))
     return found
-
-
-def stability_limit(step_s: float) -> float:
-    """
-    Return the gain k' [1/s] of Filter 1, at the old pole, at which the torque bias goes unstable.
-
-    The loop is brought to its steady bias, where static friction holds the rotors; from there a
-    small disturbance shrinks or grows, and the limit is where it does neither.
-
-    Parameters
-    ----------
-    step_s
-        macro-step [s]
-
-    """
-    low, high = _GAINS
-    while high - low > _GAIN_WIDTH:
-        gain = 0.5 * (low + high)
-        if growth_rate(gain, step_s) > 0.0:
-            high = gain
-        else:
-            low = gain
-    return 0.5 * (low + high)
-
-
-def growth_rate(gain: float, step_s: float, settled_s: float = 12.0, watched_s: float = 6.0,
-                ) -> float:
-    """
-    Return how fast a small disturbance of the steady torque bias grows [1/s].
-
-    Parameters
-    ----------
-    gain
-        k' of Filter 1 [1/s]
-    step_s
-        macro-step [s]
-    settled_s
-        time given to the loop, at a stable gain, to become steady [s]
-    watched_s
-        time over which the disturbance is watched [s]
-
-    """
-    emulator = Emulator(filter_variant(_SETTLING_GAIN, _OLD_POLE).drive(), step_s)
-    emulator.advance(round(settled_s / step_s))
-    emulator.tune({'torque_share': {'filter_1.gain': gain, 'bias_source': 'fixed',
-                                    'fixed_voltage': _bias_at(gain, emulator)}})
-    _, samples = emulator.advance(round(watched_s / step_s))
-    difference = (samples[:, emulator.names.index('motor_2/current'), 0]
-                  - samples[:, emulator.names.index('motor_1/current'), 0])
-    difference = difference - difference.mean()
-    # the swing in the first and in the last third, once the quick transients are gone
-    third = difference.size // 3
-    middle, last = difference[third:2 * third], difference[2 * third:]
-    return float(np.log(last.std() / middle.std()) / (third * step_s))
-
-
-_SETTLING_GAIN = 45.4
-# The disturbance [V], so small that static friction keeps on holding the rotors.
-_DISTURBANCE = 1e-3
-
-
-def _bias_at(gain: float, emulator: Emulator) -> float:
-    """Return the bias voltage at which the present state is steady but for the disturbance."""
-    counter_torque = emulator.now[emulator.names.index('torque_share/counter_torque'), 0]
-    difference = (emulator.now[emulator.names.index('motor_2/current'), 0]
-                  - emulator.now[emulator.names.index('motor_1/current'), 0])
-    settings = emulator.units['torque_share'].settings()
-    difference_gain = settings['filter_1.difference_gain'][1]
-    assert isinstance(difference_gain, float)
-    return float(difference_gain * difference + _OLD_POLE * counter_torque / gain) + _DISTURBANCE

@@ -39,9 +39,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print the table."""
-    from antenna_drive.article.accuracy import distances, stability_limit
+    from antenna_drive.article.accuracy import distances
     from antenna_drive.article.experiments import experiments
+    from antenna_drive.article.stability import simulated_limit
     from antenna_drive.errors import UserError
+    from antenna_drive.parameters import load
 
     steps = args.step or list(_DEFAULT_STEPS)
     for step_s in steps:
@@ -49,6 +51,8 @@ def run(args: argparse.Namespace) -> int:
         if parts < 0.5 or abs(parts - round(parts)) > 1e-6:
             raise UserError(f'--step {step_s:g}: allowed is a whole part of 0.004 s')
     names = list(experiments())
+    drive = load('old_circuit')
+    pole = drive.torque_share.filter_1.pole
     table: list[dict[str, Any]] = []
     with Progress('accuracy', len(steps) * len(names)) as progress:
         for number, step_s in enumerate(steps):
@@ -57,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
                 found += distances(step_s, [name])
                 progress.update(number * len(names) + place + 1)
             table.append({
-                'step_s': step_s, 'stability_limit': stability_limit(step_s),
+                'step_s': step_s, 'stability_limit': simulated_limit(drive, pole, step_s),
                 'worst': {name: max(((item.share, item.signal) for item in found
                                      if item.experiment == name)) for name in names},
                 'distances': [{'experiment': item.experiment, 'signal': item.signal,

@@ -143,10 +143,6 @@ class Emulator:
         """Return the rows of `now` that a unit reads, in the order of its inputs."""
         return self._inputs[name]
 
-    def first_row(self, name: str) -> int:
-        """Return the row of `now` at which a unit's outputs begin."""
-        return int(self._outputs[name].start)
-
     def restart(self) -> None:
         """Return every unit to its initial state, at step 0; live changes stay in force."""
         self.k = 0
@@ -199,7 +195,7 @@ class Emulator:
 
         """
         if self._own_physics:
-            return advance(self, count, every)
+            return self._advance_compiled(count, every)
         steps, samples = [], []
         for _ in range(count):
             after = self.step()
@@ -208,6 +204,21 @@ class Emulator:
                 samples.append(after)
         return (np.array(steps, np.int64),
                 np.array(samples).reshape(-1, len(self.names), 2))
+
+    def _advance_compiled(self, count: int, every: int) -> tuple[Any, FloatArray]:
+        units: Any = self.units
+        commands = units[wiring.TEST_SIGNAL].ahead(self.k, count)
+        numbers = np.arange(self.k + 1, self.k + count + 1)
+        numbers = numbers[numbers % every == 0]
+        kept = np.empty((numbers.size, *self.now.shape))
+        stepped = wiring.UNITS[1:]
+        advance(self.k, self.step_s, drive_units.inner_steps(self.step_s), every, commands,
+                self.now, np.empty_like(self.now), kept,
+                tuple(self._inputs[name] for name in stepped),
+                np.array([self._outputs[name].start for name in wiring.UNITS]),
+                *(units[name].memory() for name in stepped))
+        self.k += count
+        return numbers, kept
 
     def chunks(self, duration: float, changes: Changes | None = None, every: int = 1,
                ) -> Iterator[tuple[Any, FloatArray]]:

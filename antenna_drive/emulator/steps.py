@@ -15,18 +15,11 @@
 
 from __future__ import annotations
 
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
-from antenna_drive.emulator import wiring
-from antenna_drive.emulator.unit import FloatArray
-from antenna_drive.emulator.units import inner_steps
 from antenna_drive.physics import motor_drive, structure, torque_share
-from antenna_drive.physics.arrays import IntArray
+from antenna_drive.physics.arrays import FloatArray, IntArray
 from antenna_drive.physics.compiling import compiled, inner
-import numpy as np
-
-if TYPE_CHECKING:
-    from antenna_drive.emulator.run import Emulator
 
 
 @inner
@@ -44,7 +37,7 @@ def _scatter(y: FloatArray, first: int, after: FloatArray) -> None:
 
 
 @compiled
-def _advance(
+def advance(
         k: int, h: float, steps: int, every: int, commands: FloatArray, now: FloatArray,
         after: FloatArray, kept: FloatArray, columns: tuple[IntArray, ...], firsts: IntArray,
         motor_1: Any, motor_2: Any, share: Any, plant: Any,
@@ -95,21 +88,3 @@ def _advance(
         if (k + i + 1) % every == 0:
             _scatter(now, 0, kept[row])
             row += 1
-
-
-def advance(emulator: Emulator, count: int, every: int) -> tuple[IntArray, FloatArray]:
-    """Advance an emulator of our own units by `count` macro-steps; see `Emulator.advance`."""
-    units: Any = emulator.units
-    k = emulator.k
-    commands = units[wiring.TEST_SIGNAL].ahead(k, count)
-    numbers = np.arange(k + 1, k + count + 1)
-    numbers = numbers[numbers % every == 0]
-    kept = np.empty((numbers.size, *emulator.now.shape))
-    stepped = wiring.UNITS[1:]
-    _advance(k, emulator.step_s, inner_steps(emulator.step_s), every, commands, emulator.now,
-             np.empty_like(emulator.now), kept,
-             tuple(emulator.rows_read(name) for name in stepped),
-             np.array([emulator.first_row(name) for name in wiring.UNITS]),
-             *(units[name].memory() for name in stepped))
-    emulator.k += count
-    return numbers, kept
