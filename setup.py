@@ -19,7 +19,8 @@ import sys
 from setuptools import find_packages, setup
 
 PACKAGE = 'antenna_drive'
-NODES = ('rate_loop_plant', 'motor_drive', 'torque_share', 'test_signal', 'recorder')
+NODES = ('rate_loop_plant', 'motor_drive', 'torque_share', 'test_signal', 'recorder',
+         'command_player')
 
 # ROS 2 Kilted as wheels: CPython 3.10 to 3.14 on x86-64 Linux, and nowhere else. The wheels of
 # one release fit each other alone (ros-rclpy pins its own to the patch), so each is held to

@@ -62,15 +62,17 @@ def draw(recording: Recording, stream: IO[bytes], form: str, *,
         axis.set_title(panel.title, loc='left', fontsize='medium', fontweight='bold')
         axis.set_ylabel(panel.unit)
         axis.grid(alpha=0.3)
-        # above the panel, where it hides nothing
-        axis.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=len(panel.names),
-                    fontsize='small', frameon=False, borderaxespad=0.1)
         axis.margins(x=0)
         if panel.unit == 'article A' and kappa:
             # article amperes are no real ones: these stand on the other side
             other = axis.secondary_yaxis('right', functions=(
                 lambda a, k=kappa: k * a, lambda a, k=kappa: a / k))
             other.set_ylabel('real A')
+        if panel.names == (panel.title,):
+            continue  # the title names the one curve
+        # above the panel, where it hides nothing
+        axis.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=len(panel.names),
+                    fontsize='small', frameon=False, borderaxespad=0.1)
     axes[-1].set_xlabel('time [s]')
     if title:
         figure.suptitle(title)

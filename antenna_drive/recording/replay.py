@@ -50,17 +50,43 @@ Changes = dict[int, dict[str, Mapping[str, Value]]]
 
 
 class CommandUnit(Unit):
-    """The test signal of a replay: it plays a table, and holds its last row at the end."""
+    """
+    The test signal of a replay: it plays what was recorded, and holds the last value at the end.
+
+    It takes the place of the drive's own test signal, in one process or as a node.
+    """
 
     outputs: ClassVar[tuple[Signal, ...]] = wiring.TEST_SIGNAL_OUTPUTS
 
-    def __init__(self, table: FloatArray) -> None:
-        """Take value and slope of each output at each step, shape (n, len(outputs), 2)."""
+    def __init__(self, recording: Recording) -> None:
+        """
+        Take the rate command of a recording, and the external torque if it has one.
+
+        Raises
+        ------
+        RecordingError : the recording holds no command
+
+        """
         super().__init__(wiring.TEST_SIGNAL)
-        self._table = table
+        if COMMAND not in recording or not len(recording[COMMAND]):
+            raise RecordingError(f'{COMMAND}: not in this recording, there is nothing to replay')
+        self._channels = [recording.channels.get(name) for name in (COMMAND, TORQUE)]
+        self.start_ns = int(recording[COMMAND].time_ns[0])
+        self._end_ns = int(recording[COMMAND].time_ns[-1])
+        self._table = np.zeros((1, len(self.outputs), 2))
+
+    def last_step(self, step_s: float) -> int:
+        """Return the last macro-step of `step_s` [s] that the command covers."""
+        return int((self._end_ns - self.start_ns) / NANOSECONDS / step_s + 1e-6)
 
     def start(self, step_s: float) -> FloatArray:
-        """Give the first row; see `Unit.start`."""
+        """Lay the command onto the macro-steps and give the first; see `Unit.start`."""
+        times = self.start_ns + nanoseconds(np.arange(self.last_step(step_s) + 1) * step_s)
+        self._table = np.zeros((len(times), len(self.outputs), 2))
+        for row, channel in enumerate(self._channels):
+            if channel is not None and len(channel):
+                self._table[:, row] = command_table(channel, times)
+        self._table[-1, :, 1] = 0.0
         return self._table[0].copy()
 
     def step(self, k: int, inputs: FloatArray) -> FloatArray:
@@ -125,25 +151,18 @@ def twin(recording: Recording, config: Sequence[str] = (), step_s: float | None 
     ParameterError : a configuration or the recording's own is not allowed
 
     """
-    if COMMAND not in recording or not len(recording[COMMAND]):
-        raise RecordingError(f'{COMMAND}: not in this recording, there is nothing to replay')
+    command = CommandUnit(recording)
     noted = recording.notes.get(STEP)
     if not isinstance(noted, float) or not 0.0 < noted <= 1.0:
         noted = MACRO_STEP
     step = step_s or noted
-    start, end = int(recording[COMMAND].time_ns[0]), int(recording[COMMAND].time_ns[-1])
-    count = int((end - start) / NANOSECONDS / step + 1e-6)
-    times = start + nanoseconds(np.arange(count + 1) * step)
-    table = np.zeros((count + 1, len(wiring.TEST_SIGNAL_OUTPUTS), 2))
-    for row, name in enumerate((COMMAND, TORQUE)):
-        if name in recording and len(recording[name]):
-            table[:, row] = command_table(recording[name], times)
     units, changes, whence = _drive(recording, config, noted, step)
-    emulator = Emulator(load(), step, {**units, wiring.TEST_SIGNAL: CommandUnit(table)})
-    made = record(emulator, count * step, changes=changes, every=every, sheet=recording.sheet,
+    emulator = Emulator(load(), step, {**units, wiring.TEST_SIGNAL: command})
+    made = record(emulator, command.last_step(step) * step, changes=changes, every=every,
+                  sheet=recording.sheet,
                   twin_of=str(recording.notes.get('source', '')), parameters=whence,
                   command='straight line between samples, jumps kept')
-    return made.shift(start / NANOSECONDS) if start else made
+    return made.shift(command.start_ns / NANOSECONDS) if command.start_ns else made
 
 
 def _drive(recording: Recording, config: Sequence[str], noted: float,

@@ -35,8 +35,9 @@ from antenna_drive.lockstep.observer import Observer  # noqa: E402
 from antenna_drive.lockstep.processes import DriveProcesses  # noqa: E402
 from antenna_drive.parameters.loading import load  # noqa: E402
 from antenna_drive.parameters.sets import changed  # noqa: E402
+from antenna_drive.recording.csv_format import read_csv, write_csv  # noqa: E402
 from antenna_drive.recording.mcap_format import read_bag  # noqa: E402
-from antenna_drive.recording.recording import RecordingWarning  # noqa: E402
+from antenna_drive.recording.recording import Recording, RecordingWarning  # noqa: E402
 from antenna_drive.recording.replay import twin  # noqa: E402
 from mcap.exceptions import EndOfFile  # noqa: E402
 from mcap.reader import NonSeekingReader  # noqa: E402
@@ -247,6 +248,37 @@ def test_a_full_disk_is_told_and_stops_nothing_else(tmp_path: Path, fresh_domain
         assert process.said('File too large; recorded up to')
     with pytest.warns(RecordingWarning, match='read up to'):
         assert len(read_bag(tmp_path / 'run', partial=True)['plant/encoder']) > 100
+
+
+def test_a_recorded_command_is_played_by_a_node_as_in_one_process(
+        tmp_path: Path, fresh_domain: int) -> None:
+    time = np.arange(0.0, 1.0, 0.013)
+    field = tmp_path / 'field.csv'
+    command = np.where(time < 0.5, 1e-3 * np.sin(9.0 * time), -1e-3)
+    write_csv(Recording.from_arrays(time, {'test_signal/rate_command': command}), field)
+    again = twin(read_csv(field))
+    samples: dict[int, Any] = {}
+    with Observer('watcher', lambda k, t, s: samples.__setitem__(k, s[:, 0].copy())) as observer:
+        with DriveProcesses(
+                {'test_signal': {'run.pace': 0.0, 'run.observers': ['watcher']}},
+                commands={'test_signal': [sys.executable, '-m',
+                                          'antenna_drive.nodes.command_player', str(field)]}):
+            observer.spin(lambda: len(samples) > 1000)
+    last = len(again['plant/encoder'])
+    assert last == 989
+    for row, name in enumerate(observer.names):
+        # the twin's last step is a step of the played command too, whatever comes after it
+        assert [samples[k][row] for k in range(last)] == again[name].values.tolist(), name
+    assert samples[1000][0] == samples[last][0] == -1e-3
+
+
+def test_a_player_without_a_recording_says_so() -> None:
+    for arguments, words in (([], 'which recording?'), (['none.csv'], 'none.csv: no such file')):
+        with RecorderProcess(*arguments, program=(
+                '-m', 'antenna_drive.nodes.command_player')) as process:
+            assert process.wait() == 2
+            assert len(process.lines) == 1
+            assert words in process.lines[0]
 
 
 def test_wrong_arguments_are_refused_in_one_line(tmp_path: Path,
