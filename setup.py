@@ -87,7 +87,6 @@ setup(
         'test': [
             'pytest >= 7.4',
             'hypothesis >= 6.80',
-            'rosbags >= 0.10',  # reads what mcap wrote
             'mypy >= 1.8',
             'types-PyYAML',
             'rosbags >= 0.10',  # reads our bags, as someone else's program would
