@@ -196,6 +196,58 @@ class Member:
         return None
 
 
+class Guest(Member):
+    """
+    A member that nobody waits for, and that may join a run in the middle.
+
+    It begins at the earliest step that every peer still remembers; `Unit.start` is called all
+    the same. From there on it follows as any member does.
+    """
+
+    def __init__(self, unit: Unit, outputs: Mapping[str, Sequence[Signal]] = OUTPUTS,
+                 conductor: str = TEST_SIGNAL) -> None:
+        """Prepare to follow; see Member."""
+        super().__init__(unit, 0.0, outputs, conductor)
+        self._joining = NO_RUN
+        self._first: dict[str, Frame] = {}
+
+    def receive(self, peer: str, frame: Frame) -> None:
+        """Take in a frame or refuse it."""
+        if self.run != NO_RUN:
+            super().receive(peer, frame)
+        elif self.inbox.well_formed(peer, frame):
+            if frame[0] > self._joining:
+                self._joining = frame[0]
+                self._first.clear()
+            if frame[0] == self._joining != NO_RUN and frame[1] >= self._earliest():
+                self._first[peer] = frame
+
+    def _earliest(self) -> float:
+        return max((frame[1] for frame in self._first.values()), default=0.0)
+
+    def wanted(self) -> tuple[str, ...]:
+        """Return the peers from whom a frame would be of use now."""
+        return super().wanted() if self.run != NO_RUN else self.missing()
+
+    def missing(self) -> tuple[str, ...]:
+        """Return the peers without whom it cannot go on."""
+        if self.run != NO_RUN:
+            return super().missing()
+        earliest = self._earliest()
+        return tuple(peer for peer in self.peers
+                     if peer not in self._first or self._first[peer][1] < earliest)
+
+    def go_on(self) -> FloatArray | None:
+        """Join the run in progress or make the next step; see Member."""
+        if self.run != NO_RUN or self.missing():
+            return super().go_on()
+        outputs = self._begin(self._joining, self._first[self.conductor][2])
+        self.step = self.inbox.step = int(self._earliest())
+        for peer, frame in self._first.items():
+            self.inbox.offer(peer, frame)
+        return outputs
+
+
 class Conductor(Member):
     """
     The member that owns the run: its id, its macro-step, its beginning and its end.

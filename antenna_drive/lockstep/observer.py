@@ -15,8 +15,9 @@
 Somebody who reads every signal of a running drive at every step, and loses none.
 
 An observer that test_signal was told of (run.observers) is a member of the lock-step: no step
-is made before it has seen the last, however fast the drive runs. Any other is a guest: it
-follows a run as long as it keeps within the second that the nodes remember.
+is made before it has seen the last, however fast the drive runs. Any other is a guest: it joins
+a run where it is, at the earliest step that the nodes remember, and follows as long as it
+keeps within what they remember: the last thousand steps.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from typing import Any
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.wiring import OUTPUTS
 from antenna_drive.lockstep.entry import choose_transport
-from antenna_drive.lockstep.member import Member
+from antenna_drive.lockstep.member import Guest, Member
 from antenna_drive.lockstep.readings import CHANGES_QOS
 from antenna_drive.lockstep.ros_link import FrameLink
 import numpy as np
@@ -91,7 +92,8 @@ class Observer:
         on_step : called as on_step(step, time [s], samples) with an array of shape
             (len(names), 2), value and derivative, valid during the call only
         on_begin : called as on_begin(run, macro-step [s]) when a run begins, also in the middle
-            of another: what came before belongs to a run that is over
+            of another: what came before belongs to a run that is over; a guest's first step
+            need not be step 0
         on_change : called as on_change(unit, record) with what a node says on `<unit>/changes`,
             see ChangeRecord; from another thread
         namespace, domain_id : where the drive is; None for the domain in the environment
@@ -106,14 +108,17 @@ class Observer:
         self._context = Context()
         self._context.init(args=[], domain_id=domain_id)
         self._node = Node(name, namespace=namespace, context=self._context)
-        birth = 0.0 if guest else float(time.time_ns() // 1000)
-        self._member = Member(_Reader(name, self.names, on_step), birth, outputs)
+        birth = float(time.time_ns() // 1000)
+        reader = _Reader(name, self.names, on_step)
+        self._member = Guest(reader, outputs) if guest else Member(reader, birth, outputs)
+        self._run = 0.0
         self._link = FrameLink(self._node, self._member.layouts)
         self._executor: SingleThreadedExecutor | None = None
         self._thread: Thread | None = None
         if on_change is not None:
             self._listen(outputs, on_change)
-        self._link.publish(self._member.layout.hello(birth))
+        if not guest:
+            self._link.publish(self._member.layout.hello(birth))
 
     def _listen(self, outputs: Mapping[str, Sequence[Signal]], on_change: OnChange) -> None:
         for unit in outputs:
@@ -155,8 +160,10 @@ class Observer:
         while not until():
             outputs = member.go_on()
             if outputs is not None:
-                if member.step == 0 and self._on_begin is not None:
-                    self._on_begin(int(member.run), member.step_s)
+                if member.run != self._run:
+                    self._run = member.run
+                    if self._on_begin is not None:
+                        self._on_begin(int(member.run), member.step_s)
                 link.publish(member.layout.encode(
                     member.run, member.step, member.step_s, outputs))
                 continue

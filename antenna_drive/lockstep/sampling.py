@@ -95,10 +95,9 @@ class _Collected:
     def __init__(self, steps: int, progress: Callable[[int], None] | None) -> None:
         self._steps = steps
         self._progress = progress
-        self._done = -1
+        self._done = self._seen = -1
         self.samples = np.zeros((0, 0, 2))
-        self.began = self.ended = 0.0
-        self.started = 0.0
+        self.began = self.ended = self.started = 0.0
 
     def made(self, names: Sequence[str]) -> None:
         self.samples = np.zeros((self._steps + 1, len(names), 2))
@@ -133,7 +132,7 @@ class _Collected:
 
     def _look(self, now: float) -> None:
         self._processes.check()
-        if self._done >= 0 and self._done != getattr(self, '_seen', -1):
+        if self._done != self._seen:
             self._seen = self._done
             self._deadline = now + STEP_PATIENCE_S
             if self._progress is not None:

@@ -26,7 +26,7 @@ import math
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.lockstep.inbox import DEPTH, Inbox, Refusal
-from antenna_drive.lockstep.member import Conductor, Member
+from antenna_drive.lockstep.member import Conductor, Guest, Member
 from hypothesis import given, settings, strategies as st
 import numpy as np
 import pytest
@@ -318,3 +318,45 @@ def test_an_input_that_nobody_puts_out_is_named() -> None:
     unit.inputs = ('motor_1/c',)  # type: ignore[misc]
     with pytest.raises(ValueError, match='motor_1/c: no such signal'):
         Member(unit, 0.0, OUTPUTS)
+
+
+class Listener(Unit):
+    """Keeps whatever it reads."""
+
+    inputs = tuple(f'{name}/a' for name in UNITS)
+
+    def start(self, step_s: float) -> FloatArray:
+        self.read: dict[int, FloatArray] = {}
+        return np.zeros((0, 2))
+
+    def step(self, k: int, inputs: FloatArray) -> FloatArray:
+        self.read[k] = inputs.copy()
+        return np.zeros((0, 2))
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(st.integers(0, 15), min_size=5, max_size=5),
+       st.lists(st.sampled_from(UNITS), max_size=200))
+def test_a_guest_joins_in_the_middle_and_misses_nothing_from_there(
+        forgotten: list[int], choices: list[str]) -> None:
+    history = expected(40, 1e-3)
+    queues = {name: deque((9.0, float(k), 1e-3, *history[name][k].ravel().tolist())
+                          for k in range(first, 41))
+              for name, first in zip(UNITS, forgotten)}
+    listener = Listener('guest')
+    guest = Guest(listener, OUTPUTS)
+
+    def give(name: str) -> None:
+        if queues[name] and name in guest.wanted():
+            guest.receive(name, queues[name].popleft())
+        guest.go_on()
+
+    for name in choices:
+        give(name)
+    for _ in range(60):
+        for name in UNITS:
+            give(name)
+    assert list(listener.read) == list(range(max(forgotten), 41))
+    for k, read in listener.read.items():
+        assert read.tobytes() == np.array([history[name][k][0] for name in UNITS]).tobytes()
+    assert not guest.inbox.refused

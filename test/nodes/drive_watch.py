@@ -77,7 +77,13 @@ class Watch:
     def value(self, name: str, key: str) -> str:
         """Return one value of a node's last report, '' if it is not there."""
         status = self.reports.get(name)
-        return next((item.value for item in status.values if item.key == key), '') if status else ''
+        if status is None:
+            return ''
+        return next((item.value for item in status.values if item.key == key), '')
+
+    def _answer(self, future: Any, name: str) -> Any:
+        self.until(future.done, f'the answer of {name}')
+        return future.result()
 
     def set_together(self, name: str, values: Mapping[str, Any]) -> SetParametersResult:
         """Set parameters of a node, all or none."""
@@ -85,25 +91,23 @@ class Watch:
         assert client.wait_for_services(PATIENCE_S)
         future = client.set_parameters_atomically(
             [Parameter(key, value=value) for key, value in values.items()])
-        self.until(future.done, f'the answer of {name}')
-        return future.result().result
+        return self._answer(future, name).result
 
     def get(self, name: str, *keys: str) -> list[Any]:
         """Return parameters of a node."""
         client = AsyncParameterClient(self.node, name)
         assert client.wait_for_services(PATIENCE_S)
         future = client.get_parameters(list(keys))
-        self.until(future.done, f'the answer of {name}')
         return [Parameter.from_parameter_msg(
-            _message(key, value)).value for key, value in zip(keys, future.result().values)]
+            _message(key, value)).value
+            for key, value in zip(keys, self._answer(future, name).values)]
 
     def describe(self, name: str, *keys: str) -> list[Any]:
         """Return descriptors of parameters of a node."""
         client = AsyncParameterClient(self.node, name)
         assert client.wait_for_services(PATIENCE_S)
         future = client.describe_parameters(list(keys))
-        self.until(future.done, f'the answer of {name}')
-        return list(future.result().descriptors)
+        return list(self._answer(future, name).descriptors)
 
     def publish_frames(self, topic: str, frames: list[list[float]], readers: int) -> None:
         """Publish frames that are none of ours."""
@@ -122,14 +126,15 @@ class Watch:
 class Recorder:
     """Every sample and every change of a drive, gathered in a thread."""
 
-    def __init__(self, name: str = 'watcher', namespace: str = '') -> None:
+    def __init__(self, name: str = 'watcher', namespace: str = '', guest: bool = False) -> None:
         self.samples: list[FloatArray] = []
         self.changes: list[tuple[str, Mapping[str, Any]]] = []
         self.runs: list[int] = []
         self.step_s = 0.0
+        self.first = 0
         self._stop = Event()
         self.observer = Observer(name, self._keep, on_begin=self._begin,
-                                 on_change=self._note, namespace=namespace)
+                                 on_change=self._note, namespace=namespace, guest=guest)
         self._thread = Thread(target=self.observer.spin, args=(self._stop.is_set,))
         self._thread.start()
 
@@ -139,7 +144,9 @@ class Recorder:
         self.runs.append(run)
 
     def _keep(self, step: int, time_s: float, samples: FloatArray) -> None:
-        assert step == len(self.samples)
+        if not self.samples:
+            self.first = step
+        assert step == self.first + len(self.samples)
         self.samples.append(samples.copy())
 
     def _note(self, unit: str, record: Mapping[str, Any]) -> None:

@@ -144,8 +144,7 @@ def _change_live(watch: Watch) -> None:
 
 
 def _attack(watch: Watch, recorder: Recorder) -> None:
-    length = recorder.observer.node.get_name() and 3 + 2 * sum(
-        name.startswith('plant/') for name in recorder.observer.names)
+    length = 3 + 2 * sum(name.startswith('plant/') for name in recorder.observer.names)
     rest = [0.5] * (length - 3)
     run = float(recorder.runs[-1])
     soon = float(recorder.steps)
@@ -200,6 +199,20 @@ def _missed(watch: Watch, neighbour: str, victim: str) -> bool:
 def _at_step(recorder: Recorder, processes: DriveProcesses, step: int) -> bool:
     processes.check()
     return recorder.steps >= step
+
+
+@pytest.mark.usefixtures('fresh_domain')
+def test_a_guest_joins_late_at_real_time_pace_and_loses_nothing() -> None:
+    with Watch() as watch, DriveProcesses(
+            {'test_signal': {'run.pace': 0.5, 'run.step': 2e-3}}) as processes:
+        watch.until(lambda: processes.check() is None
+                    and int(watch.value('plant', 'step') or 0) > 1200, 'step 1200')
+        with Recorder('guest', guest=True) as recorder:
+            watch.until(lambda: _at_step(recorder, processes, 1500), '1500 steps')
+            lost, first, samples = recorder.observer.lost, recorder.first, recorder.array()
+    assert not lost
+    assert first > 0, 'frame 0 was forgotten long ago'
+    assert_same_bits(samples, in_process(first + samples.shape[0] - 1, 2e-3)[first:])
 
 
 @pytest.mark.usefixtures('fresh_domain')

@@ -18,6 +18,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 import sys
+from typing import Any
 
 from antenna_drive.emulator.run import Emulator
 from antenna_drive.emulator.wiring import UNITS
@@ -37,13 +38,15 @@ def test_own_torque_share_joins_the_other_four(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.syspath_prepend(str(PACKAGE))
     from own_torque_share.constant_bias import ConstantBias
     path = os.pathsep.join([str(PACKAGE), *sys.path])
-    parameters = {'test_signal': {'run.pace': 0.0, 'run.observers': ['watcher']},
-                  'torque_share': {'bias': 9.0}}
+    parameters: dict[str, dict[str, Any]] = {
+        'test_signal': {'run.pace': 0.0, 'run.observers': ['watcher']},
+        'torque_share': {'bias': 9.0}}
     command = (sys.executable, '-m', 'own_torque_share.constant_bias')
     with Watch() as watch, Recorder('watcher') as recorder, DriveProcesses(
             parameters, commands={'torque_share': command},
             environment={'PYTHONPATH': path}) as processes:
-        watch.until(lambda: processes.check() or recorder.steps > 200, 'step 200')
+        processes.check()
+        watch.until(lambda: recorder.steps > 200, 'step 200')
         answer = watch.set_together('torque_share', {'bias': 7.5})
         assert answer.successful, answer.reason
         assert not watch.set_together('torque_share', {'bias': 21.0}).successful
