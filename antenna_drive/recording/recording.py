@@ -391,6 +391,9 @@ class Recording:
         """Return the samples of start_s <= t < end_s, with their time stamps."""
         low = -2**63 if start_s < -9.2e9 else nanoseconds(start_s)
         high = 2**63 - 1 if end_s > 9.2e9 else nanoseconds(end_s)
+        return self._cut(low, high)
+
+    def _cut(self, low: int, high: int) -> Recording:
         cut = {}
         for name, channel in self.channels.items():
             first, last = np.searchsorted(channel.time_ns, [low, high])
@@ -407,7 +410,17 @@ class Recording:
         RecordingError : there is no such signal
 
         """
-        offset_ns = nanoseconds(offset_s)
+        return self.shift_ns(nanoseconds(offset_s), names)
+
+    def shift_ns(self, offset_ns: int, names: Sequence[str] | None = None) -> Recording:
+        """
+        Do as `shift`, by whole nanoseconds: exact where stamps are too long for a double.
+
+        Raises
+        ------
+        RecordingError : there is no such signal
+
+        """
         moved = dict(self.channels)
         for name in self.names if names is None else names:
             channel = self[name]
@@ -439,9 +452,8 @@ class Recording:
         longest = max((int(np.diff(c.time_ns[-2:])[0]) for c in self.channels.values()
                        if len(c) > 1), default=0)
         count = max(0, (self.end_ns + longest - start_ns) // period_ns)
-        begins = [(start_ns + i * period_ns) / NANOSECONDS for i in range(count + 1)]
-        return tuple(self.between(begin, end).shift(-begin)
-                     for begin, end in zip(begins, begins[1:], strict=False))
+        begins = [start_ns + i * period_ns for i in range(count)]
+        return tuple(self._cut(begin, begin + period_ns).shift_ns(-begin) for begin in begins)
 
     def repeat(self, count: int, period_s: float) -> Recording:
         """Return this one period `count` times over, see `concatenate`."""

@@ -162,7 +162,7 @@ def twin(recording: Recording, config: Sequence[str] = (), step_s: float | None 
                   sheet=recording.sheet,
                   twin_of=str(recording.notes.get('source', '')), parameters=whence,
                   command='straight line between samples, jumps kept')
-    return made.shift(command.start_ns / NANOSECONDS) if command.start_ns else made
+    return made.shift_ns(command.start_ns)
 
 
 def _drive(recording: Recording, config: Sequence[str], noted: float,

@@ -147,6 +147,16 @@ def test_periods_and_concatenate_are_inverse() -> None:
     assert len(whole.between(0, 4.5).periods(1.3, 0.2)) == 3
 
 
+def test_stamps_of_a_wall_clock_lose_no_nanosecond() -> None:
+    start = 1_768_472_890_123_456_789  # a double knows such a time to 256 ns
+    whole = ramp(100, 1).repeat(3, 1.0).shift_ns(start)
+    assert whole[CURRENT].time_ns[1] == start + 10_000_000
+    assert whole.shift_ns(-start) == ramp(100, 1).repeat(3, 1.0)
+    assert whole.shift_ns(-start).periods(1.0) == (ramp(100, 1),) * 3
+    for period in whole.periods(1.0, start_s=1_768_472_890.0):
+        assert np.all(np.diff(period[CURRENT].time_ns) == 10_000_000)
+
+
 def test_concatenate_refuses_what_reaches_into_the_next_period() -> None:
     with pytest.raises(RecordingError, match='part 0 reaches outside its period of 0.5 s'):
         ramp(100, 1).repeat(2, 0.5)

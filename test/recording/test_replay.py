@@ -90,7 +90,7 @@ def test_a_field_test_is_replayed_from_its_columns_and_sheet(tmp_path: Path) -> 
 
 def test_the_clock_of_the_real_recording_is_kept() -> None:
     drive = commanded(load(), waveform='step', amplitude=1e-3)
-    real = made(drive, 0.2).shift(1.7e9)
+    real = made(drive, 0.2).shift_ns(1_768_472_890_123_456_789)
     assert twin(real)['plant/encoder'] == real['plant/encoder']
 
 
