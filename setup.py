@@ -82,9 +82,11 @@ setup(
     extras_require={
         'ros': [f'{wheel} ; {WHEELS_EXIST}' for wheel in KILTED],
         'plot': ['matplotlib >= 3.6'],
+        'calibrate': ['cma >= 3.2'],
         # the first release that can complete a chunk on demand
         'recording': ['mcap >= 1.5'],
         'test': [
+            'cma >= 3.2',
             'pytest >= 7.4',
             'hypothesis >= 6.80',
             'mypy >= 1.8',

@@ -87,6 +87,7 @@ REMEDIES = {
     'diagnostic_msgs': ROS_REMEDY,
     'matplotlib': 'pip install matplotlib',
     'mcap': 'pip install mcap',
+    'cma': 'pip install cma',
 }
 
 

@@ -14,7 +14,7 @@
 """
 Fit parameters to published or measured figures, and say what these figures determine.
 
-  antenna-drive calibrate calibration_targets --out fitted.yaml
+  antenna-drive calibrate article --out fitted.yaml
   antenna-drive calibrate my_antenna.yaml --start my_drive.yaml --out fitted.yaml --log fit.log
 
 TARGETS names the free parameters with their bounds, and the figures aimed at with tolerances
@@ -34,8 +34,9 @@ from antenna_drive import cli
 from antenna_drive.calibration.configuration import write_configuration
 from antenna_drive.calibration.problem import read_problem
 from antenna_drive.calibration.report import report
-from antenna_drive.calibration.search import Candidate, search
+from antenna_drive.calibration.search import search
 from antenna_drive.cli.output import add_json_option, Progress, STANDARD_OUTPUT, write_json
+from antenna_drive.parameters.files import config_dir
 
 COUNT = 2000
 
@@ -43,7 +44,8 @@ COUNT = 2000
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument('targets', metavar='TARGETS',
-                        help='what is free and what is aimed at: a file, or a name in config/')
+                        help='what is free and what is aimed at: a file, or a name in '
+                             'config/calibration/')
     parser.add_argument('--start', metavar='CONFIG', default='reference',
                         help='configuration to start from (default: %(default)s)')
     parser.add_argument('--out', metavar='FILE', type=Path, required=True,
@@ -60,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Do what the arguments say; return the exit code."""
-    problem = read_problem(arguments.targets, [arguments.start])
+    problem = read_problem(_find(arguments.targets), [arguments.start])
     with Progress('candidates', max(1, arguments.count)) as shown:
         found = search(problem, arguments.count, seed=arguments.seed, log=arguments.log,
                        progress=lambda done, best: shown.update(done))
@@ -72,3 +74,41 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json != STANDARD_OUTPUT:
         _write(told)
     return cli.OK if all(item['met'] for item in told['targets']) else cli.NEGATIVE
+
+
+def _find(targets: str) -> str | Path:
+    """Return a file of targets as it is, or the one of that name in config/calibration/."""
+    shipped = config_dir() / 'calibration' / f'{targets}.yaml'
+    return shipped if not Path(targets).exists() and shipped.is_file() else targets
+
+
+def _write(told: dict[str, Any]) -> None:
+    lines = [f'{told["candidates"]} candidates, cost {told["start_cost"]:.4g} -> '
+             f'{told["cost"]:.4g}', '',
+             _TARGET.format('', 'target', 'start', 'obtained', 'aim', 'tolerance')]
+    for item in told['targets']:
+        aim = f'{"" if item["kind"] == "value" else item["kind"].replace("_", " ") + " "}'
+        lines.append(_TARGET.format(
+            '' if item['met'] else 'MISSED', item['figure'], f'{item["start"]:.4g}',
+            f'{item["obtained"]:.4g}', f'{aim}{item["aim"]:g}', f'{item["tolerance"]:g}'))
+    lines += ['', _PARAMETER.format('', 'parameter', 'value', 'alone', 'with all others')]
+    for item in told['parameters']:
+        lines.append(_PARAMETER.format(
+            '' if item['determined'] else 'OPEN', item['name'], f'{item["value"]:.5g}',
+            _range(item['conditional']), _range(item['marginal'])))
+    lines += ['', 'moves of one parameter that others can make up for:']
+    lines += [f'  {item["first"]} and {item["second"]}: {item["correlation"]:+.2f}'
+              for item in told['correlations']] or ['  none']
+    for figure, curve in told['trade_offs'].items():
+        lines += ['', f'what the other targets cost at best, by {figure}:']
+        lines += [f'  {point["level"]:>10.4g}  {point["cost_of_the_others"]:.4g}'
+                  for point in curve]
+    sys.stdout.write('\n'.join(lines) + '\n')
+
+
+_TARGET = '{:<8}{:<24}{:>10}{:>12}  {:<16}{:>10}'
+_PARAMETER = '{:<6}{:<34}{:>12}  {:<26}{:<26}'
+
+
+def _range(ends: list[float]) -> str:
+    return f'{min(ends):.4g} .. {max(ends):.4g}'

@@ -1,0 +1,79 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A fitted parameter set as a configuration file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import io
+from pathlib import Path
+from typing import Any
+
+from antenna_drive.calibration.problem import Problem
+from antenna_drive.cli.output import replaced
+from antenna_drive.parameters.loading import find, read_yaml
+import yaml
+
+# More digits than any figure determines, and few enough to read.
+_DIGITS = 7
+
+
+def write_configuration(problem: Problem, shares: Sequence[float], start: str, path: Path,
+                        ) -> None:
+    """
+    Write a candidate as a configuration that lies over what the fit started from.
+
+    Parameters
+    ----------
+    problem : the fit
+    shares : the candidate, as shares of the bounds
+    start : configuration that the fit started from; what it says of other parameters is kept
+    path : file to write, whole or not at all
+
+    Raises
+    ------
+    UserError : the file cannot be written
+
+    """
+    content: dict[str, Any] = {}
+    if find(start) != find('reference'):
+        content = dict(read_yaml(find(start)) or {})
+    units = {item.key: item.unit for item in problem.free}
+    for key, value in problem.parameters(shares).items():
+        section, _, entry = key.partition('.')
+        numbers = [_rounded(item) for item in value] if isinstance(value, tuple) else (
+            _rounded(value))
+        body = dict(content.get(section) or {})
+        body[entry] = {'value': numbers, 'unit': units[key], 'source': 'fitted'}
+        content[section] = body
+    with replaced(path) as stream:
+        stream.write(as_yaml(content).encode())
+
+
+def _rounded(value: float) -> float:
+    return float(f'{value:.{_DIGITS}g}')
+
+
+def as_yaml(content: Mapping[str, Any]) -> str:
+    """Return a configuration as YAML, one entry a line, exponents as YAML 1.1 reads them."""
+    text = io.StringIO()
+    for section, body in content.items():
+        if not isinstance(body, dict):
+            text.write(f'{section}: {body}\n')
+            continue
+        text.write(f'{section}:\n')
+        for entry, item in body.items():
+            line = yaml.safe_dump(item, default_flow_style=True, sort_keys=False, width=10_000)
+            text.write(f'  {entry}: {line.removesuffix(chr(10)).removesuffix("...").rstrip()}\n')
+    return text.getvalue()

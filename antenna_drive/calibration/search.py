@@ -1,0 +1,173 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The search for the best fit: CMA-ES, seeded, with a log that it can go on from.
+
+The log holds one line of JSON for the problem and one for every candidate. Whoever starts the
+same search again gets the same candidates, and those in the log are not simulated anew: an
+interrupted search goes on where it stopped, and ends where it would have ended.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import hashlib
+import json
+import math
+from pathlib import Path
+from typing import Any, TextIO
+
+from antenna_drive.calibration.problem import Evaluation, Problem
+from antenna_drive.errors import UserError
+import cma
+import numpy as np
+
+# A candidate is given up once it costs more than this times the worst of the last generation's
+# better half, from which the search goes on.
+_GIVE_UP = 1.5
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A candidate: its place between the bounds, and what it gives."""
+
+    shares: tuple[float, ...]
+    evaluation: Evaluation
+
+
+@dataclass(frozen=True)
+class Found:
+    """
+    What a search found.
+
+    Attributes
+    ----------
+    best : the best candidate
+    candidates : all of them, in their order
+
+    """
+
+    best: Candidate
+    candidates: tuple[Candidate, ...]
+
+
+class _Log:
+    """The candidates of a search, on disk as they come."""
+
+    def __init__(self, path: Path, problem: Problem, seed: int) -> None:
+        self._path = path
+        self.read: list[Candidate] = []
+        head = {'problem': _digest(problem), 'seed': seed}
+        if path.exists():
+            self._read(head)
+            return
+        with path.open('w', encoding='utf-8') as stream:
+            stream.write(json.dumps(head) + '\n')
+
+    def _read(self, head: dict[str, Any]) -> None:
+        lines = self._path.read_text(encoding='utf-8').splitlines(keepends=True)
+        try:
+            if not lines or json.loads(lines[0]) != head:
+                raise UserError(f'{self._path}: belongs to another search (targets, start or seed '
+                                'differ), give --log another file or remove it')
+            whole = [line for line in lines[1:] if line.endswith('\n')]
+            for line in whole:
+                entry = json.loads(line)
+                self.read.append(Candidate(
+                    tuple(entry['shares']),
+                    Evaluation(entry['cost'], entry['figures'], entry['complete'])))
+        except (ValueError, KeyError, TypeError) as error:
+            raise UserError(f'{self._path}: is not the log of a search: {error}') from error
+        if len(whole) < len(lines) - 1:
+            # the line that an interruption cut short is simulated anew
+            self._path.write_text(''.join([lines[0], *whole]), encoding='utf-8')
+
+    def open(self) -> TextIO:  # noqa: A003
+        return self._path.open('a', encoding='utf-8')
+
+
+def _digest(problem: Problem) -> str:
+    """Return what tells one problem from another."""
+    said = repr((problem.free, problem.targets, problem.population, problem.spread,
+                 problem.parameters(problem.start())))
+    return hashlib.sha256(said.encode()).hexdigest()[:16]
+
+
+def search(problem: Problem, count: int, *, seed: int = 1, log: Path | None = None,
+           progress: Callable[[int, Candidate], None] | None = None) -> Found:
+    """
+    Look for the parameters that cost least.
+
+    Parameters
+    ----------
+    problem : what is free, what is aimed at, and from where
+    count : candidates to try; the search ends with a whole generation
+    seed : the same seed gives the same search
+    log : where candidates are kept as they come; a search that finds its log goes on from it
+    progress : told the number of candidates so far, and the best one
+
+    Raises
+    ------
+    UserError : the log belongs to another search, or cannot be read or written
+
+    """
+    known = _Log(log, problem, seed) if log is not None else None
+    start = problem.start()
+    candidates = [Candidate(tuple(start), problem.evaluate(start))]
+    random = np.random.default_rng(seed)
+    strategy = cma.CMAEvolutionStrategy(start, problem.spread, {
+        'bounds': [0.0, 1.0], 'popsize': problem.population, 'verbose': -9, 'seed': math.nan,
+        'randn': lambda *shape: random.standard_normal(shape), 'maxiter': math.inf})
+    stream = known.open() if known else None
+    try:
+        limit = math.inf
+        while len(candidates) <= count and not strategy.stop():
+            asked = strategy.ask()
+            generation = []
+            for shares in asked:
+                number = len(candidates) - 1
+                if known and number < len(known.read):
+                    candidate = known.read[number]
+                    if not np.allclose(candidate.shares, shares, rtol=0.0, atol=1e-9):
+                        raise UserError(f'{log}: does not repeat (another version of a library?), '
+                                        'remove it to start anew')
+                else:
+                    candidate = Candidate(tuple(map(float, shares)),
+                                          problem.evaluate(shares, limit))
+                    if stream:
+                        _write(stream, candidate)
+                candidates.append(candidate)
+                generation.append(candidate.evaluation.cost)
+                if progress:
+                    progress(len(candidates) - 1, _best(candidates))
+            strategy.tell(asked, generation)
+            limit = _GIVE_UP * sorted(generation)[len(generation) // 2]
+    finally:
+        if stream:
+            stream.close()
+    return Found(_best(candidates), tuple(candidates))
+
+
+def _best(candidates: list[Candidate]) -> Candidate:
+    return min((item for item in candidates if item.evaluation.complete),
+               key=lambda item: item.evaluation.cost)
+
+
+def _write(stream: TextIO, candidate: Candidate) -> None:
+    evaluation = candidate.evaluation
+    stream.write(json.dumps({
+        'shares': candidate.shares, 'cost': evaluation.cost, 'complete': evaluation.complete,
+        'figures': dict(evaluation.figures)}) + '\n')
+    stream.flush()
