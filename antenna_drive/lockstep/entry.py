@@ -50,11 +50,16 @@ def run_drive_unit(default_name: str, names: Sequence[str], args: Sequence[str] 
 
     Parameters
     ----------
-    default_name : the node's name unless it is remapped with -r __node:=...
-    names : names of the units that this executable can be
-    args : command line without the program's name; None for the process's own
-    fed_by_topic : settings that follow a Float64 topic `<node>/<setting>`
-    description : what --help says first
+    default_name
+        the node's name unless it is remapped with -r __node:=...
+    names
+        names of the units that this executable can be
+    args
+        command line without the program's name; None for the process's own
+    fed_by_topic
+        settings that follow a Float64 topic `<node>/<setting>`
+    description
+        what --help says first
 
     Returns
     -------
@@ -83,8 +88,10 @@ def run_unit(unit: Unit, args: Sequence[str] | None = None) -> int:
 
     Parameters
     ----------
-    unit : its name is the name of the unit that it stands in for
-    args : command line without the program's name; None for the process's own
+    unit
+        its name is the name of the unit that it stands in for
+    args
+        command line without the program's name; None for the process's own
 
     Returns
     -------

@@ -62,8 +62,10 @@ class FrameLayout:
 
         Parameters
         ----------
-        run, step, step_s : the run's id, the macro-step, its length [s]
-        outputs : array of shape (number of signals, 2): value and time derivative
+        run, step, step_s
+            the run's id, the macro-step, its length [s]
+        outputs
+            array of shape (number of signals, 2): value and time derivative
 
         """
         return self._prefix + self._header.pack(run, step, step_s) + outputs.tobytes()

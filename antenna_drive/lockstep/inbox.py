@@ -100,9 +100,9 @@ class Inbox:
         elif not all_finite(frame):
             nan = any(map(math.isnan, frame))
             self.refuse(peer, Refusal.NAN if nan else Refusal.INFINITE)
-        elif frame[1] < 0.0 or not frame[1].is_integer():
+        elif frame[1] < 0.0 or frame[1] % 1.0 != 0.0:
             self.refuse(peer, Refusal.NOT_A_STEP)
-        elif not 0.0 <= frame[0] < LARGEST_RUN or not frame[0].is_integer():
+        elif not 0.0 <= frame[0] < LARGEST_RUN or frame[0] % 1.0 != 0.0:
             self.refuse(peer, Refusal.WRONG_RUN)
         else:
             return True

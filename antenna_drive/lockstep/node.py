@@ -66,11 +66,16 @@ class DriveNode:
 
         Parameters
         ----------
-        node : a bare node of the unit's name
-        unit : the unit, with every override already in force
-        overrides : what the user gave at the start
-        config : the configuration files the unit was made from
-        fed_by_topic : live settings that follow a Float64 topic `<node>/<setting>` instead of
+        node
+            a bare node of the unit's name
+        unit
+            the unit, with every override already in force
+        overrides
+            what the user gave at the start
+        config
+            the configuration files the unit was made from
+        fed_by_topic
+            live settings that follow a Float64 topic `<node>/<setting>` instead of
             being parameters
 
         Raises

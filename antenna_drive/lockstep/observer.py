@@ -88,17 +88,24 @@ class Observer:
 
         Parameters
         ----------
-        name : name of the observer's node; a member is one that run.observers names
-        on_step : called as on_step(step, time [s], samples) with an array of shape
+        name
+            name of the observer's node; a member is one that run.observers names
+        on_step
+            called as on_step(step, time [s], samples) with an array of shape
             (len(names), 2), value and derivative, valid during the call only
-        on_begin : called as on_begin(run, macro-step [s]) when a run begins, also in the middle
+        on_begin
+            called as on_begin(run, macro-step [s]) when a run begins, also in the middle
             of another: what came before belongs to a run that is over; a guest's first step
             need not be step 0
-        on_change : called as on_change(unit, record) with what a node says on `<unit>/changes`,
+        on_change
+            called as on_change(unit, record) with what a node says on `<unit>/changes`,
             see ChangeRecord; from another thread
-        namespace, domain_id : where the drive is; None for the domain in the environment
-        guest : True for an observer that nobody waits for
-        outputs : the signals of each unit
+        namespace, domain_id
+            where the drive is; None for the domain in the environment
+        guest
+            True for an observer that nobody waits for
+        outputs
+            the signals of each unit
 
         """
         choose_transport(os.environ)

@@ -60,13 +60,20 @@ class DriveProcesses:
 
         Parameters
         ----------
-        parameters : what to set on each node, by unit and parameter name
-        config : configuration files or sets of config/ for every node
-        namespace : of every node, '/east'; '' for none
-        domain_id : the ROS 2 domain; None for the one in the environment
-        order : the units, in the order in which they are started
-        commands : commands to run in place of our own nodes, by unit
-        environment : variables to set beside those of this process
+        parameters
+            what to set on each node, by unit and parameter name
+        config
+            configuration files or sets of config/ for every node
+        namespace
+            of every node, '/east'; '' for none
+        domain_id
+            the ROS 2 domain; None for the one in the environment
+        order
+            the units, in the order in which they are started
+        commands
+            commands to run in place of our own nodes, by unit
+        environment
+            variables to set beside those of this process
 
         """
         self.order = tuple(order)

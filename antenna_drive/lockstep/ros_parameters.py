@@ -209,9 +209,12 @@ def accept_changes(node: Node, entries: Mapping[str, Entry],
 
     Parameters
     ----------
-    node : the node on which they are declared
-    entries : what may be said of each parameter
-    change : puts a set of changes in force and returns '', or refuses all and returns why
+    node
+        the node on which they are declared
+    entries
+        what may be said of each parameter
+    change
+        puts a set of changes in force and returns '', or refuses all and returns why
 
     """
     def as_floats(parameters: list[Parameter[Any]]) -> list[Parameter[Any]]:

@@ -27,7 +27,7 @@ import pytest
 
 pytest.importorskip('rclpy', reason='rclpy is not installed: no processes to test')
 
-from antenna_drive.lockstep.processes import DriveProcesses  # noqa: E402
+from antenna_drive.lockstep.processes import DriveProcesses  # noqa: E402, I100
 from drive_watch import Recorder, Watch  # noqa: E402
 
 PACKAGE = Path(__file__).parents[2] / 'examples' / 'own_torque_share'
