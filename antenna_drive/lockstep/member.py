@@ -52,11 +52,16 @@ class Member:
 
         Parameters
         ----------
-        unit : the unit to be stepped
-        birth : when this node was started [us of wall time]; it joins younger runs only
-        outputs : signals of each unit of the drive, by unit
-        conductor : name of the unit that owns the run
-        others : peers to wait for at every step although the unit reads nothing from them
+        unit
+            the unit to be stepped
+        birth
+            when this node was started [us of wall time]; it joins younger runs only
+        outputs
+            signals of each unit of the drive, by unit
+        conductor
+            name of the unit that owns the run
+        others
+            peers to wait for at every step although the unit reads nothing from them
 
         Raises
         ------
@@ -265,10 +270,14 @@ class Conductor(Member):
 
         Parameters
         ----------
-        unit, birth, outputs : see Member
-        step_s : length of the macro-step [s]
-        last_step : the step at which a run ends; None for a run without end
-        observers : further members, which read the drive and put out nothing
+        unit, birth, outputs
+            see Member
+        step_s
+            length of the macro-step [s]
+        last_step
+            the step at which a run ends; None for a run without end
+        observers
+            further members, which read the drive and put out nothing
 
         """
         members = [name for name in outputs if name != unit.name]
@@ -323,7 +332,8 @@ class Conductor(Member):
 
         Parameters
         ----------
-        now : wall time [us]; the run's id, unless somebody was born later by his own clock
+        now
+            wall time [us]; the run's id, unless somebody was born later by his own clock
 
         Returns
         -------

@@ -60,10 +60,9 @@ class DriveProcesses:
 
         Parameters
         ----------
-        parameters
-            what to set on each node, by unit and parameter name
-        config
-            configuration files or sets of config/ for every node
+        config, parameters
+            configuration files or sets of config/ for every node, and what to set on each node
+            over them, by unit and parameter name
         namespace
             of every node, '/east'; '' for none
         domain_id

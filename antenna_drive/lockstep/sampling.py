@@ -63,11 +63,16 @@ def sample_processes(steps: int, step_s: float, *, name: str = 'observer',
 
     Parameters
     ----------
-    steps, step_s : number and length [s] of the macro-steps
-    name : name of the observing node
-    parameters, config, namespace, domain_id : see DriveProcesses
-    pace : how many times faster than real time, 0 for as fast as possible
-    progress : called with the step about ten times a second
+    steps, step_s
+        number and length [s] of the macro-steps
+    name
+        name of the observing node
+    parameters, config, namespace, domain_id
+        see DriveProcesses
+    pace
+        how many times faster than real time, 0 for as fast as possible
+    progress
+        called with the step about ten times a second
 
     Raises
     ------
