@@ -27,7 +27,6 @@ from antenna_drive.physics.arrays import FloatArray
 from antenna_drive.physics.compiling import compiled, inner
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import max_len_seq
 
 (ZERO, SQUARE, SAW_TOOTH, SAW_TOOTH_JUMP, STEP, SINE, CHIRP, MULTISINE, PRBS,
  EXTERNAL) = range(10)
@@ -39,6 +38,8 @@ _PRBS_ORDER = 10
 
 def prbs_bits() -> NDArray[np.float64]:
     """Return one period of the pseudo-random binary sequence, as +1 and -1, shape (1023,)."""
+    # scipy.signal takes a second of processor time to import, which only this unit has need of
+    from scipy.signal import max_len_seq
     bits, _ = max_len_seq(_PRBS_ORDER)
     return 2.0 * bits.astype(np.float64) - 1.0
 
