@@ -18,6 +18,7 @@ Repeat the article's experiments and put every published figure beside what the 
   antenna-drive article --json -               rows and contradictions, for programs
   antenna-drive article --figures figures      the figures, drawn anew from runs
   antenna-drive article --config reference     the same for another parameter set
+  antenna-drive article --through-nodes        T3 and T4a, T4e in five ROS 2 processes
 
 A row passes if the obtained figure is within the tolerance of the published one; where the
 article gives a figure of the field and one of its analysis, of the analysis'. Currents are
@@ -27,18 +28,29 @@ in the article's amperes. The exit code is 1 if a row does not pass.
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict
+from collections.abc import Callable
+from dataclasses import asdict, replace
 from pathlib import Path
 import sys
+from typing import Any
 
 from antenna_drive import cli
 from antenna_drive.article.contradictions import Contradiction, contradictions
+from antenna_drive.article.experiments import Experiment
 from antenna_drive.article.measures import Results, with_circuits
 from antenna_drive.article.rows import Row, rows
 from antenna_drive.cli.output import add_json_option, Progress, STANDARD_OUTPUT, write_json
+from antenna_drive.emulator.run import MACRO_STEP, Run, simulate
+from antenna_drive.emulator.units import home
+from antenna_drive.parameters import Drive
+import numpy as np
 
 # The parameter set that the article is compared with unless another is asked for.
 CONFIGURATION = 'reference'
+# The experiments whose rows are shown; all of them if there are none.
+EXPERIMENTS: tuple[str, ...] = ()
+# The experiments that --through-nodes runs in five processes.
+THROUGH_NODES = ('T3a', 'T3b', 'T4a', 'T4e')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,6 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json_option(parser)
     parser.add_argument('--figures', metavar='DIR', type=Path,
                         help='draw the figures into DIR, one file each and figures.html')
+    parser.add_argument('--through-nodes', action='store_true',
+                        help=f'run {", ".join(THROUGH_NODES)} through the five ROS 2 processes')
     parser.add_argument('--config', metavar='SET', nargs='+', default=[CONFIGURATION],
                         help='parameter set: a name in config/ or a file; further ones lie over '
                              'the first (default: %(default)s)')
@@ -53,9 +67,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Do what the arguments say; return the exit code."""
-    results = Results(with_circuits(*arguments.config))
+    run_one = _through_nodes(arguments.config) if arguments.through_nodes else None
+    results = Results(with_circuits(*arguments.config), run=run_one)
     with Progress('experiments', 1.0) as shown:
-        found = rows(results, progress=lambda done, total: shown.update(done / total))
+        found = rows(results, EXPERIMENTS,
+                     lambda done, total: shown.update(done / total))
+    if arguments.through_nodes:
+        found = [_marked(row) for row in found]
     disagreements = contradictions(results)
     if arguments.figures is not None:
         from antenna_drive.article.figures import draw_all
@@ -68,6 +86,34 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json != STANDARD_OUTPUT:
         _write(found, disagreements)
     return cli.OK if all(row.passed for row in found) else cli.NEGATIVE
+
+
+def _through_nodes(configuration: list[str]) -> Callable[[Experiment, Drive], Run]:
+    """Return what runs some experiments in five processes, and the others in this one."""
+    from antenna_drive.lockstep.sampling import sample_processes
+
+    def run_one(experiment: Experiment, drive: Drive) -> Run:
+        if experiment.name not in THROUGH_NODES:
+            return simulate(drive, experiment.duration)
+        settings: dict[str, dict[str, Any]] = {}
+        for parameter, value in experiment.settings.items():
+            unit, name = home(parameter)
+            settings.setdefault(unit, {})[name] = value
+        steps = round(experiment.duration / MACRO_STEP)
+        with Progress(f'{experiment.name}, five processes', steps) as shown:
+            sampled = sample_processes(steps, MACRO_STEP, name='article', parameters=settings,
+                                       config=[*configuration, experiment.circuit],
+                                       progress=shown.update)
+        return Run(MACRO_STEP, np.arange(steps + 1), sampled.names, sampled.samples)
+
+    return run_one
+
+
+def _marked(row: Row) -> Row:
+    """Return a row whose note says that five processes gave it."""
+    if row.id.partition('.')[0] not in THROUGH_NODES:
+        return row
+    return replace(row, note=f'{row.note}; through five ROS 2 processes')
 
 
 def _write(found: list[Row], disagreements: list[Contradiction]) -> None:
