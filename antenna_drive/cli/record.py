@@ -31,11 +31,11 @@ import time
 from typing import Any
 
 from antenna_drive.cli.output import Progress
-from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL, UNITS
+from antenna_drive.cli.settings import parse_settings
+from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.errors import UserError
 from antenna_drive.recording.recorder import RunRecorder
 from antenna_drive.recording.sheet import load_sheet
-import yaml
 
 _NAME = 'recorder'
 _PATIENCE_S = 60.0  # until the drive begins, and from step to step
@@ -61,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Start, record, end."""
-    parameters = _parameters(args.settings)
+    parameters = parse_settings(args.settings)
     recorder = RunRecorder(
         args.out, {f'{unit}/{s.name}': s.unit for unit, own in OUTPUTS.items() for s in own},
         load_sheet(args.sheet) if args.sheet else None, recorded_by=_NAME)
@@ -123,24 +123,6 @@ class _Watch:
             raise UserError(f'the drive does not go on at step {self._done + 1}: waiting for '
                             f'{", ".join(observer.missing)}')
         return False
-
-
-def _parameters(settings: tuple[str, ...]) -> dict[str, dict[str, Any]]:
-    parameters: dict[str, dict[str, Any]] = {}
-    for item in settings:
-        name, equals, text = item.partition('=')
-        unit, _, key = name.partition('.')
-        if not equals or not key or unit not in UNITS:
-            raise UserError(f'--set {item}: allowed is UNIT.NAME=VALUE, with a unit of '
-                            f'{", ".join(UNITS)}')
-        try:
-            value = yaml.safe_load(text)
-        except yaml.YAMLError:
-            value = text
-        # ROS 2 tells whole numbers from others, the drive's parameters are nearly all others
-        whole = isinstance(value, int) and not isinstance(value, bool)
-        parameters.setdefault(unit, {})[key] = float(value) if whole else value
-    return parameters
 
 
 def _positive(text: str) -> float:

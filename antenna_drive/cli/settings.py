@@ -44,7 +44,10 @@ def parse_settings(settings: Sequence[str]) -> dict[str, dict[str, Any]]:
             raise UserError(f'--set {text}: {unit}: no such unit{nearest(unit, UNITS)}; '
                             f'allowed are {", ".join(UNITS)}')
         try:
-            found.setdefault(unit, {})[key] = yaml.safe_load(value)
+            given = yaml.safe_load(value)
         except yaml.YAMLError as error:
             raise UserError(f'--set {text}: {value!r} is no value') from error
+        # ROS 2 tells whole numbers from others, the drive's parameters are nearly all others
+        whole = isinstance(given, int) and not isinstance(given, bool)
+        found.setdefault(unit, {})[key] = float(given) if whole else given
     return found
