@@ -318,7 +318,7 @@ _SENSORS = (
 )
 _LOOP = (
     Effect('loop.delay', 'of the rate error of both motors, as a [3/4] Pade approximant',
-           (Quantity('delay', 's', 8e-4, 1.2e-2),), _motor_field('delay', 'delay')(slice(0, 2))),
+           (Quantity('delay', 's', 8e-4, 7e-3),), _motor_field('delay', 'delay')(slice(0, 2))),
 )
 
 CATALOGUE: dict[str, Effect] = {effect.key: effect for effect in (

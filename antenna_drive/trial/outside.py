@@ -109,7 +109,7 @@ OUTSIDE: dict[str, Effect] = {effect.key: effect for effect in (
            _structure_values(dahl_travel='travel', dahl='share')),
     Effect('outside.unequal_bridges', 'gain of a power stage differs with the direction of '
            'the current, v (1 + error tanh(v / 0.3 A))',
-           (Quantity('error', '1', 0.05, 0.5, turned='sign'), MOTOR),
+           (Quantity('error', '1', 0.05, 0.3, turned='sign'), MOTOR),
            _motor_values(bridge_error='error')),
     Effect('outside.structural_friction', 'dry friction in the joints of the first mode',
            (Quantity('torque', 'N m', 4e3, 8e4), Quantity('rate', 'rad/s', 2e-5, 1e-4)),
@@ -125,7 +125,7 @@ OUTSIDE: dict[str, Effect] = {effect.key: effect for effect in (
            (Quantity('torque', 'N m', 0.5, 6.0), MOTOR, Quantity('start', 's', 3.0, 18.0),
             Quantity('length', 's', 3.0, 9.0)), _brake),
     Effect('outside.tach_coupling', 'a tachometer hangs on an elastic coupling, inside the loop',
-           (Quantity('frequency', 'rad/s', 120.0, 45.0), MOTOR),
+           (Quantity('frequency', 'rad/s', 220.0, 110.0), MOTOR),
            _motor_values(coupling_frequency='frequency')),
     Effect('outside.mains_hum', '50 Hz on a tachometer, inside the loop',
            (Quantity('amplitude', 'rad/s', 0.02, 0.6), MOTOR), _motor_values(hum='amplitude')),

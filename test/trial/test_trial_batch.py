@@ -26,6 +26,7 @@ from typing import Any
 
 from antenna_drive.cli import main
 from antenna_drive.errors import UserError
+from antenna_drive.recording.csv_format import read_csv
 from antenna_drive.trial import batch, sealing
 from antenna_drive.trial.cases import make_recording
 import numpy as np
@@ -107,6 +108,15 @@ def test_recordings_are_in_the_input_format(made: Path) -> None:
                                   'elevation_deg', 'sensors', 'parameter_tolerance'}
             assert sheet['start'] == 'rest'
             assert 'truth' not in (made / case / f'{name}.yaml').read_text()
+
+
+def test_another_reader_takes_recording_and_sheet(made: Path) -> None:
+    for path in sorted(made.glob('case_*/rec_*.csv')):
+        recording = read_csv(path)
+        assert len(recording.channels) == 7
+        assert recording.sheet.parameter_tolerance == 0.02
+        assert recording.sheet.waveform is not None
+        assert recording.sheet.sensors is not None
 
 
 def test_sheet_commands_what_the_csv_holds(made: Path) -> None:
