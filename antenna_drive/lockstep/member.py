@@ -29,6 +29,10 @@ from antenna_drive.lockstep.inbox import DEPTH, Frame, Inbox, Refusal
 import numpy as np
 
 
+# How far an observer may fall behind: half of what each node remembers.
+SLACK = 500
+
+
 class Member:
     """
     A unit's part in the lock-step.
@@ -259,7 +263,8 @@ class Conductor(Member):
 
     It begins a run when it has heard from every other member, publishes step k + 1 only when
     it holds step k of every one, and begins afresh when one of them says hello: that is a node
-    that was started again.
+    that was started again. Observers are waited for too, but not at every step: they may read
+    in bulk, as long as they stay within what the others remember.
     """
 
     def __init__(self, unit: Unit, birth: float, step_s: float, last_step: int | None = None,
@@ -277,7 +282,7 @@ class Conductor(Member):
         last_step
             the step at which a run ends; None for a run without end
         observers
-            further members, which read the drive and put out nothing
+            further members, which read the drive and say now and then how far they are
 
         """
         members = [name for name in outputs if name != unit.name]
@@ -285,6 +290,9 @@ class Conductor(Member):
         self.wanted_step_s = step_s
         self.last_step = last_step
         self.ended = False
+        self._units = tuple(members)
+        self._unit_slots = [self.inbox.slots[name] for name in members]
+        self._used = dict.fromkeys(observers, 0.0)
         self._heard: dict[str, float] = {}
         self._begin_again = True
 
@@ -298,6 +306,8 @@ class Conductor(Member):
         elif frame[0] > self.run:
             # nobody but the conductor makes runs
             self.inbox.refuse(peer, Refusal.WRONG_RUN)
+        elif peer in self._used and frame[0] == self.run:
+            self._used[peer] = max(self._used[peer], frame[1])
         else:
             self.inbox.offer(peer, frame)
             for name, birth in self.inbox.hellos:
@@ -324,7 +334,17 @@ class Conductor(Member):
         if self.run == NO_RUN:
             return self.unheard()
         holds = self.inbox.holds
-        return tuple(peer for peer in self.peers if not holds(peer))
+        missing = tuple(name for name in self._units if not holds(name))
+        if self._used:
+            missing += self._behind()
+        return missing
+
+    def _behind(self) -> tuple[str, ...]:
+        """Return the observers that have to catch up before the next step."""
+        least = self.step - SLACK
+        if self.last_step is not None and self.step > self.last_step:
+            least = self.step
+        return tuple(name for name, used in self._used.items() if used < least)
 
     def new_run(self, now: float) -> FloatArray | None:
         """
@@ -344,6 +364,7 @@ class Conductor(Member):
             return None
         self._begin_again = False
         self.ended = False
+        self._used = dict.fromkeys(self._used, 0.0)
         run = max(float(int(now)), self.birth + 1.0, self.run + 1.0,
                   *(heard + 1.0 for heard in self._heard.values()))
         return self._begin(run, self.wanted_step_s)
@@ -353,9 +374,11 @@ class Conductor(Member):
         if self.run == NO_RUN or self.fault or self.ended or self._begin_again:
             return None
         slot = self.step % DEPTH
-        for slots in self.inbox.slots.values():
+        for slots in self._unit_slots:
             if slots[slot] is None:
                 return None
+        if self._used and self._behind():
+            return None
         if self.last_step is not None and self.step >= self.last_step:
             self._wait_for_the_last(slot)
             return None

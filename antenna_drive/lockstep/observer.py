@@ -14,10 +14,10 @@
 """
 Somebody who reads every signal of a running drive at every step, and loses none.
 
-An observer that test_signal was told of (run.observers) is a member of the lock-step: no step
-is made before it has seen the last, however fast the drive runs. Any other is a guest: it joins
-a run where it is, at the earliest step that the nodes remember, and follows as long as it
-keeps within what they remember: the last thousand steps.
+An observer that test_signal was told of (run.observers) is a member of the lock-step: the drive
+never gets further ahead of it than the nodes remember, however fast it runs. Any other is a
+guest: it joins a run where it is, at the earliest step that the nodes remember, and follows as
+long as it keeps within what they remember, the last thousand steps.
 """
 
 from __future__ import annotations
@@ -47,6 +47,9 @@ OnStep = Callable[[int, float, FloatArray], None]
 OnChange = Callable[[str, Mapping[str, Any]], None]
 
 _LONGEST_WAIT_S = 0.1
+
+# To be woken for each frame would cost the drive more than to be read in bulk [s].
+_NAP_S = 0.01
 
 
 class _Reader(Unit):
@@ -119,6 +122,7 @@ class Observer:
         reader = _Reader(name, self.names, on_step)
         self._member = Guest(reader, outputs) if guest else Member(reader, birth, outputs)
         self._run = 0.0
+        self._told = -1
         self._link = FrameLink(self._node, self._member.layouts)
         self._executor: SingleThreadedExecutor | None = None
         self._thread: Thread | None = None
@@ -163,21 +167,36 @@ class Observer:
 
     def spin(self, until: Callable[[], bool]) -> None:
         """Follow the drive until `until()` is true; it is asked every 0.1 s and at each step."""
-        member, link = self._member, self._link
+        member = self._member
         while not until():
-            outputs = member.go_on()
-            if outputs is not None:
-                if member.run != self._run:
-                    self._run = member.run
-                    if self._on_begin is not None:
-                        self._on_begin(int(member.run), member.step_s)
-                link.publish(member.layout.encode(
-                    member.run, member.step, member.step_s, outputs))
-                continue
-            for peer in link.wait(member.wanted(), _LONGEST_WAIT_S):
-                frame = link.take(peer)
-                if frame is not None:
-                    member.receive(peer, frame)
+            if member.go_on() is None:
+                if not self._take():
+                    self._tell()
+                    self._link.wait(member.wanted(), _LONGEST_WAIT_S)
+                    time.sleep(_NAP_S)
+            elif member.run != self._run:
+                self._run = member.run
+                self._told = -1
+                if self._on_begin is not None:
+                    self._on_begin(int(member.run), member.step_s)
+
+    def _take(self) -> bool:
+        """Take what has come; return whether anything has."""
+        taken = False
+        for peer in self._member.wanted():
+            frame = self._link.take(peer)
+            if frame is not None:
+                self._member.receive(peer, frame)
+                taken = True
+        return taken
+
+    def _tell(self) -> None:
+        """Say how far we are, if that is news and somebody waits for it."""
+        member = self._member
+        if member.run and member.step != self._told and not isinstance(member, Guest):
+            self._told = member.step
+            self._link.publish(member.layout.encode(
+                member.run, member.step, member.step_s, np.zeros((0, 2))))
 
     def close(self) -> None:
         """Leave the drive."""

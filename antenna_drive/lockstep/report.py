@@ -98,6 +98,8 @@ class Report:
     def publish(self, now: float) -> None:
         """Publish the state at `now` [s]."""
         self.next_s = now + PERIOD_S
+        if self._waiting_since is not None:
+            self.waiting(now)  # the log never says less than the report
         level, message = self._judge(now)
         status = DiagnosticStatus(
             level=level, name=self._node.get_fully_qualified_name(), message=message,

@@ -26,7 +26,7 @@ import math
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.lockstep.inbox import DEPTH, Inbox, Refusal
-from antenna_drive.lockstep.member import Conductor, Guest, Member
+from antenna_drive.lockstep.member import Conductor, Guest, Member, SLACK
 from hypothesis import given, settings, strategies as st
 import numpy as np
 import pytest
@@ -360,3 +360,33 @@ def test_a_guest_joins_in_the_middle_and_misses_nothing_from_there(
     for k, read in listener.read.items():
         assert read.tobytes() == np.array([history[name][k][0] for name in UNITS]).tobytes()
     assert not guest.inbox.refused
+
+
+def test_the_conductor_waits_for_an_observer_that_falls_behind() -> None:
+    unit = Chaotic('test_signal')
+    conductor = Conductor(unit, 1.0, 1e-3, SLACK + 20, OUTPUTS, observers=('recorder',))
+    for name in (*UNITS[1:], 'recorder'):
+        frame = (0.0, 2.0, 0.0, *([] if name == 'recorder' else [0.0] * 4))
+        conductor.receive(name, frame)
+    assert conductor.new_run(10.0) is not None
+    run = conductor.run
+
+    def step_as_far_as_possible() -> int:
+        for _ in range(SLACK + 50):
+            for name in UNITS[1:]:
+                if name in conductor.missing():
+                    conductor.receive(name, (run, float(conductor.step), 1e-3, *[0.5] * 4))
+            conductor.go_on()
+        return conductor.step
+
+    assert step_as_far_as_possible() == SLACK + 1
+    assert conductor.missing() == ('recorder',)
+    conductor.receive('recorder', (run, 5.0, 1e-3))
+    assert step_as_far_as_possible() == SLACK + 6
+    conductor.receive('recorder', (run, 500.0, 1e-3))
+    assert step_as_far_as_possible() == SLACK + 21, 'one more than the last: nobody uses it'
+    assert not conductor.ended
+    assert conductor.missing() == ('recorder',)
+    conductor.receive('recorder', (run, SLACK + 21.0, 1e-3))
+    step_as_far_as_possible()
+    assert conductor.ended
