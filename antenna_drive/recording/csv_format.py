@@ -100,9 +100,12 @@ def parse_nanoseconds(text: str, cell: Cell, per_unit: int = NANOSECONDS) -> int
 
     Parameters
     ----------
-    text : decimal number
-    cell : where it stands
-    per_unit : nanoseconds in the unit of the number; seconds if not given
+    text
+        decimal number
+    cell
+        where it stands
+    per_unit
+        nanoseconds in the unit of the number; seconds if not given
 
     Raises
     ------
@@ -180,7 +183,8 @@ def read_csv(path: str | Path) -> Recording:
 
     Parameters
     ----------
-    path : NAME.csv with the field test's columns (FIELD_COLUMNS) or those of `write_csv`
+    path
+        NAME.csv with the field test's columns (FIELD_COLUMNS) or those of `write_csv`
 
     Returns
     -------
@@ -326,10 +330,14 @@ def write_csv(recording: Recording, path: str | Path, *, field: bool = False,
 
     Parameters
     ----------
-    recording : what to write
-    path : NAME.csv, not there yet
-    field : write the field test's columns under their names, and no other signal
-    names : the signals to write; all of them if not given
+    recording
+        what to write
+    path
+        NAME.csv, not there yet
+    field
+        write the field test's columns under their names, and no other signal
+    names
+        the signals to write; all of them if not given
 
     Returns
     -------

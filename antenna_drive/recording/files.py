@@ -28,8 +28,10 @@ def read_recording(path: str | Path, *, partial: bool = False) -> Recording:
 
     Parameters
     ----------
-    path : the folder or file
-    partial : read what can be read of a bag that was cut off or damaged
+    path
+        the folder or file
+    partial
+        read what can be read of a bag that was cut off or damaged
 
     Raises
     ------

@@ -59,8 +59,10 @@ class Follower:
 
         Parameters
         ----------
-        lengths : how many numbers a frame of each unit has, in the order of the signals
-        conductor : the unit that owns the run: nobody else begins one
+        lengths
+            how many numbers a frame of each unit has, in the order of the signals
+        conductor
+            the unit that owns the run: nobody else begins one
 
         """
         self._lengths = dict(lengths)

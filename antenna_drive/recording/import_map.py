@@ -271,8 +271,10 @@ def import_csv(path: str | Path, import_map: ImportMap) -> Recording:
 
     Parameters
     ----------
-    path : the file; a test sheet NAME.yaml beside NAME.csv is taken along
-    import_map : what the file holds
+    path
+        the file; a test sheet NAME.yaml beside NAME.csv is taken along
+    import_map
+        what the file holds
 
     Raises
     ------

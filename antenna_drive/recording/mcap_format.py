@@ -107,12 +107,18 @@ class BagWriter:
 
         Parameters
         ----------
-        path : folder that is not there yet
-        signals : name -> unit of each signal that will come
-        configuration, sheet, notes : see Recording
-        stem : first part of the storage file's name; the folder's name if not given
-        flush_s : longest time between chunks, by `clock` and by the time stamps [s]
-        clock : a steady clock [s]
+        path
+            folder that is not there yet
+        signals
+            name -> unit of each signal that will come
+        configuration, sheet, notes
+            see Recording
+        stem
+            first part of the storage file's name; the folder's name if not given
+        flush_s
+            longest time between chunks, by `clock` and by the time stamps [s]
+        clock
+            a steady clock [s]
 
         Raises
         ------
@@ -190,9 +196,12 @@ class BagWriter:
 
         Parameters
         ----------
-        step : number of the macro-step
-        time_ns : simulated time [ns], not negative
-        values : one for each signal, in their order; NaN where there is no sample
+        step
+            number of the macro-step
+        time_ns
+            simulated time [ns], not negative
+        values
+            one for each signal, in their order; NaN where there is no sample
 
         Raises
         ------
@@ -597,8 +606,10 @@ def read_bag(path: str | Path, *, partial: bool = False) -> Recording:
 
     Parameters
     ----------
-    path : the folder, or a file NAME.mcap
-    partial : read what can be read of a bag that was cut off or damaged, and warn how far
+    path
+        the folder, or a file NAME.mcap
+    partial
+        read what can be read of a bag that was cut off or damaged, and warn how far
 
     Raises
     ------

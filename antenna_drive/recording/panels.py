@@ -84,8 +84,10 @@ def panels_of(recording: Recording, patterns: Sequence[str] | None = None) -> tu
 
     Parameters
     ----------
-    recording : what is to be looked at
-    patterns : the signals, see `chosen`; if not given, panels that tell nothing are left out: an
+    recording
+        what is to be looked at
+    patterns
+        the signals, see `chosen`; if not given, panels that tell nothing are left out: an
         external torque of zero, ammeters that read the currents, and the lock-step's own signal
 
     Raises

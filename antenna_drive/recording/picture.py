@@ -34,11 +34,16 @@ def draw(recording: Recording, stream: IO[bytes], form: str, *,
 
     Parameters
     ----------
-    recording : what to draw
-    stream : where to write the picture
-    form : one of FORMATS
-    patterns : the signals, such as 'motor_*/current'; all that have samples if not given
-    title : above the picture
+    recording
+        what to draw
+    stream
+        where to write the picture
+    form
+        one of FORMATS
+    patterns
+        the signals, such as 'motor_*/current'; all that have samples if not given
+    title
+        above the picture
 
     Raises
     ------

@@ -50,9 +50,12 @@ class RunRecorder:
 
         Parameters
         ----------
-        path : folder that is not there yet; later runs go to PATH_run_2, PATH_run_3 ...
-        signals : name -> unit of every signal, in the order in which `step` gives them
-        sheet, notes : see Recording
+        path
+            folder that is not there yet; later runs go to PATH_run_2, PATH_run_3 ...
+        signals
+            name -> unit of every signal, in the order in which `step` gives them
+        sheet, notes
+            see Recording
 
         Raises
         ------
@@ -100,8 +103,10 @@ class RunRecorder:
 
         Parameters
         ----------
-        number : of the macro-step
-        values : one for each signal, NaN where there is no sample
+        number
+            of the macro-step
+        values
+            one for each signal, NaN where there is no sample
 
         Raises
         ------

@@ -161,7 +161,8 @@ class Channel:
 
         Parameters
         ----------
-        time_ns : array of shape (m,), int64 [ns]; inside the span of the samples
+        time_ns
+            array of shape (m,), int64 [ns]; inside the span of the samples
 
         Returns
         -------
@@ -282,10 +283,14 @@ class Recording:
 
         Parameters
         ----------
-        time_s : shape (n,) [s]; rounded to whole nanoseconds
-        signals : name -> values, shape (n,)
-        units : name -> unit, for signals that the drive does not have
-        known : configuration, changes, sheet and notes
+        time_s
+            shape (n,) [s]; rounded to whole nanoseconds
+        signals
+            name -> values, shape (n,)
+        units
+            name -> unit, for signals that the drive does not have
+        known
+            configuration, changes, sheet and notes
 
         Raises
         ------
@@ -433,8 +438,10 @@ class Recording:
 
         Parameters
         ----------
-        period_s : length of a period [s]
-        start_s : where the first period begins [s]; what lies before is left out
+        period_s
+            length of a period [s]
+        start_s
+            where the first period begins [s]; what lies before is left out
 
         Returns
         -------
@@ -490,10 +497,13 @@ class Recording:
 
         Parameters
         ----------
-        names : the signals wanted; all if not given
-        onto : a signal, whose time stamps are used, or an array of times [s]; the first of
+        names
+            the signals wanted; all if not given
+        onto
+            a signal, whose time stamps are used, or an array of times [s]; the first of
             `names` if not given
-        method : one of METHODS
+        method
+            one of METHODS
 
         Raises
         ------

@@ -100,8 +100,10 @@ def command_table(channel: Channel, times_ns: Any) -> FloatArray:
 
     Parameters
     ----------
-    channel : the command, at least one sample
-    times_ns : the macro-steps [ns], shape (n,); before the first sample and after the last the
+    channel
+        the command, at least one sample
+    times_ns
+        the macro-steps [ns], shape (n,); before the first sample and after the last the
         command stands still
 
     Returns
@@ -136,10 +138,14 @@ def twin(recording: Recording, config: Sequence[str] = (), step_s: float | None 
 
     Parameters
     ----------
-    recording : has to hold the rate command
-    config : configuration files or names of sets in config/
-    step_s : macro-step [s]; that of the recording if it tells, else 1 ms
-    every : keep the samples of the macro-steps that this number divides
+    recording
+        has to hold the rate command
+    config
+        configuration files or names of sets in config/
+    step_s
+        macro-step [s]; that of the recording if it tells, else 1 ms
+    every
+        keep the samples of the macro-steps that this number divides
 
     Returns
     -------

@@ -43,8 +43,10 @@ def page(recording: Recording, title: str) -> str:
 
     Parameters
     ----------
-    recording : what the page is about
-    title : its name, for people
+    recording
+        what the page is about
+    title
+        its name, for people
 
     Raises
     ------

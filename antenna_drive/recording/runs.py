@@ -43,9 +43,12 @@ def from_run(run: Run, drive: Drive | None = None, sheet: TestSheet | None = Non
 
     Parameters
     ----------
-    run : what the emulator gave
-    drive : the parameters that it began with, to be kept as the configuration
-    sheet, notes : see Recording
+    run
+        what the emulator gave
+    drive
+        the parameters that it began with, to be kept as the configuration
+    sheet, notes
+        see Recording
 
     Raises
     ------
@@ -69,9 +72,12 @@ def record(emulator: Emulator, duration: float, **known: Any) -> Recording:
 
     Parameters
     ----------
-    emulator : the drive, some of its units perhaps replaced
-    duration : [s]
-    known : `changes` and `every` for the run; sheet and notes for the recording
+    emulator
+        the drive, some of its units perhaps replaced
+    duration
+        [s]
+    known
+        `changes` and `every` for the run; sheet and notes for the recording
 
     Raises
     ------

@@ -57,8 +57,10 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
 
     Parameters
     ----------
-    folder : of the trial
-    count, seed, tolerance, sample_rate, duration : as in `cases.draw_truths`
+    folder
+        of the trial
+    count, seed, tolerance, sample_rate, duration
+        as in `cases.draw_truths`
 
     Returns
     -------
@@ -98,8 +100,10 @@ def make_case(folder: Path, truth: Truth) -> None:
 
     Parameters
     ----------
-    folder : of the trial
-    truth : of the case
+    folder
+        of the trial
+    truth
+        of the case
 
     """
     final = folder / truth['case']
@@ -124,10 +128,14 @@ def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
 
     Parameters
     ----------
-    folder : of the trial
-    manifest : of the trial
-    jobs : how many processes
-    done : is told how many cases are complete, and of how many
+    folder
+        of the trial
+    manifest
+        of the trial
+    jobs
+        how many processes
+    done
+        is told how many cases are complete, and of how many
 
     """
     _sweep(folder)
@@ -176,9 +184,12 @@ def diagnose_case(case: Path, options: Sequence[str], limit: float) -> bool:
 
     Parameters
     ----------
-    case : folder of the case
-    options : more options for the diagnosis
-    limit : seconds after which it counts as failed
+    case
+        folder of the case
+    options
+        more options for the diagnosis
+    limit
+        seconds after which it counts as failed
 
     Returns
     -------
@@ -217,12 +228,18 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
 
     Parameters
     ----------
-    folder : of the trial
-    manifest : of the trial
-    jobs : how many diagnoses at once
-    options : more options for the diagnosis
-    limit : seconds after which one diagnosis counts as failed
-    done : is told how many cases are through, and of how many
+    folder
+        of the trial
+    manifest
+        of the trial
+    jobs
+        how many diagnoses at once
+    options
+        more options for the diagnosis
+    limit
+        seconds after which one diagnosis counts as failed
+    done
+        is told how many cases are through, and of how many
 
     Returns
     -------

@@ -55,11 +55,16 @@ def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float =
 
     Parameters
     ----------
-    count : number of cases
-    seed : of everything
-    tolerance : largest relative deviation of any parameter from the reference, unit 1
-    sample_rate : of the recordings [Hz]
-    duration : of each recording [s]
+    count
+        number of cases
+    seed
+        of everything
+    tolerance
+        largest relative deviation of any parameter from the reference, unit 1
+    sample_rate
+        of the recordings [Hz]
+    duration
+        of each recording [s]
 
     """
     random = np.random.default_rng([seed, 0])
@@ -128,8 +133,10 @@ def build_machine(truth: Truth, recording: int) -> Machine:
 
     Parameters
     ----------
-    truth : of the case
-    recording : 0 for the first; wind and bad contacts are another draw in each
+    truth
+        of the case
+    recording
+        0 for the first; wind and bad contacts are another draw in each
 
     """
     sheet = truth['sheets'][recording]
@@ -161,8 +168,10 @@ def make_recording(truth: Truth, recording: int) -> dict[str, FloatArray]:
 
     Parameters
     ----------
-    truth : of the case
-    recording : its number, from 0
+    truth
+        of the case
+    recording
+        its number, from 0
 
     Returns
     -------

@@ -60,9 +60,12 @@ class Study:
 
         Parameters
         ----------
-        tolerance : largest relative deviation of any parameter, unit 1
-        seed : of the programme
-        report : is told the done part, 0 to 1
+        tolerance
+            largest relative deviation of any parameter, unit 1
+        seed
+            of the programme
+        report
+            is told the done part, 0 to 1
 
         """
         truth = next(t for t in draw_truths(40, seed, tolerance) if t['kind'] == 'none')
@@ -144,8 +147,10 @@ class Study:
 
         Parameters
         ----------
-        effect_id : of the catalogue or outside it
-        values : the effect's numbers
+        effect_id
+            of the catalogue or outside it
+        values
+            the effect's numbers
 
         Returns
         -------

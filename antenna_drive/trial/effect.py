@@ -53,8 +53,10 @@ class Quantity:
 
         Parameters
         ----------
-        part : 0 for the smallest size, 1 for the largest
-        random : decides on the sign or the inverse
+        part
+            0 for the smallest size, 1 for the largest
+        random
+            decides on the sign or the inverse
 
         """
         if self.spacing == 'log':
@@ -99,8 +101,10 @@ class Effect:
 
         Parameters
         ----------
-        size : 0 for just detectable, 1 for strong
-        random : source of everything else
+        size
+            0 for just detectable, 1 for strong
+        random
+            source of everything else
 
         Returns
         -------

@@ -351,15 +351,23 @@ def derivative(t: float, middle: float, y: FloatArray, mode: ModeArray, machine:
 
     Parameters
     ----------
-    t : time [s]
-    middle : any time strictly inside the present stretch between two jumps of an input [s];
+    t
+        time [s]
+    middle
+        any time strictly inside the present stretch between two jumps of an input [s];
         it says on which side of a jump the inputs are to be taken
-    y : state, shape (STATES,)
-    mode : switches, shape (SWITCHES,)
-    machine : the antenna
-    test : record of the test sheet (waveform.TEST)
-    dy : result, shape (STATES,)
-    margin : result, shape (SWITCHES,); negative where a switch has to be thrown
+    y
+        state, shape (STATES,)
+    mode
+        switches, shape (SWITCHES,)
+    machine
+        the antenna
+    test
+        record of the test sheet (waveform.TEST)
+    dy
+        result, shape (STATES,)
+    margin
+        result, shape (SWITCHES,); negative where a switch has to be thrown
 
     """
     circuit = machine.circuit[0]
@@ -398,10 +406,14 @@ def readings(times: FloatArray, middles: FloatArray, states: FloatArray, machine
 
     Parameters
     ----------
-    times, middles : as in `derivative`, shape (n,) [s]
-    states : shape (n, STATES)
-    machine, test : as in `derivative`
-    commands, biases, tachs : results, shapes (n,), (n,), (2, n) [rad/s, V, rad/s]
+    times, middles
+        as in `derivative`, shape (n,) [s]
+    states
+        shape (n, STATES)
+    machine, test
+        as in `derivative`
+    commands, biases, tachs
+        results, shapes (n,), (n,), (2, n) [rad/s, V, rad/s]
 
     """
     circuit = machine.circuit[0]

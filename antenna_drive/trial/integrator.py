@@ -138,16 +138,26 @@ def integrate(machine: Machine, test: Any, start: FloatArray, mode: ModeArray,
 
     Parameters
     ----------
-    machine : the antenna
-    test : TEST record
-    start : state at t = 0, shape (STATES,); overwritten with the last state
-    mode : switches at t = 0, shape (SWITCHES,); overwritten
-    corners : times at which inputs are not smooth, ascending [s]
-    samples : times at which the state is wanted, ascending, from 0 [s]
-    tolerance : largest error of one step, in units of `scale`
-    scale : typical size of each state
-    out : result, shape (len(samples), STATES)
-    statistics : result, shape (3,): steps taken, steps rejected, switchings
+    machine
+        the antenna
+    test
+        TEST record
+    start
+        state at t = 0, shape (STATES,); overwritten with the last state
+    mode
+        switches at t = 0, shape (SWITCHES,); overwritten
+    corners
+        times at which inputs are not smooth, ascending [s]
+    samples
+        times at which the state is wanted, ascending, from 0 [s]
+    tolerance
+        largest error of one step, in units of `scale`
+    scale
+        typical size of each state
+    out
+        result, shape (len(samples), STATES)
+    statistics
+        result, shape (3,): steps taken, steps rejected, switchings
 
     Returns
     -------

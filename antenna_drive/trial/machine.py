@@ -165,9 +165,12 @@ def reference_machine(circuit: str = 'old', filter_1: str = 'old',
 
     Parameters
     ----------
-    circuit : torque-share constants of Table 1, 'old' or 'new'
-    filter_1 : Filter 1 of Table 1, 'old' or 'new'
-    bias_pot : k_p, unit 1
+    circuit
+        torque-share constants of Table 1, 'old' or 'new'
+    filter_1
+        Filter 1 of Table 1, 'old' or 'new'
+    bias_pot
+        k_p, unit 1
 
     """
     machine = Machine(np.zeros(2, MOTOR), np.zeros(1, STRUCTURE), np.zeros(1, CIRCUIT),
@@ -253,8 +256,10 @@ def draw_tolerances(tolerance: float, random: np.random.Generator) -> Tolerances
 
     Parameters
     ----------
-    tolerance : largest relative deviation, unit 1
-    random : source of randomness
+    tolerance
+        largest relative deviation, unit 1
+    random
+        source of randomness
 
     """
     def factors(*shape: int) -> NDArray[np.float64]:

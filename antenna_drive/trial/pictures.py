@@ -32,8 +32,10 @@ def draw_scorecard(figures: dict[str, Any], path: Path) -> None:
 
     Parameters
     ----------
-    figures : as `scorecard.score` gives them
-    path : of the picture
+    figures
+        as `scorecard.score` gives them
+    path
+        of the picture
 
     """
     table = figures['confusion']

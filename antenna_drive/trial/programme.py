@@ -39,9 +39,12 @@ def draw_sheets(tolerance: float, duration: float,
 
     Parameters
     ----------
-    tolerance : how far the machine may be from the reference, unit 1
-    duration : length of each recording [s]
-    random : source of randomness
+    tolerance
+        how far the machine may be from the reference, unit 1
+    duration
+        length of each recording [s]
+    random
+        source of randomness
 
     """
     fitted = 'new' if random.uniform() < 0.7 else 'old'

@@ -81,9 +81,12 @@ def start_state(machine: Machine, sheet: TestSheet, place: tuple[float, float]) 
 
     Parameters
     ----------
-    machine : the antenna
-    sheet : says whether the share circuit has settled (bias: start)
-    place : where each motor stands inside its gap, -1 to 1
+    machine
+        the antenna
+    sheet
+        says whether the share circuit has settled (bias: start)
+    place
+        where each motor stands inside its gap, -1 to 1
 
     """
     y = np.zeros(equations.STATES)
@@ -123,11 +126,16 @@ def simulate(machine: Machine, sheet: TestSheet, times: FloatArray,
 
     Parameters
     ----------
-    machine : the antenna with its imperfections
-    sheet : the test
-    times : when the signals are wanted, ascending, not before 0, shape (n,) [s]
-    place : where each motor stands inside its gap at the start, -1 to 1
-    tolerance : largest error of one integration step, unit 1
+    machine
+        the antenna with its imperfections
+    sheet
+        the test
+    times
+        when the signals are wanted, ascending, not before 0, shape (n,) [s]
+    place
+        where each motor stands inside its gap at the start, -1 to 1
+    tolerance
+        largest error of one integration step, unit 1
 
     Raises
     ------

@@ -98,7 +98,8 @@ def read_cases(folder: Path) -> tuple[list[Case], int]:
 
     Parameters
     ----------
-    folder : of the trial
+    folder
+        of the trial
 
     Returns
     -------
@@ -231,8 +232,10 @@ def score(cases: Sequence[Case], pending: int = 0) -> dict[str, Any]:
 
     Parameters
     ----------
-    cases : with their verdicts
-    pending : number of cases that were not diagnosed yet
+    cases
+        with their verdicts
+    pending
+        number of cases that were not diagnosed yet
 
     Returns
     -------

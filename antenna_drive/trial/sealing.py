@@ -70,9 +70,12 @@ def seal(folder: Path, settings: dict[str, Any], truths: Iterable[Truth]) -> dic
 
     Parameters
     ----------
-    folder : of the trial; made if it is not there
-    settings : what the trial was drawn with; goes into the manifest
-    truths : of all cases
+    folder
+        of the trial; made if it is not there
+    settings
+        what the trial was drawn with; goes into the manifest
+    truths
+        of all cases
 
     Returns
     -------

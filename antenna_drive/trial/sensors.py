@@ -39,9 +39,12 @@ def sample_instants(rate: float, duration: float,
 
     Parameters
     ----------
-    rate : mean sample rate [Hz]
-    duration : length of the recording [s]
-    random : source of randomness
+    rate
+        mean sample rate [Hz]
+    duration
+        length of the recording [s]
+    random
+        source of randomness
 
     Returns
     -------
@@ -82,11 +85,16 @@ def record(history: History, machine: Machine, grade: SensorGrade, stamps: Float
 
     Parameters
     ----------
-    history : true signals at the true instants
-    machine : holds the errors of the sensors
-    grade : noise and resolution
-    stamps : time stamps, shape (n,) [s]
-    random : source of noise and offsets
+    history
+        true signals at the true instants
+    machine
+        holds the errors of the sensors
+    grade
+        noise and resolution
+    stamps
+        time stamps, shape (n,) [s]
+    random
+        source of noise and offsets
 
     Returns
     -------

@@ -50,9 +50,12 @@ def command(test: Any, t: float, middle: float) -> float:
 
     Parameters
     ----------
-    test : a TEST record
-    t : time [s]
-    middle : time within the same stretch between two corners, which selects the branch [s]
+    test
+        a TEST record
+    t
+        time [s]
+    middle
+        time within the same stretch between two corners, which selects the branch [s]
 
     """
     if test.shape == SQUARE:
@@ -87,8 +90,10 @@ def corners(test: Any, end: float) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    test : a TEST record
-    end : end of the test [s]
+    test
+        a TEST record
+    end
+        end of the test [s]
 
     """
     times: list[float] = []
