@@ -1,0 +1,325 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Bounded, robust least squares with derivatives that are used again and again.
+
+A run of the machine is dear and a derivative is many runs. A fit therefore starts from the
+derivatives of a fit nearby and corrects them by Broyden's rule as it goes; fresh ones, central
+differences all of them, are taken where a fit has settled. Offsets within the tolerance are
+fitted together with whatever else is sought, with hard bounds and a mild pull to their middle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from antenna_drive.gap.model import FloatArray, Model, Parameter
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+# Residuals beyond so many standard deviations count linearly (Huber); the scale is the larger of
+# the sensors' and that of the residuals themselves.
+HUBER = 3.0
+
+
+@dataclass(frozen=True)
+class State:
+    """
+    Where a fit is.
+
+    Attributes
+    ----------
+    parameters : what is fitted, m of them
+    x : their values, shape (m,)
+    residual : measured less predicted, in standard deviations, shape (n,); zero where nothing was
+        measured
+    jacobian : derivative of the prediction [standard deviations per unit], shape (n, m)
+    weight : Huber weight of each residual, shape (n,)
+    cost : half the weighted sum of squares, with the pull of the offsets
+
+    """
+
+    parameters: tuple[Parameter, ...]
+    x: FloatArray
+    residual: FloatArray
+    jacobian: FloatArray
+    weight: FloatArray
+    cost: float
+
+    def point(self) -> dict[str, float]:
+        """Return the values by name."""
+        return dict(zip((p.name for p in self.parameters), self.x.tolist(), strict=True))
+
+    def value(self, name: str) -> float:
+        """Return one value by name."""
+        return self.point()[name]
+
+
+class Problem:
+    """
+    The residuals of a model against its experiments.
+
+    Parameters
+    ----------
+    model : the machine
+    used : for each experiment which samples are fitted, shape (n,) of bool; None for all
+
+    """
+
+    def __init__(self, model: Model, used: Sequence[NDArray[np.bool_]] | None = None) -> None:
+        """Lay the measured samples out in one row."""
+        self.model = model
+        self.experiments = list(model.experiments)
+        self.sizes = [e.measured.size for e in self.experiments]
+        self.ends = np.cumsum(self.sizes)
+        self.valid = np.concatenate([
+            (np.isfinite(e.measured)
+             & (np.ones(e.time.size, bool) if used is None else used[k])[:, np.newaxis]).ravel()
+            for k, e in enumerate(self.experiments)])
+        self.samples = int(self.valid.sum())
+
+    def rows(self, experiment: int) -> slice:
+        """Return where an experiment's residuals lie."""
+        end = int(self.ends[experiment])
+        return slice(end - self.sizes[experiment], end)
+
+    def _scaled(self, k: int, predicted: FloatArray | None) -> FloatArray:
+        experiment = self.experiments[k]
+        assert predicted is not None
+        z = ((experiment.measured - predicted) / experiment.noise).ravel()
+        z[~self.valid[self.rows(k)]] = 0.0
+        # a prediction that has run away is a bad one, not a broken one
+        return np.asarray(np.clip(np.nan_to_num(z, nan=1e4, posinf=1e4, neginf=-1e4), -1e4, 1e4))
+
+    def residuals(self, points: Sequence[dict[str, float]]) -> list[FloatArray]:
+        """Return the residuals of several variants, shape (n,) each."""
+        return [np.concatenate([self._scaled(k, values) for k, values in enumerate(result)])
+                for result in self.model.simulate(points)]
+
+    def columns(self, point: dict[str, float], parameters: Sequence[Parameter],
+                residual: FloatArray, central: bool) -> FloatArray:
+        """
+        Return derivatives of the prediction by difference quotients.
+
+        Parameters
+        ----------
+        point : where
+        parameters : by what
+        residual : at the point, for one-sided differences
+        central : take two sides where the bounds leave room for them
+
+        """
+        variants, only, plan = [], [], []
+        for j, item in enumerate(parameters):
+            here = point.get(item.name, 0.0)
+            up = here + item.step <= item.high
+            down = here - item.step >= item.low
+            sides = [s for s, there in ((1.0, up), (-1.0, down)) if there]
+            if not central and len(sides) == 2:
+                sides = sides[:1]
+            for side in sides:
+                variants.append({**point, item.name: here + side * item.step})
+                only.append(item.experiment)
+                plan.append((j, side, len(sides)))
+        jacobian = np.zeros((residual.size, len(parameters)))
+        chunk = 16
+        for first in range(0, len(variants), chunk):
+            part = slice(first, first + chunk)
+            results = self.model.simulate(variants[part], only[part])
+            for (j, side, count), result in zip(plan[part], results, strict=True):
+                for k, values in enumerate(result):
+                    if values is None:
+                        continue
+                    rows = self.rows(k)
+                    change = residual[rows] - self._scaled(k, values)
+                    jacobian[rows, j] += side * change / (parameters[j].step * count)
+        return jacobian
+
+    def start(self, parameters: Sequence[Parameter], point: dict[str, float],
+              jacobian: FloatArray | None = None, central: bool = False) -> State:
+        """Begin a fit at a point; derivatives are taken unless they are given."""
+        x = np.array([np.clip(point.get(p.name, 0.0), p.low, p.high) for p in parameters])
+        at = dict(zip((p.name for p in parameters), x.tolist(), strict=True))
+        residual = self.residuals([at])[0]
+        if jacobian is None:
+            jacobian = self.columns(at, parameters, residual, central)
+        weight = huber_weight(residual, self.valid)
+        state = State(tuple(parameters), x, residual, jacobian, weight, 0.0)
+        return _with_cost(state)
+
+    def refreshed(self, state: State, central: bool = True) -> State:
+        """Return the state with fresh derivatives and weights."""
+        jacobian = self.columns(state.point(), state.parameters, state.residual, central)
+        weight = huber_weight(state.residual, self.valid)
+        return _with_cost(State(state.parameters, state.x, state.residual, jacobian, weight, 0.0))
+
+    def widened(self, state: State, parameters: Sequence[Parameter], values: Sequence[float],
+                columns: FloatArray) -> State:
+        """Return the state with more parameters, at these values, with these derivatives."""
+        x = np.r_[state.x, values]
+        jacobian = np.column_stack([state.jacobian, columns])
+        everything = (*state.parameters, *parameters)
+        point = dict(zip((p.name for p in everything), x.tolist(), strict=True))
+        residual = self.residuals([point])[0]
+        return _with_cost(State(everything, x, residual, jacobian, state.weight, 0.0))
+
+    def fit(self, state: State, turns: int = 10, gain: float = 1.0) -> State:
+        """
+        Go downhill until a turn gains less than `gain` in cost, or for so many turns.
+
+        Every run, a failed one too, corrects the derivatives along its own direction.
+        """
+        jacobian = state.jacobian.copy()
+        low = np.array([p.low for p in state.parameters])
+        high = np.array([p.high for p in state.parameters])
+        pull = _pull(state.parameters)
+        hessian = jacobian.T @ (state.weight[:, np.newaxis] * jacobian)
+        x, residual, cost = state.x, state.residual, state.cost
+        damping = 1e-3
+        idle = 0
+        for _ in range(turns):
+            gradient = jacobian.T @ (state.weight * residual) - pull * x
+            curvature = hessian + np.diag(pull)
+            diagonal = np.diag(curvature).copy()
+            step = bounded_step(curvature + damping * np.diag(diagonal + 1e-12), gradient,
+                                low - x, high - x)
+            expected = float(gradient @ step - 0.5 * step @ curvature @ step)
+            if not np.any(step) or expected < 0.3 * gain:
+                break
+            trial = np.clip(x + step, low, high)
+            point = dict(zip((p.name for p in state.parameters), trial.tolist(), strict=True))
+            after = self.residuals([point])[0]
+            trial_cost = _cost(after, state.weight, trial, pull)
+            gained = cost - trial_cost
+            # Broyden's rule, in the metric in which all parameters are alike
+            metric = step * diagonal
+            length = float(step @ metric)
+            if length > 0.0:
+                error = (residual - after) - jacobian @ step
+                direction = metric / length
+                cross = jacobian.T @ (state.weight * error)
+                square = float(error @ (state.weight * error))
+                hessian += (np.outer(cross, direction) + np.outer(direction, cross)
+                            + square * np.outer(direction, direction))
+                jacobian += np.outer(error, direction)
+            if gained > 0.0:
+                x, residual, cost = trial, after, trial_cost
+                damping = max(damping / (5.0 if gained > 0.5 * expected else 1.0), 1e-6)
+                idle = idle + 1 if gained < gain else 0
+                if idle > 1:
+                    break
+            else:
+                damping = min(max(damping, 1e-3) * 6.0, 1e4)
+        return State(state.parameters, x, residual, jacobian, state.weight, cost)
+
+
+def scanned(problem: Problem, point: dict[str, float], names: Sequence[str], experiment: int,
+            grid: Sequence[Sequence[float]], until: float) -> dict[str, float]:
+    """
+    Return the point with those values of a grid that fit the start of one experiment best.
+
+    Where a body starts inside a gap is no matter of going downhill: it is tried out.
+
+    Parameters
+    ----------
+    problem : what is fitted
+    point : the values of everything else
+    names : the parameters that are tried
+    experiment : the one that they act on
+    grid : values of all of `names`, one row for each trial
+    until : how much of the experiment is looked at [s]
+
+    """
+    trials = [point, *({**point, **dict(zip(names, values, strict=True))} for values in grid)]
+    here = problem.experiments[experiment]
+    early = here.time < until
+    best, best_cost = point, np.inf
+    for first in range(0, len(trials), 32):
+        part = trials[first:first + 32]
+        results = problem.model.simulate(part, [experiment] * len(part), until)
+        for trial, result in zip(part, results, strict=True):
+            predicted = result[experiment]
+            assert predicted is not None
+            z = np.abs((here.measured[early] - predicted[early]) / here.noise[early])
+            z = z[np.isfinite(z)]
+            cost = float(np.sum(np.where(z < HUBER, 0.5 * z ** 2, HUBER * z - 0.5 * HUBER ** 2)))
+            if cost < best_cost:
+                best, best_cost = trial, cost
+    return best
+
+
+def huber_weight(residual: FloatArray, valid: NDArray[np.bool_]) -> FloatArray:
+    """Return Huber's weights, with the residuals' own scale where that is above the sensors'."""
+    size = np.abs(residual)
+    scale = max(1.0, float(np.median(size[valid])) / 0.6745) if valid.any() else 1.0
+    return np.asarray(np.where(valid, np.minimum(1.0, HUBER * scale / np.maximum(size, 1e-9)), 0.0))
+
+
+def _pull(parameters: Sequence[Parameter]) -> FloatArray:
+    return np.array([1.0 / p.spread ** 2 if p.spread > 0.0 else 0.0 for p in parameters])
+
+
+def _cost(residual: FloatArray, weight: FloatArray, x: FloatArray, pull: FloatArray) -> float:
+    return float(0.5 * residual @ (weight * residual) + 0.5 * x @ (pull * x))
+
+
+def _with_cost(state: State) -> State:
+    cost = _cost(state.residual, state.weight, state.x, _pull(state.parameters))
+    return State(state.parameters, state.x, state.residual, state.jacobian, state.weight, cost)
+
+
+def bounded_step(curvature: FloatArray, gradient: FloatArray, low: FloatArray,
+                 high: FloatArray) -> FloatArray:
+    """
+    Return the step d within bounds that maximises gradient d - d curvature d / 2.
+
+    Parameters
+    ----------
+    curvature : symmetric and positive definite, shape (m, m)
+    gradient : shape (m,)
+    low, high : bounds of the step, low <= 0 <= high, shape (m,)
+
+    """
+    m = gradient.size
+    step = np.zeros(m)
+    free = np.ones(m, bool)
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(curvature), 1e-300))
+    scaled = curvature * np.outer(scale, scale)
+    for _ in range(4 * m):
+        rest = gradient - curvature @ np.where(free, 0.0, step)
+        index = np.flatnonzero(free)
+        if index.size:
+            part = scaled[np.ix_(index, index)]
+            try:
+                factor = linalg.cho_factor(part + 1e-12 * np.eye(index.size))
+                step[index] = scale[index] * linalg.cho_solve(factor, (scale * rest)[index])
+            except linalg.LinAlgError:
+                step[index] = scale[index] * np.linalg.lstsq(part, (scale * rest)[index],
+                                                            rcond=1e-10)[0]
+        out = free & ((step < low) | (step > high))
+        if out.any():
+            step = np.clip(step, low, high)
+            free &= ~out
+            continue
+        slope = gradient - curvature @ step
+        wrong = ~free & (((step <= low) & (slope > 0.0)) | ((step >= high) & (slope < 0.0)))
+        wrong &= high > low
+        if not wrong.any():
+            break
+        # one at a time, the steepest: letting all go at once may cycle
+        worst = np.argmax(np.where(wrong, np.abs(slope) * scale, -1.0))
+        free[worst] = True
+    return np.asarray(np.clip(step, low, high))
