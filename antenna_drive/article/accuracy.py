@@ -14,9 +14,9 @@
 """
 How far the lock-step is from the converged reference, on the article's experiments.
 
-The reference is the same drive at a macro-step of `FINE_STEP`. Measured is the rms distance of every
-signal of T1 to T4, as a share of that signal's rms. `stability` measures the other thing that
-the exchange between units may change: the gain at which the torque bias becomes unstable.
+The reference is the same drive at a macro-step of `FINE_STEP`. Measured is the rms distance of
+every signal of T1 to T4, as a share of that signal's rms. `stability` measures the other thing
+that the exchange between units may change: the gain at which the torque bias becomes unstable.
 """
 
 from __future__ import annotations
