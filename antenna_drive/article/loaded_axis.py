@@ -28,6 +28,7 @@ from antenna_drive.emulator.run import MACRO_STEP, simulate
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.parameters import Drive
 import numpy as np
+from numpy.typing import NDArray
 
 # The torque bias of the three curves in each figure, as a share of the greatest motor torque.
 SHARES = (0.1, 0.2, 0.3)
@@ -56,7 +57,7 @@ class LoadedAxis:
 
     load: FloatArray
     torques: FloatArray
-    rising: FloatArray
+    rising: NDArray[np.bool_]
 
     @property
     def bias(self) -> FloatArray:

@@ -45,6 +45,8 @@ _DETERMINED = 0.05
 # Correlations that are worth telling.
 _CORRELATED = 0.8
 _TRADE_OFF_POINTS = 12
+# Others that cost this many times the least are left out of a trade-off.
+_HOPELESS = 30.0
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,8 @@ class _Local:
 
 
 def report(problem: Problem, found: Found, trade_offs: Sequence[str] = (),
-           progress: Callable[[float], None] | None = None) -> dict[str, Any]:
+           progress: Callable[[float], None] | None = None,
+           also: Sequence[Candidate] = ()) -> dict[str, Any]:
     """
     Tell what was found and how far it is determined.
 
@@ -66,6 +69,7 @@ def report(problem: Problem, found: Found, trade_offs: Sequence[str] = (),
     found : what the search found
     trade_offs : figures of targets whose price in the other targets is to be shown
     progress : told the share that is done
+    also : candidates of other searches with the same figures, for the trade-offs
 
     Returns
     -------
@@ -119,7 +123,8 @@ def report(problem: Problem, found: Found, trade_offs: Sequence[str] = (),
         'flat_directions': [
             {names[i]: float(direction[i]) for i in np.argsort(-np.abs(direction))[:4]}
             for direction in flat],
-        'trade_offs': {figure: _trade_off(problem, found, figure) for figure in trade_offs},
+        'trade_offs': {figure: _trade_off(problem, (*found.candidates, *also), figure)
+                       for figure in trade_offs},
     }
 
 
@@ -200,25 +205,31 @@ def _profile(item: Any, i: int, best: Candidate, local: _Local,
     return sorted(points)
 
 
-def _trade_off(problem: Problem, found: Found, figure: str) -> list[dict[str, Any]]:
+def _trade_off(problem: Problem, candidates: Sequence[Candidate], figure: str,
+               ) -> list[dict[str, Any]]:
     """
     Return what the other targets cost at best, for each level of one figure.
 
-    Taken from all candidates of the search: the more of them, the closer to the true curve.
+    Taken from everything that was tried: the more, the closer to the true curve.
     """
-    target = next(item for item in problem.targets if item.figure == figure)
-    complete = [item for item in found.candidates if item.evaluation.complete]
-    levels = np.array([item.evaluation.figures[figure] for item in complete])
-    others = np.array([item.evaluation.cost - target.cost(level)
-                       for item, level in zip(complete, levels)])
-    usable = np.isfinite(levels)
-    least, most = np.quantile(levels[usable], (0.0, 0.95))
-    edges = np.linspace(least, most, _TRADE_OFF_POINTS + 1)
+    others = [target for target in problem.targets if target.figure != figure]
+    wanted = {target.figure for target in problem.targets}
+    tried = [item.evaluation.figures for item in candidates
+             if wanted <= item.evaluation.figures.keys()
+             and math.isfinite(item.evaluation.figures[figure])]
+    costs = np.array([sum(target.cost(figures[target.figure]) for target in others)
+                      for figures in tried])
+    # levels at which the others are hopeless say nothing, and would stretch the curve
+    usable = np.flatnonzero(costs <= _HOPELESS * max(1.0, costs.min()))
+    levels = np.array([tried[k][figure] for k in usable])
+    edges = np.linspace(levels.min(), levels.max(), _TRADE_OFF_POINTS + 1)
     curve = []
     for low, high in zip(edges, edges[1:]):
-        inside = np.flatnonzero(usable & (levels >= low) & (levels <= high))
+        inside = usable[(levels >= low) & (levels <= high)]
         if inside.size:
-            k = inside[np.argmin(others[inside])]
-            curve.append({'level': levels[k], 'cost_of_the_others': others[k],
-                          'figures': dict(complete[k].evaluation.figures)})
+            k = inside[np.argmin(costs[inside])]
+            missed = [target.figure for target in others
+                      if abs(target.residual(tried[k][target.figure])) > 1.0]
+            curve.append({'level': tried[k][figure], 'cost_of_the_others': costs[k],
+                          'missed': missed, 'figures': dict(tried[k])})
     return curve

@@ -83,11 +83,7 @@ class _Log:
                 raise UserError(f'{self._path}: belongs to another search (targets, start or seed '
                                 'differ), give --log another file or remove it')
             whole = [line for line in lines[1:] if line.endswith('\n')]
-            for line in whole:
-                entry = json.loads(line)
-                self.read.append(Candidate(
-                    tuple(entry['shares']),
-                    Evaluation(entry['cost'], entry['figures'], entry['complete'])))
+            self.read += [_candidate(line) for line in whole]
         except (ValueError, KeyError, TypeError) as error:
             raise UserError(f'{self._path}: is not the log of a search: {error}') from error
         if len(whole) < len(lines) - 1:
@@ -96,6 +92,32 @@ class _Log:
 
     def open(self) -> TextIO:  # noqa: A003
         return self._path.open('a', encoding='utf-8')
+
+
+def _candidate(line: str) -> Candidate:
+    entry = json.loads(line)
+    return Candidate(tuple(entry['shares']),
+                     Evaluation(entry['cost'], entry['figures'], entry['complete']))
+
+
+def read_log(path: Path) -> list[Candidate]:
+    """
+    Return the candidates of any search's log.
+
+    Raises
+    ------
+    UserError : the file cannot be read, or is not such a log
+
+    """
+    try:
+        lines = path.read_text(encoding='utf-8').splitlines(keepends=True)
+        if 'problem' not in json.loads(lines[0]):
+            raise KeyError('problem')
+        return [_candidate(line) for line in lines[1:] if line.endswith('\n')]
+    except OSError as error:
+        raise UserError(f'{path}: cannot be read, {error.strerror}') from error
+    except (ValueError, KeyError, TypeError, IndexError) as error:
+        raise UserError(f'{path}: is not the log of a search: {error}') from error
 
 
 def _digest(problem: Problem) -> str:

@@ -34,7 +34,7 @@ from antenna_drive import cli
 from antenna_drive.calibration.configuration import write_configuration
 from antenna_drive.calibration.problem import read_problem
 from antenna_drive.calibration.report import report
-from antenna_drive.calibration.search import search
+from antenna_drive.calibration.search import read_log, search
 from antenna_drive.cli.output import add_json_option, Progress, STANDARD_OUTPUT, write_json
 from antenna_drive.parameters.files import config_dir
 
@@ -57,18 +57,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='candidates to try (default: %(default)s)')
     parser.add_argument('--trade-off', metavar='FIGURE', nargs='+', default=[],
                         help='also show what each of these figures costs the others')
+    parser.add_argument('--also', metavar='LOG', nargs='+', type=Path, default=[],
+                        help='logs of earlier searches whose candidates count in trade-offs')
     add_json_option(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Do what the arguments say; return the exit code."""
+    also = [candidate for path in arguments.also for candidate in read_log(path)]
     problem = read_problem(_find(arguments.targets), [arguments.start])
     with Progress('candidates', max(1, arguments.count)) as shown:
         found = search(problem, arguments.count, seed=arguments.seed, log=arguments.log,
                        progress=lambda done, best: shown.update(done))
     write_configuration(problem, found.best.shares, arguments.start, arguments.out)
     with Progress('what is determined', 1.0) as shown:
-        told = report(problem, found, arguments.trade_off, shown.update)
+        told = report(problem, found, arguments.trade_off, shown.update, also)
     if arguments.json is not None:
         write_json(told, arguments.json)
     if arguments.json != STANDARD_OUTPUT:
@@ -101,7 +104,8 @@ def _write(told: dict[str, Any]) -> None:
               for item in told['correlations']] or ['  none']
     for figure, curve in told['trade_offs'].items():
         lines += ['', f'what the other targets cost at best, by {figure}:']
-        lines += [f'  {point["level"]:>10.4g}  {point["cost_of_the_others"]:.4g}'
+        lines += [f'  {point["level"]:>10.4g}  {point["cost_of_the_others"]:<10.4g}'
+                  f'{"misses " + ", ".join(point["missed"]) if point["missed"] else ""}'
                   for point in curve]
     sys.stdout.write('\n'.join(lines) + '\n')
 

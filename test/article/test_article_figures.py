@@ -23,6 +23,7 @@ from xml.etree import ElementTree
 from antenna_drive.article import figures, loaded_axis
 from antenna_drive.article.measures import Results, with_circuits
 from antenna_drive.article.profile_measures import loaded_axis as loop_of_load
+import numpy as np
 import pytest
 
 NUMBERS = (1, 2, 3, *range(8, 14), *range(15, 24))
@@ -78,6 +79,6 @@ def test_axes_are_the_articles(number: int, results: Results, short_load: None) 
 
 def test_the_drawn_backlash_is_equation_1(results: Results) -> None:
     line, = figures.backlash(results).axes[0].lines
-    twist, torque = line.get_data()
+    twist, torque = map(np.asarray, line.get_data())
     expected = [0.0 if abs(x) <= 1.0 else 20.0 * (x - 1.0 if x > 0.0 else x + 1.0) for x in twist]
     assert torque == pytest.approx(expected)

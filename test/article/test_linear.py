@@ -18,7 +18,9 @@ from __future__ import annotations
 import cmath
 import math
 
-from antenna_drive.article.linear import bias_loop, growth, rate_loop, stability_limit, step_response
+from antenna_drive.article.linear import (
+    bias_loop, growth, rate_loop, stability_limit, step_response,
+)
 from antenna_drive.article.stability import growth_rate
 from antenna_drive.parameters import load
 import numpy as np

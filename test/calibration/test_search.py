@@ -127,8 +127,8 @@ def test_the_report_tells_what_is_determined(monkeypatch: pytest.MonkeyPatch) ->
     for item in (a, b):
         assert 0.5 * np.ptp(item['marginal']) == pytest.approx(expected, rel=1e-3)
         assert item['determined']
-        assert 0.5 * np.ptp(item['conditional']) == pytest.approx(1 / math.hypot(100.0, 20.0),
-                                                                 rel=1e-3)
+        alone = 1.0 / math.hypot(100.0, 20.0)
+        assert 0.5 * np.ptp(item['conditional']) == pytest.approx(alone, rel=1e-3)
     assert not c['determined']
     pair, = told['correlations']
     wanted = (1 / 100.0 ** 2 - 1 / 20.0 ** 2) / (1 / 100.0 ** 2 + 1 / 20.0 ** 2)
@@ -142,6 +142,14 @@ def test_the_report_tells_what_is_determined(monkeypatch: pytest.MonkeyPatch) ->
     # what the difference costs at best, by the level of the sum, is least near its aim
     curve = told['trade_offs']['sum']
     assert all(point['cost_of_the_others'] >= 0.0 for point in curve)
+    cheapest = min(curve, key=lambda point: point['cost_of_the_others'])
+    assert cheapest['missed'] == []
+    # a better candidate of another search is seen
+    other = Candidate((0.5, 0.5, 0.5), Evaluation(0.0, {
+        'sum': cheapest['level'] + 1e-6, 'difference': float(SLOPES[1] @ BEST)}, True))
+    curve = report(problem, found, ['sum'],  # type: ignore[arg-type]
+                   also=[other])['trade_offs']['sum']
+    assert min(point['cost_of_the_others'] for point in curve) == 0.0
     with pytest.raises(ParameterError, match='no such target, did you mean sum'):
         report(problem, found, ['sums'])  # type: ignore[arg-type]
 
