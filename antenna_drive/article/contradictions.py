@@ -283,7 +283,7 @@ def place_of_friction(results: Results) -> Contradiction:
         'bias of 22 percent, 0.56 A per motor, settles after an overshoot of 80 percent',
         {'overshoot_percent': 80.0}, tuple(found),
         'friction of 1 A at the motor cannot be overcome by 0.56 A: the rotors stand still, the '
-        'gears feel little of the bias and nothing overshoots. Most of it is on the axis')
+        'gears feel nothing of the bias and nothing overshoots. Most of it is on the axis')
 
 
 def saw_tooth(results: Results) -> Contradiction:

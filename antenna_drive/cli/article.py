@@ -46,7 +46,7 @@ from antenna_drive.parameters import Drive
 import numpy as np
 
 # The parameter set that the article is compared with unless another is asked for.
-CONFIGURATION = 'reference'
+CONFIGURATION = 'dss26'
 # The experiments whose rows are shown; all of them if there are none.
 EXPERIMENTS: tuple[str, ...] = ()
 # The experiments that --through-nodes runs in five processes.
