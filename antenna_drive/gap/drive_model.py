@@ -28,6 +28,7 @@ from antenna_drive.gap import catalogue
 from antenna_drive.gap.catalogue import ADD, DriveParameter, SCALE, SET, Setting, Wave
 from antenna_drive.gap.excitation import Bias, Command, RecordedCommand, schedule, SheetCommand
 from antenna_drive.gap.model import Effect, Experiment, FloatArray, Form, Point
+from antenna_drive.gap.residuals import Motion
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed, Drive
@@ -104,7 +105,7 @@ class Sensors:
         noise[:, :2] = math.hypot(self.current_noise, self.current_step / math.sqrt(12.0))
         noise[:, 2:4] = np.sqrt(self.tach_noise ** 2 + self.tach_step ** 2 / 12.0
                                 + (self.tach_relative * clean[:, 2:4]) ** 2)
-        noise[:, 4] = self.encoder_step / math.sqrt(12.0)
+        noise[:, 4] = 0.5 * self.encoder_step  # what is left within a step is no white noise
         noise[:, 5] = math.hypot(self.bias_noise, self.bias_step / math.sqrt(12.0))
         return np.asarray(np.sqrt(noise ** 2 + (slope * jitter) ** 2))
 
@@ -292,6 +293,21 @@ class DriveModel:
             experiments.append(Experiment(test.name, test.time, tuple(CHANNELS.values()), UNITS,
                                           measured, noise))
         return tuple(experiments)
+
+    def motion(self, k: int) -> Motion:
+        """Return how the machine moved in an experiment: as measured, else as simulated."""
+        experiment = self.experiments[k]
+        predicted = self.simulate([{}], [k])[0][k]
+        assert predicted is not None
+
+        def signal(c: int) -> FloatArray:
+            measured = experiment.measured[:, c]
+            return np.where(np.isfinite(measured), measured, predicted[:, c])
+
+        test = self._tests[k]
+        return Motion(rate=0.5 * (signal(TACH_1) + signal(TACH_2)),
+                      load=signal(CURRENT_1) + signal(CURRENT_2), angle=signal(ENCODER),
+                      limit=float(test.record['motor_1']['motor']['current_limit'][0]))
 
     # -- running -------------------------------------------------------------------------------
 

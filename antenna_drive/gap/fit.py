@@ -48,6 +48,7 @@ class State:
         measured
     jacobian : derivative of the prediction [standard deviations per unit], shape (n, m)
     weight : Huber weight of each residual, shape (n,)
+    hessian : jacobian, weight, jacobian, shape (m, m)
     cost : half the weighted sum of squares, with the pull of the offsets
 
     """
@@ -57,6 +58,7 @@ class State:
     residual: FloatArray
     jacobian: FloatArray
     weight: FloatArray
+    hessian: FloatArray
     cost: float
 
     def point(self) -> dict[str, float]:
@@ -157,24 +159,36 @@ class Problem:
         if jacobian is None:
             jacobian = self.columns(at, parameters, residual, central)
         weight = huber_weight(residual, self.valid)
-        state = State(tuple(parameters), x, residual, jacobian, weight, 0.0)
-        return _with_cost(state)
+        return _state(tuple(parameters), x, residual, jacobian, weight)
 
     def refreshed(self, state: State, central: bool = True) -> State:
         """Return the state with fresh derivatives and weights."""
         jacobian = self.columns(state.point(), state.parameters, state.residual, central)
         weight = huber_weight(state.residual, self.valid)
-        return _with_cost(State(state.parameters, state.x, state.residual, jacobian, weight, 0.0))
+        return _state(state.parameters, state.x, state.residual, jacobian, weight)
 
     def widened(self, state: State, parameters: Sequence[Parameter], values: Sequence[float],
                 columns: FloatArray) -> State:
         """Return the state with more parameters, at these values, with these derivatives."""
         x = np.r_[state.x, values]
-        jacobian = np.column_stack([state.jacobian, columns])
         everything = (*state.parameters, *parameters)
         point = dict(zip((p.name for p in everything), x.tolist(), strict=True))
         residual = self.residuals([point])[0]
-        return _with_cost(State(everything, x, residual, jacobian, state.weight, 0.0))
+        weighted = state.weight[:, np.newaxis] * columns
+        cross = state.jacobian.T @ weighted
+        hessian = np.block([[state.hessian, cross], [cross.T, columns.T @ weighted]])
+        return _state(everything, x, residual, np.column_stack([state.jacobian, columns]),
+                      state.weight, hessian)
+
+    def replaced(self, state: State, where: Sequence[int], columns: FloatArray) -> State:
+        """Return the state with other derivatives by some of its parameters."""
+        jacobian = state.jacobian.copy()
+        jacobian[:, where] = columns
+        weighted = state.weight[:, np.newaxis] * columns
+        hessian = state.hessian.copy()
+        hessian[:, where] = jacobian.T @ weighted
+        hessian[where, :] = hessian[:, where].T
+        return _state(state.parameters, state.x, state.residual, jacobian, state.weight, hessian)
 
     def fit(self, state: State, turns: int = 10, gain: float = 1.0) -> State:
         """
@@ -182,16 +196,21 @@ class Problem:
 
         Every run, a failed one too, corrects the derivatives along its own direction.
         """
-        jacobian = state.jacobian.copy()
         low = np.array([p.low for p in state.parameters])
         high = np.array([p.high for p in state.parameters])
         pull = _pull(state.parameters)
-        hessian = jacobian.T @ (state.weight[:, np.newaxis] * jacobian)
+        weight, hessian = state.weight, state.hessian.copy()
         x, residual, cost = state.x, state.residual, state.cost
+        # The derivatives are those given plus a few outer products of these.
+        errors: list[FloatArray] = []
+        directions: list[FloatArray] = []
+        across = state.jacobian.T @ (weight * residual)
         damping = 1e-3
         idle = 0
         for _ in range(turns):
-            gradient = jacobian.T @ (state.weight * residual) - pull * x
+            gradient = across - pull * x
+            for error, direction in zip(errors, directions, strict=True):
+                gradient += direction * float(error @ (weight * residual))
             curvature = hessian + np.diag(pull)
             diagonal = np.diag(curvature).copy()
             step = bounded_step(curvature + damping * np.diag(diagonal + 1e-12), gradient,
@@ -202,28 +221,37 @@ class Problem:
             trial = np.clip(x + step, low, high)
             point = dict(zip((p.name for p in state.parameters), trial.tolist(), strict=True))
             after = self.residuals([point])[0]
-            trial_cost = _cost(after, state.weight, trial, pull)
+            trial_cost = _cost(after, weight, trial, pull)
             gained = cost - trial_cost
             # Broyden's rule, in the metric in which all parameters are alike
             metric = step * diagonal
             length = float(step @ metric)
             if length > 0.0:
-                error = (residual - after) - jacobian @ step
-                direction = metric / length
-                cross = jacobian.T @ (state.weight * error)
-                square = float(error @ (state.weight * error))
-                hessian += (np.outer(cross, direction) + np.outer(direction, cross)
-                            + square * np.outer(direction, direction))
-                jacobian += np.outer(error, direction)
+                wrong = (residual - after) - state.jacobian @ step
+                for error, direction in zip(errors, directions, strict=True):
+                    wrong -= error * float(direction @ step)
+                new = metric / length
+                weighted = weight * wrong
+                cross = state.jacobian.T @ weighted
+                for error, direction in zip(errors, directions, strict=True):
+                    cross += direction * float(error @ weighted)
+                hessian += (np.outer(cross, new) + np.outer(new, cross)
+                            + float(wrong @ weighted) * np.outer(new, new))
+                errors.append(wrong)
+                directions.append(new)
             if gained > 0.0:
                 x, residual, cost = trial, after, trial_cost
+                across = state.jacobian.T @ (weight * residual)
                 damping = max(damping / (5.0 if gained > 0.5 * expected else 1.0), 1e-6)
                 idle = idle + 1 if gained < gain else 0
                 if idle > 1:
                     break
             else:
                 damping = min(max(damping, 1e-3) * 6.0, 1e4)
-        return State(state.parameters, x, residual, jacobian, state.weight, cost)
+        jacobian = state.jacobian
+        if errors:
+            jacobian = jacobian + np.array(errors).T @ np.array(directions)
+        return State(state.parameters, x, residual, jacobian, weight, hessian, cost)
 
 
 def scanned(problem: Problem, point: dict[str, float], names: Sequence[str], experiment: int,
@@ -276,9 +304,12 @@ def _cost(residual: FloatArray, weight: FloatArray, x: FloatArray, pull: FloatAr
     return float(0.5 * residual @ (weight * residual) + 0.5 * x @ (pull * x))
 
 
-def _with_cost(state: State) -> State:
-    cost = _cost(state.residual, state.weight, state.x, _pull(state.parameters))
-    return State(state.parameters, state.x, state.residual, state.jacobian, state.weight, cost)
+def _state(parameters: tuple[Parameter, ...], x: FloatArray, residual: FloatArray,
+           jacobian: FloatArray, weight: FloatArray, hessian: FloatArray | None = None) -> State:
+    if hessian is None:
+        hessian = jacobian.T @ (weight[:, np.newaxis] * jacobian)
+    return State(parameters, x, residual, jacobian, weight, hessian,
+                 _cost(residual, weight, x, _pull(parameters)))
 
 
 def bounded_step(curvature: FloatArray, gradient: FloatArray, low: FloatArray,

@@ -26,7 +26,7 @@ Which effect: from the offsets alone over single effects to pairs.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from antenna_drive.gap.fit import bounded_step, FloatArray, Problem, scanned, State
 from antenna_drive.gap.model import Form, Model, Parameter
@@ -37,6 +37,8 @@ BASES = 4
 PARTNERS = 5
 # A partner that could gain less than this in half a chi-square is not fitted.
 WORTH = 12.0
+# Fresh derivatives that gain less than this end a fit.
+SETTLED = 4.0
 _EARLY_S = 1.5
 _GRID = np.linspace(-0.95, 0.95, 13)
 
@@ -112,6 +114,7 @@ class Search:
         none = self._none_again(none, singles)
         self.progress(0.7, 'pairs of effects')
         pairs = self._pairs(singles)
+        singles, pairs = self._again(singles, pairs)
         self.progress(1.0, 'done')
         return [none, *singles, *pairs]
 
@@ -166,8 +169,7 @@ class Search:
         low = np.array([p.low for p in state.parameters]) - state.x
         high = np.array([p.high for p in state.parameters]) - state.x
         pull = np.array([1.0 / p.spread ** 2 if p.spread else 0.0 for p in state.parameters])
-        weighted = state.weight[:, np.newaxis] * state.jacobian
-        curvature = state.jacobian.T @ weighted + np.diag(pull)
+        curvature = state.hessian + np.diag(pull)
         gradient = state.jacobian.T @ (state.weight * state.residual) - pull * state.x
         found: dict[str, list[tuple[float, _Tangent]]] = {}
         for tangent in self.tangents:
@@ -176,8 +178,8 @@ class Search:
             live = [j for j, p in enumerate(tangent.form.parameters)
                     if not p.shape and p.name not in names]
             own = tangent.columns[:, live]
-            cross = weighted.T @ own
             weighted_own = state.weight[:, np.newaxis] * own
+            cross = state.jacobian.T @ weighted_own
             full = np.block([[curvature, cross], [cross.T, own.T @ weighted_own]])
             slope = np.r_[gradient, weighted_own.T @ state.residual]
             parts = [tangent.form.parameters[j] for j in live]
@@ -199,9 +201,10 @@ class Search:
         # where the effect is there, its shape matters and its derivatives are others
         names = [p.name for p in form.parameters]
         where = [j for j, p in enumerate(state.parameters) if p.name in names]
-        state.jacobian[:, where] = problem.columns(
-            state.point(), form.parameters, state.residual, central=True)
-        state = problem.fit(state, 8)
+        if any(p.shape for p in form.parameters):
+            state = problem.replaced(state, where, problem.columns(
+                state.point(), form.parameters, state.residual, central=True))
+            state = problem.fit(state, 8)
         return Candidate((*base.effects, tangent.effect), (*base.forms, form), state)
 
     def _singles(self, none: Candidate) -> list[Candidate]:
@@ -213,28 +216,46 @@ class Search:
             self.progress(0.4 + 0.2 * i / len(chosen), 'single effects')
             found.append(self._fitted(none, tangent, fresh=False))
         found.sort(key=lambda c: c.cost)
-        # the best get fresh derivatives of everything
         for i in range(min(2, len(found))):
-            state = self.problem.refreshed(found[i].state, central=False)
-            state = self.problem.fit(state, 8)
-            found[i] = Candidate(found[i].effects, found[i].forms, state)
-        return sorted(found, key=lambda c: c.cost)
+            found[i] = self._settled(found[i])
+        found.sort(key=lambda c: c.cost)
+        return [*found[:BASES], *(_light(c) for c in found[BASES:])]
+
+    def _settled(self, candidate: Candidate, rounds: int = 3) -> Candidate:
+        """Fit with fresh derivatives of everything until that gains nothing any more."""
+        state = candidate.state
+        for _ in range(rounds):
+            cost = state.cost
+            state = self.problem.fit(self.problem.refreshed(state, central=False), 10)
+            if cost - state.cost < SETTLED:
+                break
+        return replace(candidate, state=state)
+
+    def _without(self, candidate: Candidate, effect: str) -> Candidate:
+        """Fit a candidate without one of its effects, from the offsets that it has with it."""
+        gone = candidate.effects.index(effect)
+        effects = tuple(e for i, e in enumerate(candidate.effects) if i != gone)
+        forms = tuple(f for i, f in enumerate(candidate.forms) if i != gone)
+        names = {p.name for p in candidate.forms[gone].parameters}
+        state = candidate.state
+        own = [j for j, p in enumerate(state.parameters) if p.name not in names]
+        point = {state.parameters[j].name: float(state.x[j]) for j in own}
+        again = self.problem.start([state.parameters[j] for j in own], point,
+                                   state.jacobian[:, own])
+        return Candidate(effects, forms, self.problem.fit(again, 12))
 
     def _none_again(self, none: Candidate, singles: Sequence[Candidate]) -> Candidate:
         """Fit the offsets alone once more from those of the best effect."""
         best = none
         for single in singles[:2]:
-            state = single.state
-            own = [j for j, p in enumerate(state.parameters) if p in self.model.nuisances]
-            point = {state.parameters[j].name: float(state.x[j]) for j in own}
-            again = self.problem.start(self.model.nuisances, point, state.jacobian[:, own])
-            again = self.problem.fit(again, 12)
+            again = self._without(single, single.effects[0])
             if again.cost < best.cost:
-                best = Candidate((), (), again)
+                best = again
         return best
 
     def _pairs(self, singles: Sequence[Candidate]) -> list[Candidate]:
         found: dict[tuple[str, ...], Candidate] = {}
+        share = 0.3 / (BASES * PARTNERS)
         for base in singles[:BASES]:
             partners = [(gain, tangent) for gain, tangent in self._screen(
                 base.state, base.effects) if gain > WORTH][:PARTNERS]
@@ -242,10 +263,35 @@ class Search:
                 key = tuple(sorted((*base.effects, tangent.effect)))
                 if key in found:
                     continue
-                found[key] = self._fitted(base, tangent, fresh=True)
+                self.progress(0.7 + share * len(found), 'pairs of effects')
+                pair = self._fitted(base, tangent, fresh=True)
+                best = min((c.cost for c in found.values()), default=np.inf)
+                found[key] = pair if pair.cost < best else _light(pair)
         pairs = sorted(found.values(), key=lambda c: c.cost)
-        # the best pair with each of its members in the other's place
-        return pairs
+        return [*pairs[:1], *(_light(pair) for pair in pairs[1:])]
+
+    def _again(self, singles: Sequence[Candidate], pairs: Sequence[Candidate],
+               ) -> tuple[list[Candidate], list[Candidate]]:
+        """Settle the best pair, and fit each of its members alone from where it ends."""
+        if not pairs or pairs[0].cost > singles[0].cost - WORTH:
+            return list(singles), list(pairs)
+        best = self._settled(pairs[0], 2)
+        members = {}
+        for effect in best.effects:
+            alone = self._without(best, effect)
+            members[alone.effects[0]] = alone
+        better = [members[c.effects[0]]
+                  if c.effects[0] in members and members[c.effects[0]].cost < c.cost else c
+                  for c in singles]
+        known = {c.effects[0] for c in singles}
+        better += [c for name, c in members.items() if name not in known]
+        return sorted(better, key=lambda c: c.cost), [best, *pairs[1:]]
+
+
+def _light(candidate: Candidate) -> Candidate:
+    """Return the candidate without its derivatives, which take most of the memory."""
+    return replace(candidate, state=replace(candidate.state, jacobian=np.empty((0, 0)),
+                                            weight=np.empty(0)))
 
 
 def parameters_of(candidate: Candidate) -> list[tuple[Parameter, float]]:

@@ -1,0 +1,80 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Say where a real drive and the model part, which effect is behind it, and how far it goes.
+
+Give one or more recordings of the same machine (CSV, with the test sheet NAME.yaml beside
+NAME.csv, or a bag). The more different the tests, the surer the verdict: a slow square wave, a
+triangle and a chirp or multisine of half a minute each are a good programme.
+
+examples:
+  antenna-drive diagnose field.csv
+  antenna-drive diagnose rec_a.csv rec_b.csv rec_c.csv --config my_drive.yaml \\
+      --json verdict.json --report verdict.html
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+import sys
+
+from antenna_drive.cli.output import add_json_option, Progress, replaced, STANDARD_OUTPUT
+from antenna_drive.cli.output import write_json
+from antenna_drive.cli.reading import warnings_in_one_line
+from antenna_drive.errors import UserError
+from antenna_drive.recording.files import read_recording
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.add_argument('recordings', nargs='+', metavar='RECORDING',
+                        help='recordings of one machine: .csv, or bags (folder or .mcap)')
+    parser.add_argument('--config', action='append', default=[], metavar='FILE',
+                        help='configuration of the model, a file or the name of a set in '
+                             'config/; may be given several times (default: reference)')
+    add_json_option(parser)
+    parser.add_argument('--report', metavar='FILE', help='write a self-contained page to FILE')
+    parser.add_argument('--jobs', type=int, default=2, metavar='N',
+                        help='simulations at once (default: 2)')
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Diagnose, and write what was asked for; 0 whatever the verdict."""
+    # the compiled physics takes a while to load: not before it is needed
+    from antenna_drive.gap.diagnosis import diagnose
+    from antenna_drive.parameters.loading import load
+
+    if arguments.jobs < 1:
+        raise UserError(f'--jobs: {arguments.jobs} given, allowed is 1 or more')
+    drive = load(*arguments.config)
+    recordings = {}
+    with warnings_in_one_line():
+        for path in arguments.recordings:
+            name = Path(path).stem
+            while name in recordings:
+                name += '_'
+            recordings[name] = read_recording(path)
+    with Progress('diagnosis', 1.0) as progress:
+        diagnosis = diagnose(recordings, drive, lambda share, doing: progress.update(share),
+                             arguments.jobs)
+    if arguments.json:
+        write_json(diagnosis.result, arguments.json)
+    if arguments.report:
+        from antenna_drive.gap.report import page
+        with replaced(Path(arguments.report)) as stream:
+            stream.write(page(diagnosis).encode())
+    stream_out = sys.stderr if arguments.json == STANDARD_OUTPUT else sys.stdout
+    print(diagnosis.summary(), file=stream_out)
+    return 0

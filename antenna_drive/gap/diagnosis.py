@@ -1,0 +1,358 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The diagnosis of a gap between a machine and its model: where, which effect, how far it shrinks.
+
+Examples
+--------
+>>> from antenna_drive.gap.diagnosis import diagnose          # doctest: +SKIP
+>>> from antenna_drive.parameters import load                 # doctest: +SKIP
+>>> from antenna_drive.recording.files import read_recording  # doctest: +SKIP
+>>> recording = read_recording('field.csv')                   # doctest: +SKIP
+>>> diagnose({'field': recording}, load()).summary()          # doctest: +SKIP
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+import math
+import time
+from typing import Any
+
+from antenna_drive.gap import residuals, verdict
+from antenna_drive.gap.drive_model import DriveModel
+from antenna_drive.gap.fit import FloatArray, Problem, State
+from antenna_drive.gap.model import Model
+from antenna_drive.gap.search import Candidate, parameters_of, Search
+from antenna_drive.parameters.sets import Drive
+from antenna_drive.recording.recording import Recording
+import numpy as np
+
+Progress = Callable[[float, str], None]
+# How many entries of `which` are given beside 'unknown' and 'none', and what is left out below.
+_ENTRIES = 12
+_LEAST = 1e-4
+_BLOCK_S = 1.0
+_RESAMPLES = 400
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """
+    What was found.
+
+    Attributes
+    ----------
+    result : the JSON of docs/diagnosis.md, as plain data
+    model : that was compared
+    none, best : the fits without and with the likeliest effects
+    candidates : everything that was fitted
+    notes : what was inferred or is missing
+
+    """
+
+    result: dict[str, Any]
+    model: Model
+    none: Candidate
+    best: Candidate
+    candidates: Sequence[Candidate] = field(default_factory=tuple)
+    notes: Sequence[str] = ()
+
+    def summary(self) -> str:
+        """Return the verdict in a few lines."""
+        result = self.result
+        lines = [_HEADLINES[result['verdict']]]
+        for entry in result['which'][:3]:
+            if entry['probability'] >= 0.01:
+                names = ' and '.join(entry['effects'])
+                lines.append(f'  {100.0 * entry["probability"]:5.1f} %  {names}')
+                lines += [f'           {name} = {value["value"]:.4g} {value["unit"]}'
+                          for name, value in entry['parameters'].items()]
+        for group in result['confusable']:
+            lines.append('  these data cannot tell apart: ' + ', '.join(group))
+        fraction = result['how_far']['explained_fraction']
+        if fraction['value'] is not None:
+            low, high = fraction['ci95']
+            lines.append(f'  explains {100.0 * fraction["value"]:.0f} % of the gap '
+                         f'({100.0 * low:.0f} to {100.0 * high:.0f}), judged on '
+                         f'{result["how_far"]["held_out"]}')
+        lines += [f'  note: {note}' for note in self.notes]
+        return '\n'.join(lines)
+
+
+_HEADLINES = {
+    'no_gap': 'no gap: machine and model agree within tolerance and noise',
+    'explained': 'explained: one of the known effects closes the gap',
+    'partly_explained': 'partly explained: a known effect closes some of the gap',
+    'unknown_effect': 'unknown effect: nothing in the catalogue closes the gap',
+}
+
+
+def diagnose(recordings: Mapping[str, Recording], drive: Drive,
+             progress: Progress = lambda share, doing: None, threads: int = 2) -> Diagnosis:
+    """
+    Say where a real drive and its model part, which effect is behind it, and how far it goes.
+
+    Parameters
+    ----------
+    recordings : of one machine, by name, with their test sheets
+    drive : the configuration of the model
+    progress : called with the share that is done, 0 to 1, and what is being done
+    threads : how many simulations at once
+
+    Raises
+    ------
+    UserError : a recording cannot be used; the message says which and why
+
+    """
+    began = time.monotonic()
+    model = DriveModel(recordings, drive, threads)
+    return _diagnosed(model, progress, began, model.notes)
+
+
+def _diagnosed(model: DriveModel, progress: Progress, began: float,
+               notes: Sequence[str]) -> Diagnosis:
+    problem = Problem(model)
+    search = Search(problem, lambda share, doing: progress(0.9 * share, doing))
+    candidates = search.run()
+    none = candidates[0]
+    best = verdict.best(candidates)
+    excess = _excess(problem, best.state)
+    ranked, unknown = verdict.rank(candidates, excess)
+    progress(0.9, 'how far it goes')
+    how_far = _how_far(problem, none, best)
+    entries: list[dict[str, Any]] = []
+    for item in ranked[:_ENTRIES]:
+        if item.probability >= _LEAST or item is ranked[0] or not item.candidate.effects:
+            entries.append({'effects': list(item.candidate.effects) or ['none'],
+                            'probability': item.probability,
+                            'parameters': _parameters(item.candidate)})
+    if ['none'] not in [entry['effects'] for entry in entries]:
+        share = next(r.probability for r in ranked if not r.candidate.effects)
+        entries.append({'effects': ['none'], 'probability': share, 'parameters': {}})
+    entries.append({'effects': ['unknown'], 'probability': unknown, 'parameters': {}})
+    total = sum(entry['probability'] for entry in entries)
+    for entry in entries:
+        entry['probability'] /= total
+    entries.sort(key=lambda entry: -entry['probability'])
+    word = _word(entries[0]['effects'], how_far, excess)
+    motions = [model.motion(k) for k in range(len(model.experiments))]
+    result = {
+        'verdict': word,
+        'where': _where(problem, model, none, best, ranked),
+        'which': entries,
+        'confusable': verdict.confusable(candidates) if best.effects else [],
+        'how_far': how_far,
+        'residual_tests': _tests(problem, best.state, excess, motions),
+        'seconds': time.monotonic() - began,
+        'notes': list(notes),
+    }
+    progress(1.0, 'done')
+    return Diagnosis(result, model, none, best, candidates, notes)
+
+
+def _word(top: list[str], how_far: dict[str, Any], excess: float) -> str:
+    if top == ['none']:
+        return 'no_gap'
+    if top == ['unknown']:
+        return 'unknown_effect'
+    return 'explained' if excess < verdict.EXCESS else 'partly_explained'
+
+
+def _z(problem: Problem, state: State, k: int) -> FloatArray:
+    """Return an experiment's residuals, NaN where nothing was measured, shape (n, c)."""
+    experiment = problem.experiments[k]
+    rows = problem.rows(k)
+    z = np.where(problem.valid[rows], state.residual[rows], np.nan)
+    return np.asarray(z.reshape(experiment.measured.shape))
+
+
+def _excess(problem: Problem, state: State) -> float:
+    """
+    Return how much of the residual is no noise: the mean over tests and signals.
+
+    Beyond what white noise of the same fast part would give, so that a sensor noisier than its
+    sheet says raises no alarm; outliers are clipped.
+    """
+    found = []
+    for k, experiment in enumerate(problem.experiments):
+        z = np.clip(_z(problem, state, k), -6.0, 6.0)
+        # at rest the encoder's residual is a fraction of one step, and no noise at all
+        found += [residuals.structure(z[:, c]) for c in range(len(experiment.channels))
+                  if experiment.channels[c] != 'encoder' and np.isfinite(z[:, c]).sum() > 50]
+    return float(np.mean(np.maximum(found, -0.5))) if found else 0.0
+
+
+def _tests(problem: Problem, state: State, excess: float,
+           motions: Sequence[residuals.Motion]) -> dict[str, Any]:
+    signals: dict[str, Any] = {}
+    zs = [_z(problem, state, k) for k in range(len(problem.experiments))]
+    for c, channel in enumerate(problem.experiments[0].channels):
+        z = np.concatenate([part[:, c] for part in zs])
+        if np.isfinite(z).any():
+            signals[channel] = {
+                'rms': float(np.sqrt(np.nanmean(z ** 2))),
+                'slow_excess': float(np.mean([residuals.structure(part[:, c]) for part in zs])),
+                'greatest_correlation': max(residuals.correlation(part[:, c]) for part in zs),
+            }
+    return {'excess_over_noise': excess, 'signals': signals,
+            'depends_on': residuals.dependences(problem.experiments, motions, zs)}
+
+
+def _parameters(candidate: Candidate) -> dict[str, Any]:
+    """Return the values of a candidate's effects with intervals of 95 percent."""
+    state = candidate.state
+    pull = np.array([1.0 / p.spread ** 2 if p.spread else 0.0 for p in state.parameters])
+    curvature = state.hessian + np.diag(pull)
+    scale = np.sqrt(np.maximum(np.diag(curvature), 1e-30))
+    covariance = np.linalg.pinv(curvature / np.outer(scale, scale)) / np.outer(scale, scale)
+    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    names = [p.name for p in state.parameters]
+    found = {}
+    for parameter, value in parameters_of(candidate):
+        wide = 1.96 * float(spread[names.index(parameter.name)])
+        found[parameter.name] = {
+            'value': value, 'ci95': [max(value - wide, parameter.low),
+                                     min(value + wide, parameter.high)],
+            'unit': parameter.unit}
+    return found
+
+
+# -- where ----------------------------------------------------------------------------------------
+
+def _where(problem: Problem, model: DriveModel, none: Candidate, best: Candidate,
+           ranked: Sequence[verdict.Ranked]) -> list[dict[str, Any]]:
+    """Return the parts, signals and regimes in which the gap lies, the largest first."""
+    components: dict[str, float] = {}
+    for item in ranked:
+        for effect in item.candidate.effects:
+            component = model.effects[effect].component
+            components[component] = components.get(component, 0.0) + item.probability / len(
+                item.candidate.effects)
+    total = sum(components.values())
+    if not total or not best.effects:
+        return []
+    shares: dict[tuple[str, str], float] = {}
+    for k, experiment in enumerate(problem.experiments):
+        regime = residuals.regimes(experiment, model.motion(k))
+        gained = np.nan_to_num(_z(problem, none.state, k) ** 2 - _z(problem, best.state, k) ** 2)
+        for c, channel in enumerate(experiment.channels):
+            for r, name in enumerate(residuals.REGIMES):
+                key = (channel, name)
+                shares[key] = shares.get(key, 0.0) + float(gained[regime == r, c].sum())
+    positive = {key: max(value, 0.0) for key, value in shares.items()}
+    whole = sum(positive.values()) or 1.0
+    found = [{'component': component, 'signal': signal, 'regime': regime,
+              'share': weight / total * share / whole}
+             for component, weight in components.items()
+             for (signal, regime), share in positive.items()]
+    found.sort(key=lambda item: -float(item['share']))  # type: ignore[arg-type]
+    return [item for item in found[:12] if float(item['share']) > 0.01]  # type: ignore[arg-type]
+
+
+# -- how far --------------------------------------------------------------------------------------
+
+def _how_far(problem: Problem, none: Candidate, best: Candidate) -> dict[str, Any]:
+    """Return the gap before and after, on data that the fits have not seen."""
+    count = len(problem.experiments)
+    channels = problem.experiments[0].channels
+    before, after = [], []
+    for k in range(count):
+        unseen = [_unseen(problem, candidate, k) for candidate in (none, best)]
+        before.append(unseen[0])
+        after.append(unseen[1] if best.effects else unseen[0])
+    floor = 1.0
+    seen = [np.isfinite(z).sum() for z in before]
+    energy = [float(np.nansum(np.concatenate([np.ravel(z) for z in part]) ** 2) / sum(seen))
+              for part in (before, after)]
+    fraction, interval = None, [None, None]
+    if best.effects:
+        sums = [_blocks(problem.experiments[k].time, before[k], after[k]) for k in range(count)]
+        blocks = np.concatenate(sums)
+        fraction = _fraction(blocks.sum(axis=0))
+        random = np.random.default_rng(0)
+        draws = [_fraction(blocks[random.integers(0, len(blocks), len(blocks))].sum(axis=0))
+                 for _ in range(_RESAMPLES)]
+        interval = [float(np.quantile(draws, 0.025)), float(np.quantile(draws, 0.975))]
+    per_signal = {}
+    for c, channel in enumerate(channels):
+        pair = [np.concatenate([z[:, c] for z in part]) for part in (before, after)]
+        if np.isfinite(pair[0]).any():
+            per_signal[channel] = {'before': float(np.sqrt(np.nanmean(pair[0] ** 2))),
+                                   'after': float(np.sqrt(np.nanmean(pair[1] ** 2)))}
+    return {'before': math.sqrt(energy[0]), 'after': math.sqrt(energy[1]), 'noise_floor': floor,
+            'explained_fraction': {'value': fraction, 'ci95': interval},
+            'per_signal': per_signal,
+            'held_out': ('each recording in turn, predicted from the others' if count > 1 else
+                         'the second half of the recording, predicted from the first')}
+
+
+def _unseen(problem: Problem, candidate: Candidate, k: int) -> FloatArray:
+    """Return the residuals of an experiment that the machine's parameters were not fitted to."""
+    experiments = problem.experiments
+    used = [np.full(e.time.size, i != k) for i, e in enumerate(experiments)]
+    half = experiments[k].time[-1] / 2.0
+    if len(experiments) == 1:
+        used[0] = experiments[0].time < half
+    training = Problem(problem.model, used)
+    state = candidate.state
+    if state.jacobian.size == 0:
+        state = problem.start(state.parameters, state.point())
+    fitted = training.start(state.parameters, state.point(), state.jacobian)
+    fitted = training.fit(fitted, 6)
+    if len(experiments) > 1:
+        # what belongs to the withheld test alone, such as where its motors started, is free
+        own = [j for j, p in enumerate(fitted.parameters) if p.experiment == k]
+        tied = [p for p in fitted.parameters if p.experiment != k]
+        values = fitted.point()
+        fixed = {p.name: values[p.name] for p in tied}
+        testing = _Held(problem.model, [np.full(e.time.size, i == k)
+                                        for i, e in enumerate(experiments)], fixed)
+        parts = [fitted.parameters[j] for j in own]
+        here = testing.start(parts, state.point(), state.jacobian[:, own])
+        fitted = testing.fit(here, 6)
+        return _z(testing, fitted, k)
+    whole = _z(problem, problem.start(state.parameters, fitted.point(), state.jacobian), k)
+    whole[used[0]] = np.nan
+    return whole
+
+
+class _Held(Problem):
+    """A problem some of whose parameters are held."""
+
+    def __init__(self, model: Model, used: Sequence[Any], fixed: dict[str, float]) -> None:
+        super().__init__(model, used)
+        self._fixed = fixed
+
+    def residuals(self, points: Sequence[dict[str, float]]) -> list[FloatArray]:
+        return super().residuals([{**self._fixed, **point} for point in points])
+
+
+def _blocks(time_s: FloatArray, before: FloatArray, after: FloatArray) -> FloatArray:
+    """Return energy before, after and of noise in each block of a second, shape (blocks, 3)."""
+    block = (time_s / _BLOCK_S).astype(int)
+    count = int(block[-1]) + 1
+    columns = [np.nansum(before ** 2, axis=1), np.nansum(after ** 2, axis=1),
+               np.isfinite(before).sum(axis=1)]
+    return np.column_stack([np.bincount(block, column, minlength=count) for column in columns])
+
+
+def _fraction(sums: FloatArray) -> float:
+    """Return the explained share of the energy above the noise, at most 1."""
+    before, after, floor = sums
+    # a floor above what is left would explain more than all
+    floor = min(floor, after)
+    return float((before - after) / max(before - floor, 1e-30))
