@@ -25,7 +25,6 @@ from collections.abc import Callable, Sequence
 from html import escape
 import io
 import math
-from pathlib import Path
 from typing import Any
 
 from antenna_drive.article import loaded_axis, static_profile
@@ -33,7 +32,6 @@ from antenna_drive.article.experiments import GAINS, LAGS, SAW_TOOTH
 from antenna_drive.article.measures import NEW_CIRCUIT, OLD_CIRCUIT, Results
 from antenna_drive.article.profile_measures import loaded_axis as loop_of_load
 from antenna_drive.article.static_profile import as_in_the_text, bias_voltage, NEW_GAIN
-from antenna_drive.cli.output import replaced
 from antenna_drive.parameters.sets import changed, TorqueShare
 from antenna_drive.physics.backlash import dead_zone
 from antenna_drive.physics.friction import friction_torque
@@ -310,43 +308,32 @@ FIGURES: tuple[tuple[int, str, Callable[[Results], Figure]], ...] = (
 )
 
 
-def draw_all(results: Results, folder: Path,
-             progress: Callable[[int, int], None] | None = None) -> list[Path]:
+def draw_all(results: Results, progress: Callable[[int, int], None] | None = None,
+             ) -> dict[str, bytes]:
     """
-    Draw every figure: fig_01.svg and so on, and figures.html with all of them.
+    Draw every figure.
 
     Parameters
     ----------
     results : of the parameter set
-    folder : made if it is not there
     progress : told how many figures are done, of how many
 
     Returns
     -------
-    the files written
-
-    Raises
-    ------
-    UserError : a file cannot be written
+    files by name: fig_01.svg and so on, and figures.html with all of them
 
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    written, parts = [], []
+    files, parts = {}, []
     with rc_context(_STYLE):
         for done, (number, caption, draw) in enumerate(FIGURES):
             if progress:
                 progress(done, len(FIGURES))
             drawing = io.BytesIO()
             draw(results).savefig(drawing, format='svg', metadata={'Date': None})
-            path = folder / f'fig_{number:02d}.svg'
-            with replaced(path) as stream:
-                stream.write(drawing.getvalue())
-            written.append(path)
+            files[f'fig_{number:02d}.svg'] = drawing.getvalue()
             parts.append((number, caption, drawing.getvalue()))
-    page = folder / 'figures.html'
-    with replaced(page) as stream:
-        stream.write(_page(parts).encode())
-    return [*written, page]
+    files['figures.html'] = _page(parts).encode()
+    return files
 
 
 def _page(parts: Sequence[tuple[int, str, bytes]]) -> str:

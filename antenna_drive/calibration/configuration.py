@@ -17,11 +17,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 import io
-from pathlib import Path
 from typing import Any
 
 from antenna_drive.calibration.problem import Problem
-from antenna_drive.cli.output import replaced
 from antenna_drive.parameters.loading import find, read_yaml
 import yaml
 
@@ -29,21 +27,15 @@ import yaml
 _DIGITS = 7
 
 
-def write_configuration(problem: Problem, shares: Sequence[float], start: str, path: Path,
-                        ) -> None:
+def configuration(problem: Problem, shares: Sequence[float], start: str) -> str:
     """
-    Write a candidate as a configuration that lies over what the fit started from.
+    Return a candidate as a configuration file that lies over what the fit started from.
 
     Parameters
     ----------
     problem : the fit
     shares : the candidate, as shares of the bounds
     start : configuration that the fit started from; what it says of other parameters is kept
-    path : file to write, whole or not at all
-
-    Raises
-    ------
-    UserError : the file cannot be written
 
     """
     content: dict[str, Any] = {}
@@ -57,8 +49,7 @@ def write_configuration(problem: Problem, shares: Sequence[float], start: str, p
         body = dict(content.get(section) or {})
         body[entry] = {'value': numbers, 'unit': units[key], 'source': 'fitted'}
         content[section] = body
-    with replaced(path) as stream:
-        stream.write(as_yaml(content).encode())
+    return as_yaml(content)
 
 
 def _rounded(value: float) -> float:

@@ -39,7 +39,9 @@ from antenna_drive.article.contradictions import Contradiction, contradictions
 from antenna_drive.article.experiments import Experiment
 from antenna_drive.article.measures import Results, with_circuits
 from antenna_drive.article.rows import Row, rows
-from antenna_drive.cli.output import add_json_option, Progress, STANDARD_OUTPUT, write_json
+from antenna_drive.cli.output import (
+    add_json_option, Progress, replaced, STANDARD_OUTPUT, write_json,
+)
 from antenna_drive.emulator.run import MACRO_STEP, Run, simulate
 from antenna_drive.emulator.units import home
 from antenna_drive.parameters import Drive
@@ -76,8 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
         found = [_marked(row) for row in found]
     disagreements = contradictions(results)
     if arguments.figures is not None:
-        from antenna_drive.article.figures import draw_all
-        draw_all(results, arguments.figures)
+        _draw(results, arguments.figures)
     if arguments.json is not None:
         write_json({'configuration': list(arguments.config),
                     'rows': [asdict(row) for row in found],
@@ -107,6 +108,17 @@ def _through_nodes(configuration: list[str]) -> Callable[[Experiment, Drive], Ru
         return Run(MACRO_STEP, np.arange(steps + 1), sampled.names, sampled.samples)
 
     return run_one
+
+
+def _draw(results: Results, folder: Path) -> None:
+    from antenna_drive.article.figures import draw_all
+
+    folder.mkdir(parents=True, exist_ok=True)
+    with Progress('figures', 1.0) as shown:
+        files = draw_all(results, lambda done, total: shown.update(done / total))
+    for name, content in files.items():
+        with replaced(folder / name) as stream:
+            stream.write(content)
 
 
 def _marked(row: Row) -> Row:

@@ -31,11 +31,13 @@ import sys
 from typing import Any
 
 from antenna_drive import cli
-from antenna_drive.calibration.configuration import write_configuration
+from antenna_drive.calibration.configuration import configuration
 from antenna_drive.calibration.problem import read_problem
 from antenna_drive.calibration.report import report
 from antenna_drive.calibration.search import read_log, search
-from antenna_drive.cli.output import add_json_option, Progress, STANDARD_OUTPUT, write_json
+from antenna_drive.cli.output import (
+    add_json_option, Progress, replaced, STANDARD_OUTPUT, write_json,
+)
 from antenna_drive.parameters.files import config_dir
 
 COUNT = 2000
@@ -69,7 +71,8 @@ def run(arguments: argparse.Namespace) -> int:
     with Progress('candidates', max(1, arguments.count)) as shown:
         found = search(problem, arguments.count, seed=arguments.seed, log=arguments.log,
                        progress=lambda done, best: shown.update(done))
-    write_configuration(problem, found.best.shares, arguments.start, arguments.out)
+    with replaced(arguments.out) as stream:
+        stream.write(configuration(problem, found.best.shares, arguments.start).encode())
     with Progress('what is determined', 1.0) as shown:
         told = report(problem, found, arguments.trade_off, shown.update, also)
     if arguments.json is not None:

@@ -20,6 +20,7 @@ from pathlib import Path
 import re
 from xml.etree import ElementTree
 
+from antenna_drive import cli
 from antenna_drive.article import figures, loaded_axis
 from antenna_drive.article.measures import Results, with_circuits
 from antenna_drive.article.profile_measures import loaded_axis as loop_of_load
@@ -51,10 +52,11 @@ def results() -> Results:
 
 
 def test_every_figure_is_a_file_and_on_the_page(
-        results: Results, short_load: None, tmp_path: Path) -> None:
-    folder = tmp_path / 'figures'
-    written = figures.draw_all(results, folder)
-    assert {path.name for path in written} == {
+        short_load: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('antenna_drive.cli.article.EXPERIMENTS', ('T3a',))
+    folder = tmp_path / 'new' / 'figures'
+    assert cli.main(['article', '--figures', str(folder)]) == cli.OK
+    assert {path.name for path in folder.iterdir()} == {
         *(f'fig_{number:02d}.svg' for number in NUMBERS), 'figures.html'}
     for number in NUMBERS:
         root = ElementTree.parse(folder / f'fig_{number:02d}.svg').getroot()

@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from antenna_drive.calibration.configuration import write_configuration
+from antenna_drive.calibration.configuration import configuration
 from antenna_drive.calibration.problem import Free, Problem, read_problem, Target
 from antenna_drive.parameters import load, ParameterError
 from antenna_drive.parameters.files import config_dir
@@ -141,7 +141,7 @@ def test_the_shipped_targets_are_valid() -> None:
 def test_a_fitted_set_is_a_configuration_over_its_start(tmp_path: Path) -> None:
     problem = read_problem(written(tmp_path))
     out = tmp_path / 'fitted.yaml'
-    write_configuration(problem, [0.5, 0.25, 0.5], 'reference', out)
+    out.write_text(configuration(problem, [0.5, 0.25, 0.5], 'reference'))
     fitted, start = load(str(out)), load()
     assert fitted.motor_1.gearbox.half_gap == pytest.approx(math.sqrt(0.05 * 0.3), rel=1e-6)
     assert fitted.plant.axis.coulomb_torque == pytest.approx(1.25)
@@ -151,7 +151,7 @@ def test_a_fitted_set_is_a_configuration_over_its_start(tmp_path: Path) -> None:
     own = tmp_path / 'own.yaml'
     own.write_text('amplifier: {lag: 0.02}\ngearbox: {stiffness: 30.0, half_gap: 0.1}\n')
     again = read_problem(written(tmp_path), [str(own)])
-    write_configuration(again, [0.5, 0.25, 0.5], str(own), out)
+    out.write_text(configuration(again, [0.5, 0.25, 0.5], str(own)))
     fitted = load(str(out))
     assert fitted.motor_1.amplifier.lag == 0.02
     assert fitted.motor_1.gearbox.stiffness == 30.0
