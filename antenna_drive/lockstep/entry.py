@@ -233,20 +233,19 @@ def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], ending: _Endi
 
 def choose_transport(environment: dict[str, str] | os._Environ[str]) -> None:
     """
-    Keep to this machine, by UDP, unless the user has said otherwise.
+    Keep to this machine, with few acknowledgements, unless the user has said otherwise.
 
     Discovery: whoever wants other machines sets ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET, or any
-    other of ROS 2's own variables, and nothing is touched. Transport: for many small messages,
-    each of which somebody sleeps for, Fast DDS's shared memory costs more than the loopback
-    interface; see docs/lockstep.md.
+    other of ROS 2's own variables, and nothing is touched. Acknowledgements: config/fastdds.xml
+    says why; a profiles file of the user's own takes its place.
     """
     if not any(name in environment for name in (
             'ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_LOCALHOST_ONLY', 'ROS_STATIC_PEERS')):
         environment['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     if not any(name in environment for name in (
-            'FASTDDS_BUILTIN_TRANSPORTS', 'FASTDDS_DEFAULT_PROFILES_FILE',
-            'FASTRTPS_DEFAULT_PROFILES_FILE')):
-        environment['FASTDDS_BUILTIN_TRANSPORTS'] = 'UDPv4'
+            'FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE')):
+        from antenna_drive.parameters.files import config_dir
+        environment['FASTDDS_DEFAULT_PROFILES_FILE'] = str(config_dir() / 'fastdds.xml')
 
 
 def _help(program: str, description: str) -> str:

@@ -34,6 +34,9 @@ from rclpy.executors import ExternalShutdownException, ShutdownException, Single
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
+# A wait for a single peer [s]; after it, whatever may come ends a wait.
+_BRIEF_WAIT_S = 0.02
+
 # No wait is longer than this [s]: signals and reports are served in between.
 _LONGEST_WAIT_S = 0.2
 
@@ -254,7 +257,12 @@ class DriveNode:
         if isinstance(member, Conductor) and member.ended and not self._said_end:
             self._said_end = True
             self._hello()
-        ready = link.wait(member.wanted(), timeout)
+        if self._quiet:
+            ready = link.wait(member.wanted(), timeout)
+        else:
+            # One peer at a time: a wait costs something for each that it looks at, and to be
+            # woken by each in turn costs most. What else has come is taken without a wait.
+            ready = link.wait(member.missing()[-1:], min(timeout, _BRIEF_WAIT_S))
         for peer in ready:
             frame = link.take(peer)
             if frame is not None:

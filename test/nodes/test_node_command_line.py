@@ -106,11 +106,12 @@ def test_a_file_of_parameters_sets_constants_too(tmp_path: Path) -> None:
 
 def test_discovery_and_transport_are_the_users_to_choose() -> None:
     from antenna_drive.lockstep.entry import choose_transport
-    untouched = {'ROS_LOCALHOST_ONLY': '0', 'FASTDDS_BUILTIN_TRANSPORTS': 'SHM'}
+    untouched = {'ROS_LOCALHOST_ONLY': '0', 'FASTDDS_DEFAULT_PROFILES_FILE': 'mine.xml'}
     environment = dict(untouched)
     choose_transport(environment)
     assert environment == untouched
     environment = {}
     choose_transport(environment)
-    assert environment == {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-                           'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4'}
+    assert environment.pop('ROS_AUTOMATIC_DISCOVERY_RANGE') == 'LOCALHOST'
+    (profiles,) = environment.values()
+    assert 'heartbeat_response_delay' in Path(profiles).read_text()
