@@ -333,8 +333,10 @@ def contradictions(results: Results, only: Iterable[str] = ()) -> list[Contradic
 
     Parameters
     ----------
-    results : of the parameter set
-    only : names of the functions of this module, all if there are none
+    results
+        of the parameter set
+    only
+        names of the functions of this module, all if there are none
 
     """
     wanted = tuple(only)

@@ -315,8 +315,10 @@ def draw_all(results: Results, progress: Callable[[int, int], None] | None = Non
 
     Parameters
     ----------
-    results : of the parameter set
-    progress : told how many figures are done, of how many
+    results
+        of the parameter set
+    progress
+        told how many figures are done, of how many
 
     Returns
     -------

@@ -41,9 +41,12 @@ def bias_loop(drive: Drive, gain: float, pole: float, *, rotors_held: bool) -> F
 
     Parameters
     ----------
-    drive : parameters
-    gain, pole : k' and p of Filter 1 [1/s]
-    rotors_held : True if static friction holds the rotors
+    drive
+        parameters
+    gain, pole
+        k' and p of Filter 1 [1/s]
+    rotors_held
+        True if static friction holds the rotors
 
     Returns
     -------
@@ -129,9 +132,12 @@ def stability_limit(drive: Drive, pole: float, *, rotors_held: bool = True) -> f
 
     Parameters
     ----------
-    drive : parameters
-    pole : p of Filter 1 [1/s]
-    rotors_held : True if static friction holds the rotors
+    drive
+        parameters
+    pole
+        p of Filter 1 [1/s]
+    rotors_held
+        True if static friction holds the rotors
 
     Returns
     -------
@@ -152,8 +158,10 @@ def step_response(drive: Drive, time: FloatArray) -> FloatArray:
 
     Parameters
     ----------
-    drive : parameters
-    time : evenly spaced from 0 [s], shape (n,)
+    drive
+        parameters
+    time
+        evenly spaced from 0 [s], shape (n,)
 
     Returns
     -------

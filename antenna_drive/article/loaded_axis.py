@@ -89,9 +89,12 @@ def loaded(drive: Drive, circuit: str, share: float) -> LoadedAxis:
 
     Parameters
     ----------
-    drive : with one of the circuits
-    circuit : the circuit's name
-    share : torque bias at no load, as a share of the greatest torque
+    drive
+        with one of the circuits
+    circuit
+        the circuit's name
+    share
+        torque bias at no load, as a share of the greatest torque
 
     """
     experiment = Experiment(f'loaded axis {share:g}', 1.25 * PERIOD, circuit, {
@@ -117,9 +120,12 @@ def by_equation_14(drive: Drive, share: float, load: FloatArray) -> FloatArray:
 
     Parameters
     ----------
-    drive : with one of the circuits
-    share : torque bias at no load, as a share of the greatest torque
-    load : axial torque, percent of the greatest, shape (n,)
+    drive
+        with one of the circuits
+    share
+        torque bias at no load, as a share of the greatest torque
+    load
+        axial torque, percent of the greatest, shape (n,)
 
     Returns
     -------
@@ -144,8 +150,10 @@ def fade_out(load: FloatArray, bias: FloatArray) -> tuple[float, float]:
 
     Parameters
     ----------
-    load : mean torque of the motors, percent of the greatest, shape (n,)
-    bias : difference of their torques, shape (n,)
+    load
+        mean torque of the motors, percent of the greatest, shape (n,)
+    bias
+        difference of their torques, shape (n,)
 
     """
     # the median in each percent of load: teeth that meet, and an axis that breaks away, swing

@@ -52,9 +52,12 @@ class Results:
 
     Parameters
     ----------
-    drives : the drive with each circuit, by the circuit's name in config/
-    known : the experiments, by name
-    run : runs an experiment on its drive; the emulator in one process, unless said otherwise
+    drives
+        the drive with each circuit, by the circuit's name in config/
+    known
+        the experiments, by name
+    run
+        runs an experiment on its drive; the emulator in one process, unless said otherwise
 
     """
 
@@ -205,7 +208,8 @@ def article_measures(drive: Drive) -> dict[str, Measure]:
 
     Parameters
     ----------
-    drive : for the gear ratio and the greatest current, which figures are shares of
+    drive
+        for the gear ratio and the greatest current, which figures are shares of
 
     """
     ratio, most = drive.plant.axis.gear_ratio, drive.motor_1.motor.current_limit

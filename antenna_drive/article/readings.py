@@ -40,9 +40,12 @@ def step_response(time: FloatArray, value: FloatArray, tail_s: float = 1.0) -> R
 
     Parameters
     ----------
-    time : [s], shape (n,)
-    value : shape (n,)
-    tail_s : the mean over this last stretch is the final value [s]
+    time
+        [s], shape (n,)
+    value
+        shape (n,)
+    tail_s
+        the mean over this last stretch is the final value [s]
 
     """
     final = float(value[time > time[-1] - tail_s].mean())
@@ -66,9 +69,12 @@ def bias_range(time: FloatArray, voltage: FloatArray, after_s: float) -> BiasRan
 
     Parameters
     ----------
-    time : [s], shape (n,)
-    voltage : [V], shape (n,)
-    after_s : what comes before is left out [s]
+    time
+        [s], shape (n,)
+    voltage
+        [V], shape (n,)
+    after_s
+        what comes before is left out [s]
 
     """
     kept = voltage[time >= after_s]
@@ -82,9 +88,12 @@ def plateau(time: FloatArray, value: FloatArray, period: float, window: tuple[fl
 
     Parameters
     ----------
-    time, value : shape (n,)
-    period : of the square wave [s]; it is positive in its first half
-    window : from and to, after each reversal [s]
+    time, value
+        shape (n,)
+    period
+        of the square wave [s]; it is positive in its first half
+    window
+        from and to, after each reversal [s]
 
     Returns
     -------

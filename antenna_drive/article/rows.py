@@ -62,9 +62,12 @@ def rows(results: Results, experiments: Iterable[str] = (),
 
     Parameters
     ----------
-    results : of the parameter set
-    experiments : only rows of these, 'T3a'; all if there are none
-    progress : told how many rows are done, of how many
+    results
+        of the parameter set
+    experiments
+        only rows of these, 'T3a'; all if there are none
+    progress
+        told how many rows are done, of how many
 
     """
     wanted = tuple(experiments)

@@ -44,11 +44,16 @@ def growth_rate(drive: Drive, gain: float, pole: float, step_s: float = MACRO_ST
 
     Parameters
     ----------
-    drive : with the old circuit
-    gain, pole : k' and p of Filter 1 [1/s]
-    step_s : macro-step [s]
-    settled_s : time given to the loop, at a gain that is stable, to become steady [s]
-    watched_s : time over which the disturbance is watched [s]
+    drive
+        with the old circuit
+    gain, pole
+        k' and p of Filter 1 [1/s]
+    step_s
+        macro-step [s]
+    settled_s
+        time given to the loop, at a gain that is stable, to become steady [s]
+    watched_s
+        time over which the disturbance is watched [s]
 
     """
     emulator = Emulator(filter_variant(_SETTLING_GAIN, pole).applied_to(drive), step_s)
@@ -83,9 +88,12 @@ def simulated_limit(drive: Drive, pole: float, step_s: float = MACRO_STEP) -> fl
 
     Parameters
     ----------
-    drive : with the old circuit
-    pole : p of Filter 1 [1/s]
-    step_s : macro-step [s]
+    drive
+        with the old circuit
+    pole
+        p of Filter 1 [1/s]
+    step_s
+        macro-step [s]
 
     Returns
     -------

@@ -49,9 +49,12 @@ def as_in_the_text(share: TorqueShare, gain: float = TEXT_GAIN,
 
     Parameters
     ----------
-    share : the circuit, for transfer function 2 and the saturation
-    gain : k_2 of Eq. (14), which Table 1 calls k_4 over k_2
-    fade_out_voltage : f_o [V]
+    share
+        the circuit, for transfer function 2 and the saturation
+    gain
+        k_2 of Eq. (14), which Table 1 calls k_4 over k_2
+    fade_out_voltage
+        f_o [V]
 
     """
     return changed(share, {'g_4': gain, 'fade_out_voltage': fade_out_voltage,

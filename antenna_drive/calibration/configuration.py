@@ -33,9 +33,12 @@ def configuration(problem: Problem, shares: Sequence[float], start: str) -> str:
 
     Parameters
     ----------
-    problem : the fit
-    shares : the candidate, as shares of the bounds
-    start : configuration that the fit started from; what it says of other parameters is kept
+    problem
+        the fit
+    shares
+        the candidate, as shares of the bounds
+    start
+        configuration that the fit started from; what it says of other parameters is kept
 
     """
     content: dict[str, Any] = {}

@@ -228,8 +228,10 @@ class Problem:
 
         Parameters
         ----------
-        shares : of the bounds, one for each free parameter
-        give_up_at : once the cost exceeds this the rest is not simulated; targets are looked
+        shares
+            of the bounds, one for each free parameter
+        give_up_at
+            once the cost exceeds this the rest is not simulated; targets are looked
             at in their order
 
         """
@@ -266,8 +268,10 @@ def read_problem(source: str | Path, start: Sequence[str] = ()) -> Problem:
 
     Parameters
     ----------
-    source : path, or name of a file in config/
-    start : configuration files, from which the fit starts and everything fixed is taken
+    source
+        path, or name of a file in config/
+    start
+        configuration files, from which the fit starts and everything fixed is taken
 
     Raises
     ------

@@ -65,11 +65,16 @@ def report(problem: Problem, found: Found, trade_offs: Sequence[str] = (),
 
     Parameters
     ----------
-    problem : the fit
-    found : what the search found
-    trade_offs : figures of targets whose price in the other targets is to be shown
-    progress : told the share that is done
-    also : candidates of other searches with the same figures, for the trade-offs
+    problem
+        the fit
+    found
+        what the search found
+    trade_offs
+        figures of targets whose price in the other targets is to be shown
+    progress
+        told the share that is done
+    also
+        candidates of other searches with the same figures, for the trade-offs
 
     Returns
     -------

@@ -134,11 +134,16 @@ def search(problem: Problem, count: int, *, seed: int = 1, log: Path | None = No
 
     Parameters
     ----------
-    problem : what is free, what is aimed at, and from where
-    count : candidates to try; the search ends with a whole generation
-    seed : the same seed gives the same search
-    log : where candidates are kept as they come; a search that finds its log goes on from it
-    progress : told the number of candidates so far, and the best one
+    problem
+        what is free, what is aimed at, and from where
+    count
+        candidates to try; the search ends with a whole generation
+    seed
+        the same seed gives the same search
+    log
+        where candidates are kept as they come; a search that finds its log goes on from it
+    progress
+        told the number of candidates so far, and the best one
 
     Raises
     ------
