@@ -22,3 +22,7 @@ class UserError(Exception):
     prints it without a traceback; every error of the project that is the user's to mend,
     and not a fault of the program, is one of these.
     """
+
+    def __init__(self, message: str) -> None:
+        """Keep the message in one line, whatever a key or a path in it may hold."""
+        super().__init__(' '.join(message.split()))
