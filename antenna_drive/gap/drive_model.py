@@ -320,10 +320,14 @@ class DriveModel:
                 continue
             for order in self._orders(form, residuals):
                 wave = form.at(order)
-                for part, item in enumerate(wave.parameters):
-                    self._waves[item.name] = (wave, part)
+                self.register(wave)
                 found.append(wave)
         return found
+
+    def register(self, wave: Wave) -> None:
+        """Make a wave's parameters known."""
+        for part, item in enumerate(wave.parameters):
+            self._waves[item.name] = (wave, part)
 
     def _orders(self, form: Wave, residuals: Sequence[FloatArray]) -> list[float]:
         """Return the cycles per revolution with which the residuals vary most."""

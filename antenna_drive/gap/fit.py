@@ -30,9 +30,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-# Residuals beyond so many standard deviations count linearly (Huber); the scale is the larger of
-# the sensors' and that of the residuals themselves.
+# Residuals beyond so many standard deviations count linearly (Huber).
 HUBER = 3.0
+# The curvature is made anew when the weights have changed by so much on the mean.
+_STALE = 0.02
 
 
 @dataclass(frozen=True)
@@ -46,17 +47,18 @@ class State:
     x : their values, shape (m,)
     residual : measured less predicted, in standard deviations, shape (n,); zero where nothing was
         measured
-    jacobian : derivative of the prediction [standard deviations per unit], shape (n, m)
+    jacobian : derivative of the prediction [standard deviations per unit], shape (n, m), in
+        single precision: it is large, and a direction is all that it gives
     weight : Huber weight of each residual, shape (n,)
     hessian : jacobian, weight, jacobian, shape (m, m)
-    cost : half the weighted sum of squares, with the pull of the offsets
+    cost : Huber's sum over the residuals, half a chi-square, and the pull of the offsets
 
     """
 
     parameters: tuple[Parameter, ...]
     x: FloatArray
     residual: FloatArray
-    jacobian: FloatArray
+    jacobian: NDArray[np.float32]
     weight: FloatArray
     hessian: FloatArray
     cost: float
@@ -112,7 +114,7 @@ class Problem:
                 for result in self.model.simulate(points)]
 
     def columns(self, point: dict[str, float], parameters: Sequence[Parameter],
-                residual: FloatArray, central: bool) -> FloatArray:
+                residual: FloatArray, central: bool) -> NDArray[np.float32]:
         """
         Return derivatives of the prediction by difference quotients.
 
@@ -136,7 +138,7 @@ class Problem:
                 variants.append({**point, item.name: here + side * item.step})
                 only.append(item.experiment)
                 plan.append((j, side, len(sides)))
-        jacobian = np.zeros((residual.size, len(parameters)))
+        jacobian = np.zeros((residual.size, len(parameters)), np.float32)
         chunk = 16
         for first in range(0, len(variants), chunk):
             part = slice(first, first + chunk)
@@ -148,10 +150,14 @@ class Problem:
                     rows = self.rows(k)
                     change = residual[rows] - self._scaled(k, values)
                     jacobian[rows, j] += side * change / (parameters[j].step * count)
+        # less than a thousandth of the noise in all is rounding, no derivative
+        for j, item in enumerate(parameters):
+            if float(np.abs(jacobian[:, j]).max(initial=0.0)) * item.step < 1e-6:
+                jacobian[:, j] = 0.0
         return jacobian
 
     def start(self, parameters: Sequence[Parameter], point: dict[str, float],
-              jacobian: FloatArray | None = None, central: bool = False) -> State:
+              jacobian: NDArray[np.float32] | None = None, central: bool = False) -> State:
         """Begin a fit at a point; derivatives are taken unless they are given."""
         x = np.array([np.clip(point.get(p.name, 0.0), p.low, p.high) for p in parameters])
         at = dict(zip((p.name for p in parameters), x.tolist(), strict=True))
@@ -168,25 +174,25 @@ class Problem:
         return _state(state.parameters, state.x, state.residual, jacobian, weight)
 
     def widened(self, state: State, parameters: Sequence[Parameter], values: Sequence[float],
-                columns: FloatArray) -> State:
+                columns: NDArray[np.float32]) -> State:
         """Return the state with more parameters, at these values, with these derivatives."""
         x = np.r_[state.x, values]
         everything = (*state.parameters, *parameters)
         point = dict(zip((p.name for p in everything), x.tolist(), strict=True))
         residual = self.residuals([point])[0]
-        weighted = state.weight[:, np.newaxis] * columns
-        cross = state.jacobian.T @ weighted
-        hessian = np.block([[state.hessian, cross], [cross.T, columns.T @ weighted]])
+        cross = weighted_square(state.jacobian, state.weight, columns)
+        hessian = np.block([[state.hessian, cross],
+                            [cross.T, weighted_square(columns, state.weight)]])
         return _state(everything, x, residual, np.column_stack([state.jacobian, columns]),
                       state.weight, hessian)
 
-    def replaced(self, state: State, where: Sequence[int], columns: FloatArray) -> State:
+    def replaced(self, state: State, where: Sequence[int],
+                 columns: NDArray[np.float32]) -> State:
         """Return the state with other derivatives by some of its parameters."""
         jacobian = state.jacobian.copy()
         jacobian[:, where] = columns
-        weighted = state.weight[:, np.newaxis] * columns
         hessian = state.hessian.copy()
-        hessian[:, where] = jacobian.T @ weighted
+        hessian[:, where] = weighted_square(jacobian, state.weight, columns)
         hessian[where, :] = hessian[:, where].T
         return _state(state.parameters, state.x, state.residual, jacobian, state.weight, hessian)
 
@@ -200,15 +206,16 @@ class Problem:
         high = np.array([p.high for p in state.parameters])
         pull = _pull(state.parameters)
         weight, hessian = state.weight, state.hessian.copy()
+        shaped = weight
         x, residual, cost = state.x, state.residual, state.cost
         # The derivatives are those given plus a few outer products of these.
         errors: list[FloatArray] = []
         directions: list[FloatArray] = []
-        across = state.jacobian.T @ (weight * residual)
+        slope = across(state.jacobian, weight * residual)
         damping = 1e-3
         idle = 0
         for _ in range(turns):
-            gradient = across - pull * x
+            gradient = slope - pull * x
             for error, direction in zip(errors, directions, strict=True):
                 gradient += direction * float(error @ (weight * residual))
             curvature = hessian + np.diag(pull)
@@ -221,18 +228,18 @@ class Problem:
             trial = np.clip(x + step, low, high)
             point = dict(zip((p.name for p in state.parameters), trial.tolist(), strict=True))
             after = self.residuals([point])[0]
-            trial_cost = _cost(after, weight, trial, pull)
+            trial_cost = _cost(after, trial, pull)
             gained = cost - trial_cost
             # Broyden's rule, in the metric in which all parameters are alike
             metric = step * diagonal
             length = float(step @ metric)
             if length > 0.0:
-                wrong = (residual - after) - state.jacobian @ step
+                wrong = (residual - after) - state.jacobian @ step.astype(np.float32)
                 for error, direction in zip(errors, directions, strict=True):
                     wrong -= error * float(direction @ step)
                 new = metric / length
                 weighted = weight * wrong
-                cross = state.jacobian.T @ weighted
+                cross = across(state.jacobian, weighted)
                 for error, direction in zip(errors, directions, strict=True):
                     cross += direction * float(error @ weighted)
                 hessian += (np.outer(cross, new) + np.outer(new, cross)
@@ -241,17 +248,21 @@ class Problem:
                 directions.append(new)
             if gained > 0.0:
                 x, residual, cost = trial, after, trial_cost
-                across = state.jacobian.T @ (weight * residual)
+                now = huber_weight(residual, self.valid)
+                if float(np.mean(np.abs(now - shaped))) > _STALE:
+                    jacobian = _with(state.jacobian, errors, directions)
+                    hessian = weighted_square(jacobian, now)
+                    shaped = now
+                weight = now
+                slope = across(state.jacobian, weight * residual)
                 damping = max(damping / (5.0 if gained > 0.5 * expected else 1.0), 1e-6)
                 idle = idle + 1 if gained < gain else 0
                 if idle > 1:
                     break
             else:
                 damping = min(max(damping, 1e-3) * 6.0, 1e4)
-        jacobian = state.jacobian
-        if errors:
-            jacobian = jacobian + np.array(errors).T @ np.array(directions)
-        return State(state.parameters, x, residual, jacobian, weight, hessian, cost)
+        jacobian = _with(state.jacobian, errors, directions)
+        return _state(state.parameters, x, residual, jacobian, weight)
 
 
 def scanned(problem: Problem, point: dict[str, float], names: Sequence[str], experiment: int,
@@ -281,35 +292,62 @@ def scanned(problem: Problem, point: dict[str, float], names: Sequence[str], exp
         for trial, result in zip(part, results, strict=True):
             predicted = result[experiment]
             assert predicted is not None
-            z = np.abs((here.measured[early] - predicted[early]) / here.noise[early])
-            z = z[np.isfinite(z)]
-            cost = float(np.sum(np.where(z < HUBER, 0.5 * z ** 2, HUBER * z - 0.5 * HUBER ** 2)))
+            z = (here.measured[early] - predicted[early]) / here.noise[early]
+            cost = huber_sum(z[np.isfinite(z)])
             if cost < best_cost:
                 best, best_cost = trial, cost
     return best
 
 
+def across(jacobian: NDArray[np.float32], vector: FloatArray) -> FloatArray:
+    """Return the product of the transposed derivatives and a vector, shape (m,)."""
+    return np.asarray(jacobian.T @ vector.astype(np.float32), np.float64)
+
+
+def weighted_square(jacobian: NDArray[np.float32], weight: FloatArray,
+                    other: NDArray[np.float32] | None = None) -> FloatArray:
+    """Return derivatives, weight, derivatives (or others), shape (m, m)."""
+    other = jacobian if other is None else other
+    return np.asarray(jacobian.T @ (weight.astype(np.float32)[:, np.newaxis] * other), np.float64)
+
+
 def huber_weight(residual: FloatArray, valid: NDArray[np.bool_]) -> FloatArray:
-    """Return Huber's weights, with the residuals' own scale where that is above the sensors'."""
+    """Return Huber's weights, shape (n,); none where nothing was measured."""
+    size = np.maximum(np.abs(residual), 1e-9)
+    return np.asarray(np.where(valid, np.minimum(1.0, HUBER / size), 0.0))
+
+
+def huber_sum(residual: FloatArray) -> float:
+    """Return Huber's sum: half the square of small residuals, linear in large ones."""
     size = np.abs(residual)
-    scale = max(1.0, float(np.median(size[valid])) / 0.6745) if valid.any() else 1.0
-    return np.asarray(np.where(valid, np.minimum(1.0, HUBER * scale / np.maximum(size, 1e-9)), 0.0))
+    return float(np.sum(np.where(size < HUBER, 0.5 * size ** 2,
+                                 HUBER * size - 0.5 * HUBER ** 2)))
+
+
+def _with(jacobian: NDArray[np.float32], errors: Sequence[FloatArray],
+          directions: Sequence[FloatArray]) -> NDArray[np.float32]:
+    """Return derivatives with the corrections that were found on the way."""
+    if not errors:
+        return jacobian
+    return np.asarray(jacobian + np.array(errors, np.float32).T
+                      @ np.array(directions, np.float32))
 
 
 def _pull(parameters: Sequence[Parameter]) -> FloatArray:
     return np.array([1.0 / p.spread ** 2 if p.spread > 0.0 else 0.0 for p in parameters])
 
 
-def _cost(residual: FloatArray, weight: FloatArray, x: FloatArray, pull: FloatArray) -> float:
-    return float(0.5 * residual @ (weight * residual) + 0.5 * x @ (pull * x))
+def _cost(residual: FloatArray, x: FloatArray, pull: FloatArray) -> float:
+    return huber_sum(residual) + float(0.5 * x @ (pull * x))
 
 
 def _state(parameters: tuple[Parameter, ...], x: FloatArray, residual: FloatArray,
-           jacobian: FloatArray, weight: FloatArray, hessian: FloatArray | None = None) -> State:
+           jacobian: NDArray[np.float32], weight: FloatArray,
+           hessian: FloatArray | None = None) -> State:
     if hessian is None:
-        hessian = jacobian.T @ (weight[:, np.newaxis] * jacobian)
+        hessian = weighted_square(jacobian, weight)
     return State(parameters, x, residual, jacobian, weight, hessian,
-                 _cost(residual, weight, x, _pull(parameters)))
+                 _cost(residual, x, _pull(parameters)))
 
 
 def bounded_step(curvature: FloatArray, gradient: FloatArray, low: FloatArray,
@@ -326,8 +364,10 @@ def bounded_step(curvature: FloatArray, gradient: FloatArray, low: FloatArray,
     """
     m = gradient.size
     step = np.zeros(m)
-    free = np.ones(m, bool)
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(curvature), 1e-300))
+    diagonal = np.diag(curvature)
+    free = diagonal > 1e-30  # what changes nothing stays where it is
+    dead = ~free
+    scale = np.where(free, 1.0 / np.sqrt(np.where(free, diagonal, 1.0)), 0.0)
     scaled = curvature * np.outer(scale, scale)
     for _ in range(4 * m):
         rest = gradient - curvature @ np.where(free, 0.0, step)
@@ -347,7 +387,7 @@ def bounded_step(curvature: FloatArray, gradient: FloatArray, low: FloatArray,
             continue
         slope = gradient - curvature @ step
         wrong = ~free & (((step <= low) & (slope > 0.0)) | ((step >= high) & (slope < 0.0)))
-        wrong &= high > low
+        wrong &= (high > low) & ~dead
         if not wrong.any():
             break
         # one at a time, the steepest: letting all go at once may cycle

@@ -28,15 +28,23 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from antenna_drive.gap.fit import bounded_step, FloatArray, Problem, scanned, State
+from antenna_drive.gap.fit import (
+    across, bounded_step, FloatArray, Problem, scanned, State, weighted_square,
+)
 from antenna_drive.gap.model import Form, Model, Parameter
 import numpy as np
+from numpy.typing import NDArray
 
 SINGLES = 14
-BASES = 4
-PARTNERS = 5
+FINALISTS = 6
+BASES = 3
+PARTNERS = 4
 # A partner that could gain less than this in half a chi-square is not fitted.
 WORTH = 12.0
+# The offsets alone are fitted in at most so many rounds; they were stuck if that much of the
+# cost goes once they begin elsewhere.
+ROUNDS = 4
+STUCK = 0.02
 # Fresh derivatives that gain less than this end a fit.
 SETTLED = 4.0
 _EARLY_S = 1.5
@@ -67,7 +75,7 @@ class Candidate:
 
     @property
     def cost(self) -> float:
-        """Return half the weighted sum of squares."""
+        """Return half a chi-square, robust, with the pull of the offsets."""
         return self.state.cost
 
 
@@ -77,7 +85,7 @@ class _Tangent:
 
     effect: str
     form: Form
-    columns: FloatArray
+    columns: NDArray[np.float32]
 
 
 def starts(form: Form) -> dict[str, float]:
@@ -107,13 +115,18 @@ class Search:
     def run(self) -> list[Candidate]:
         """Return every candidate that was fitted in earnest, the offsets alone first."""
         none = self._offsets()
-        self.progress(0.2, 'what each effect would do')
-        self._take_tangents(none.state)
-        self.progress(0.4, 'single effects')
-        singles = self._singles(none)
-        none = self._none_again(none, singles)
+        for _ in range(2):
+            self.progress(0.2, 'what each effect would do')
+            self._take_tangents(none.state)
+            self.progress(0.4, 'single effects')
+            singles = self._singles(none)
+            again = self._none_again(none, singles)
+            stuck = again.cost < (1.0 - STUCK) * none.cost
+            none = again
+            if not stuck:
+                break
         self.progress(0.7, 'pairs of effects')
-        pairs = self._pairs(singles)
+        pairs = self._pairs(none, singles)
         singles, pairs = self._again(singles, pairs)
         self.progress(1.0, 'done')
         return [none, *singles, *pairs]
@@ -125,10 +138,14 @@ class Search:
         self.progress(0.03, 'offsets')
         state = problem.start(self.model.nuisances, point)
         state = problem.fit(state, 12)
-        moved = self.placed(state.point())
-        if moved != state.point():
-            state = problem.start(self.model.nuisances, moved, state.jacobian)
-        state = problem.fit(problem.refreshed(state, central=False), 10)
+        for _ in range(ROUNDS):
+            cost = state.cost
+            moved = self.placed(state.point())
+            if moved != state.point():
+                state = problem.start(self.model.nuisances, moved, state.jacobian)
+            state = problem.fit(problem.refreshed(state, central=False), 10)
+            if cost - state.cost < 0.02 * cost:
+                break
         return Candidate((), (), state)
 
     def placed(self, point: dict[str, float]) -> dict[str, float]:
@@ -146,16 +163,17 @@ class Search:
         return [state.residual[self.problem.rows(k)].reshape(e.measured.shape) * e.noise
                 for k, e in enumerate(self.problem.experiments)]
 
-    def _columns(self, state: State, form: Form) -> FloatArray:
+    def _columns(self, state: State, form: Form) -> NDArray[np.float32]:
         """Return the derivatives by a form's parameters, nought by those of its shape."""
         point = {**state.point(), **starts(form)}
-        columns = np.zeros((state.residual.size, len(form.parameters)))
+        columns = np.zeros((state.residual.size, len(form.parameters)), np.float32)
         live = [j for j, p in enumerate(form.parameters) if not p.shape]
         columns[:, live] = self.problem.columns(
             point, [form.parameters[j] for j in live], state.residual, central=False)
         return columns
 
     def _take_tangents(self, state: State) -> None:
+        self.tangents = []
         residuals = self._residuals(state)
         count = len(self.model.effects)
         for i, effect in enumerate(self.model.effects.values()):
@@ -170,7 +188,7 @@ class Search:
         high = np.array([p.high for p in state.parameters]) - state.x
         pull = np.array([1.0 / p.spread ** 2 if p.spread else 0.0 for p in state.parameters])
         curvature = state.hessian + np.diag(pull)
-        gradient = state.jacobian.T @ (state.weight * state.residual) - pull * state.x
+        gradient = across(state.jacobian, state.weight * state.residual) - pull * state.x
         found: dict[str, list[tuple[float, _Tangent]]] = {}
         for tangent in self.tangents:
             if tangent.effect in besides:
@@ -178,10 +196,10 @@ class Search:
             live = [j for j, p in enumerate(tangent.form.parameters)
                     if not p.shape and p.name not in names]
             own = tangent.columns[:, live]
-            weighted_own = state.weight[:, np.newaxis] * own
-            cross = state.jacobian.T @ weighted_own
-            full = np.block([[curvature, cross], [cross.T, own.T @ weighted_own]])
-            slope = np.r_[gradient, weighted_own.T @ state.residual]
+            cross = weighted_square(state.jacobian, state.weight, own)
+            full = np.block([[curvature, cross],
+                             [cross.T, weighted_square(own, state.weight)]])
+            slope = np.r_[gradient, across(own, state.weight * state.residual)]
             parts = [tangent.form.parameters[j] for j in live]
             step = bounded_step(full + 1e-9 * np.diag(np.diag(full) + 1e-9), slope,
                                 np.r_[low, [p.low for p in parts]],
@@ -191,21 +209,24 @@ class Search:
         best = [max(forms, key=lambda pair: pair[0]) for forms in found.values()]
         return sorted(best, key=lambda pair: -pair[0])
 
-    def _fitted(self, base: Candidate, tangent: _Tangent, fresh: bool) -> Candidate:
-        """Fit an effect on top of a candidate."""
+    def _fitted(self, base: Candidate, tangent: _Tangent, fresh: bool, turns: int) -> Candidate:
+        """Fit an effect on top of a candidate, for so many turns."""
         form, problem = tangent.form, self.problem
         columns = self._columns(base.state, form) if fresh else tangent.columns
         values = [p.start for p in form.parameters]
         state = problem.widened(base.state, form.parameters, values, columns)
-        state = problem.fit(state, 8)
-        # where the effect is there, its shape matters and its derivatives are others
-        names = [p.name for p in form.parameters]
-        where = [j for j, p in enumerate(state.parameters) if p.name in names]
-        if any(p.shape for p in form.parameters):
-            state = problem.replaced(state, where, problem.columns(
-                state.point(), form.parameters, state.residual, central=True))
-            state = problem.fit(state, 8)
+        state = problem.fit(state, turns)
         return Candidate((*base.effects, tangent.effect), (*base.forms, form), state)
+
+    def _shaped(self, candidate: Candidate, turns: int) -> Candidate:
+        """Go on with a fit: where the effect is, its shape matters and its derivatives differ."""
+        state, parts = candidate.state, candidate.forms[-1].parameters
+        if any(p.shape for p in parts):
+            names = [p.name for p in parts]
+            where = [j for j, p in enumerate(state.parameters) if p.name in names]
+            state = self.problem.replaced(state, where, self.problem.columns(
+                state.point(), parts, state.residual, central=True))
+        return replace(candidate, state=self.problem.fit(state, turns))
 
     def _singles(self, none: Candidate) -> list[Candidate]:
         screened = self._screen(none.state)
@@ -213,8 +234,12 @@ class Search:
         chosen = screened[:SINGLES]
         found = []
         for i, (_, tangent) in enumerate(chosen):
-            self.progress(0.4 + 0.2 * i / len(chosen), 'single effects')
-            found.append(self._fitted(none, tangent, fresh=False))
+            self.progress(0.4 + 0.15 * i / len(chosen), 'single effects')
+            found.append(self._fitted(none, tangent, False, 5))
+        found.sort(key=lambda c: c.cost)
+        # those that are far behind after a few turns stay there
+        for i in range(min(FINALISTS, len(found))):
+            found[i] = self._shaped(found[i], 8)
         found.sort(key=lambda c: c.cost)
         for i in range(min(2, len(found))):
             found[i] = self._settled(found[i])
@@ -253,18 +278,21 @@ class Search:
                 best = again
         return best
 
-    def _pairs(self, singles: Sequence[Candidate]) -> list[Candidate]:
+    def _pairs(self, none: Candidate, singles: Sequence[Candidate]) -> list[Candidate]:
         found: dict[tuple[str, ...], Candidate] = {}
         share = 0.3 / (BASES * PARTNERS)
+        worth = max(WORTH, 0.02 * (none.cost - singles[0].cost))
         for base in singles[:BASES]:
             partners = [(gain, tangent) for gain, tangent in self._screen(
-                base.state, base.effects) if gain > WORTH][:PARTNERS]
+                base.state, base.effects) if gain > worth][:PARTNERS]
             for _, tangent in partners:
                 key = tuple(sorted((*base.effects, tangent.effect)))
                 if key in found:
                     continue
                 self.progress(0.7 + share * len(found), 'pairs of effects')
-                pair = self._fitted(base, tangent, fresh=True)
+                pair = self._fitted(base, tangent, True, 5)
+                if pair.cost < singles[0].cost:
+                    pair = self._shaped(pair, 6)
                 best = min((c.cost for c in found.values()), default=np.inf)
                 found[key] = pair if pair.cost < best else _light(pair)
         pairs = sorted(found.values(), key=lambda c: c.cost)
@@ -290,7 +318,7 @@ class Search:
 
 def _light(candidate: Candidate) -> Candidate:
     """Return the candidate without its derivatives, which take most of the memory."""
-    return replace(candidate, state=replace(candidate.state, jacobian=np.empty((0, 0)),
+    return replace(candidate, state=replace(candidate.state, jacobian=np.empty((0, 0), np.float32),
                                             weight=np.empty(0)))
 
 

@@ -1,0 +1,103 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Measure which effects a test can tell apart, and which tests separate most: before the antenna.
+
+A test is a test sheet (YAML), or one of the built-in ones. For each effect the least size that
+shows is given, and the groups of effects that pass for each other. With --each every test is
+judged by itself as well.
+
+examples:
+  antenna-drive confusability
+  antenna-drive confusability --excitation square triangle --each
+  antenna-drive confusability --excitation planned.yaml --json -
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+import sys
+
+from antenna_drive.cli.output import add_json_option, Progress, STANDARD_OUTPUT, write_json
+from antenna_drive.errors import UserError
+import numpy as np
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.add_argument('--excitation', nargs='+', metavar='TEST',
+                        default=['square', 'triangle', 'multisine'],
+                        help='test sheets, or square, triangle, multisine, chirp '
+                             '(default: square triangle multisine)')
+    parser.add_argument('--each', action='store_true', help='judge each test by itself, too')
+    parser.add_argument('--config', action='append', default=[], metavar='FILE',
+                        help='configuration of the model; may be given several times')
+    parser.add_argument('--duration', type=float, default=30.0, metavar='S',
+                        help='length of each test (default: 30)')
+    parser.add_argument('--rate', type=float, default=200.0, metavar='HZ',
+                        help='sample rate (default: 200)')
+    add_json_option(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Analyse the tests and say what they can tell."""
+    from antenna_drive.gap.confusability import BUILT_IN, confusability, planned
+    from antenna_drive.parameters.loading import load
+    from antenna_drive.recording.sheet import load_sheet
+
+    if not 1.0 <= arguments.duration <= 3600.0:
+        raise UserError(f'--duration: {arguments.duration:g} given, allowed is 1 to 3600 s')
+    if not 50.0 <= arguments.rate <= 10000.0:
+        raise UserError(f'--rate: {arguments.rate:g} given, allowed is 50 to 10000 Hz')
+    drive = load(*arguments.config)
+    tests = {}
+    for name in arguments.excitation:
+        sheet = BUILT_IN.get(name)
+        if sheet is None:
+            path = Path(name)
+            if not path.is_file():
+                raise UserError(f'--excitation: {name}: no such test sheet, and no built-in test; '
+                                f'built in are {", ".join(BUILT_IN)}')
+            sheet = load_sheet(path)
+            if sheet.waveform is None:
+                raise UserError(f'{path}: waveform: is missing, a planned test needs one')
+        tests[Path(name).stem] = planned(sheet, arguments.duration, arguments.rate)
+    sets = {' + '.join(tests): tests}
+    if arguments.each and len(tests) > 1:
+        sets.update({name: {name: test} for name, test in tests.items()})
+    found = {}
+    with Progress('confusability', len(sets)) as progress:
+        for i, (name, chosen) in enumerate(sets.items()):
+            found[name] = confusability(chosen, drive,
+                                        lambda share, i=i: progress.update(i + share))
+    if arguments.json:
+        write_json({name: {
+            'effects': [{'effect': effect, 'detectable': size if np.isfinite(size) else None,
+                         'unit': unit} for effect, size, unit in zip(
+                             item.effects, item.detectable.tolist(), item.units, strict=True)],
+            'confusable': item.groups(), 'pairs_separated': item.separated(),
+            'alike': item.alike} for name, item in found.items()}, arguments.json)
+    out = sys.stderr if arguments.json == STANDARD_OUTPUT else sys.stdout
+    whole = next(iter(found.values()))
+    print('least size that shows, and what passes for it', file=out)
+    for i, effect in enumerate(whole.effects):
+        others = [whole.effects[j] for j in np.argsort(-whole.alike[i])
+                  if j != i and whole.alike[i, j] > 0.95][:3]
+        print(f'  {effect:36s} {whole.detectable[i]:10.3g} {whole.units[i]:12s} '
+              + ', '.join(others), file=out)
+    for name, item in found.items():
+        print(f'{name}: {100.0 * item.separated():.1f} % of all pairs of effects told apart, '
+              f'{len(item.groups())} groups are not', file=out)
+    return 0
