@@ -21,7 +21,7 @@ takes their place. Two parameters that are sine and cosine parts act as one ampl
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math
 
@@ -335,6 +335,17 @@ def _sensor_effects(into: _Catalogue) -> None:
 
 DELAY = 'loop.delay.time'
 GUST = 'axis.wind_gust'
+# The gust's torque is free at times so far apart [s], with straight lines between.
+GUST_KNOT_S = 1.0
+
+
+def gust_form(durations: Sequence[float]) -> Form:
+    """Return the form of a gust: in each test a torque over time that is what it is."""
+    return Form('torque over time', tuple(
+        DriveParameter(f'{GUST}.torque:{k}:{i}', 'N m', -1e6, 1e6, 2e3, 3e4, experiment=k,
+                       how=SET, fields=(f'gust:{k}:{i}',))
+        for k, duration in enumerate(durations)
+        for i in range(int(duration / GUST_KNOT_S) + 2)))
 
 
 def catalogue() -> dict[str, Effect]:
@@ -347,6 +358,8 @@ def catalogue() -> dict[str, Effect]:
     _share_effects(into)
     _axis_effects(into)
     _sensor_effects(into)
+    into.add('axis', 'wind_gust', 'gusts on the dish, other ones in each test',
+             'both currents vary with time, by no angle or rate')
     into.add('loop', 'delay', 'the command passes a computer or a network first',
              'everything comes late', _form('loop.delay', _parameter(
                  'time', 's', 0.0, 0.2, 5e-4, SET)))

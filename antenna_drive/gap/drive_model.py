@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from typing import Any
 
@@ -151,6 +151,9 @@ class DriveModel:
         self.effects: dict[str, Effect] = catalogue.catalogue()
         self._tests = [self._test(name, recording, drive)
                        for name, recording in recordings.items()]
+        gust = self.effects[catalogue.GUST]
+        self.effects[gust.id] = replace(gust, forms=(catalogue.gust_form(
+            [float(test.time[-1]) for test in self._tests]),))
         given = [recording.sheet.parameter_tolerance for recording in recordings.values()
                  if recording.sheet.parameter_tolerance is not None]
         if not given:
@@ -372,14 +375,21 @@ class DriveModel:
              until: float = math.inf) -> FloatArray:
         record = test.record.copy()
         bias = test.bias
+        gust: dict[int, float] = {}
         for path, how, value in settings:
-            if path.startswith('supply:'):
+            if path.startswith('gust:'):
+                gust[int(path.rpartition(':')[2])] = value
+            elif path.startswith('supply:'):
                 bias = Bias(bias.before * (1.0 + value), bias.after * (1.0 + value), bias.at)
             else:
                 _apply(record, path, how, value)
         axis = record['plant']['axis']
         if axis['mode_inertias'][0, _EXTRA] > 0.0:
             axis['mode_inertias_count'] = _EXTRA + 1
+        if gust:
+            knots = np.arange(max(gust) + 1)
+            torque = (knots * catalogue.GUST_KNOT_S,
+                      np.array([gust.get(i, 0.0) for i in range(knots.size)]))
         plan = self._plan(test, bias, delay, torque)
         samples = int(np.count_nonzero(test.time < until))
         if samples == test.time.size:
@@ -391,10 +401,21 @@ class DriveModel:
         return out
 
     def _plan(self, test: _Test, bias: Bias, delay: float, torque: Any) -> batch.Schedule:
-        if delay or torque is not None:
+        if delay:
             return schedule(test.command, bias, test.time, LONGEST_STEP, delay, torque)
         if test.plan is None:
             test.plan = schedule(test.command, test.bias, test.time, LONGEST_STEP)
+        if torque is not None:
+            steps = test.plan.steps.copy()
+            ends = np.cumsum(steps[:, batch.LENGTH])
+            left = np.interp(ends - steps[:, batch.LENGTH], *torque)
+            steps[:, batch.TORQUE] = left
+            steps[:, batch.TORQUE_SLOPE] = (np.interp(ends, *torque) - left) / steps[
+                :, batch.LENGTH]
+            if bias != test.bias:
+                middle = ends - 0.5 * steps[:, batch.LENGTH]
+                steps[:, batch.FIXED_BIAS] = np.where(middle < bias.at, bias.before, bias.after)
+            return batch.Schedule(steps, test.plan.keep)
         if bias == test.bias:
             return test.plan
         steps = test.plan.steps.copy()
@@ -435,6 +456,8 @@ class DriveModel:
     def _foreign(self, setting: Setting, point: Point, experiment: int) -> bool:
         """Tell whether a setting belongs to another experiment."""
         path = setting[0]
+        if path.startswith('gust:'):
+            return int(path.split(':')[1]) != experiment
         if path.startswith('supply:'):
             return path != f'supply:{self._tests[experiment].name}'
         if not path.endswith('start_in_gap'):

@@ -35,6 +35,7 @@ TEMPERATURE = 4.0
 # Price of an effect, of each of its numbers, of a wave whose cycles were searched for.
 EFFECT_PRICE = 8.0
 PARAMETER_PRICE = 4.0
+PULLED_PRICE = 1.5
 WAVE_PRICE = 6.0
 # The unknown: where an excess of slow residual over noise tips the scales, and how sharply.
 EXCESS = 0.10
@@ -55,7 +56,10 @@ class Ranked:
 
 def score(candidate: Candidate) -> float:
     """Return the cost of a candidate with the prices of its effects."""
-    price = EFFECT_PRICE * len(candidate.effects) + PARAMETER_PRICE * candidate.parameters
+    price = EFFECT_PRICE * len(candidate.effects)
+    # a number that is pulled to nought pays in part by that
+    price += sum(PULLED_PRICE if p.spread else PARAMETER_PRICE
+                 for form in candidate.forms for p in form.parameters)
     price += WAVE_PRICE * sum(isinstance(form, Wave) for form in candidate.forms)
     return candidate.cost + price
 
