@@ -88,9 +88,11 @@ def test_everything_but_the_nodes_can_be_imported(prefix: Path) -> None:
 
 
 @pytest.mark.parametrize('node', NODES)
-def test_node_says_what_is_missing(prefix: Path, node: str) -> None:
+def test_node_says_what_is_missing(prefix: Path, node: str, tmp_path: Path) -> None:
     """A node says in one line what is missing and how to get it."""
-    done = run(prefix, node)
+    recording = tmp_path / 'field.csv'
+    recording.write_text('time_s,rate_command_rad_s\n0.0,0.0\n0.01,0.0\n')
+    done = run(prefix, node, *([str(recording)] if node == 'command_player' else []))
     assert (done.returncode, done.stdout) == (NOT_INSTALLED, '')
     assert done.stderr.count('\n') == 1
     assert 'rclpy' in done.stderr and 'ROS 2' in done.stderr
