@@ -46,6 +46,9 @@ Progress = Callable[[float, str], None]
 _ENTRIES = 12
 _LEAST = 1e-4
 _BLOCK_S = 1.0
+_TURNS = ('each recording in turn, with the effect as the others have it; offsets within the '
+          'tolerance were fitted to it, with the effect and without')
+_HALVES = 'the second half of the recording, predicted from the first'
 _RESAMPLES = 400
 
 
@@ -131,7 +134,9 @@ def _diagnosed(model: DriveModel, progress: Progress, began: float,
     none = candidates[0]
     best = verdict.best(candidates)
     excess = _excess(problem, best.state)
-    ranked, unknown = verdict.rank(candidates, excess)
+    left = _left(problem, none, best)
+    unknown = verdict.unknown_probability(excess, left)
+    ranked = verdict.rank(candidates, unknown)
     progress(0.9, 'how far it goes')
     how_far = _how_far(problem, none, best)
     entries: list[dict[str, Any]] = []
@@ -148,7 +153,7 @@ def _diagnosed(model: DriveModel, progress: Progress, began: float,
     for entry in entries:
         entry['probability'] /= total
     entries.sort(key=lambda entry: -entry['probability'])
-    word = _word(entries[0]['effects'], how_far, excess)
+    word = _word(entries[0]['effects'], unknown)
     motions = [model.motion(k) for k in range(len(model.experiments))]
     result = {
         'verdict': word,
@@ -164,12 +169,12 @@ def _diagnosed(model: DriveModel, progress: Progress, began: float,
     return Diagnosis(result, model, none, best, candidates, notes)
 
 
-def _word(top: list[str], how_far: dict[str, Any], excess: float) -> str:
+def _word(top: list[str], unknown: float) -> str:
     if top == ['none']:
         return 'no_gap'
     if top == ['unknown']:
         return 'unknown_effect'
-    return 'explained' if excess < verdict.EXCESS else 'partly_explained'
+    return 'explained' if unknown < 0.3 else 'partly_explained'
 
 
 def _z(problem: Problem, state: State, k: int) -> FloatArray:
@@ -194,6 +199,25 @@ def _excess(problem: Problem, state: State) -> float:
         found += [residuals.structure(z[:, c]) for c in range(len(experiment.channels))
                   if experiment.channels[c] != 'encoder' and np.isfinite(z[:, c]).sum() > 50]
     return float(np.mean(np.maximum(found, -0.5))) if found else 0.0
+
+
+def _left(problem: Problem, none: Candidate, best: Candidate) -> float:
+    """Return the share of the raw gap above the noise that the best candidate leaves."""
+    raw = problem.residuals([{}])[0]
+    noise = 0.0
+    energy = np.zeros(2)
+    for k, experiment in enumerate(problem.experiments):
+        z = _z(problem, best.state, k)
+        first = raw[problem.rows(k)].reshape(experiment.measured.shape)
+        for c in range(len(experiment.channels)):
+            if experiment.channels[c] == 'encoder' or not np.isfinite(z[:, c]).any():
+                continue
+            white = 0.5 * float(np.nanmean(np.diff(z[:, c]) ** 2))
+            energy += [min(float(np.nanmean(z[:, c] ** 2)), 1e6) - white,
+                       min(float(np.mean(first[:, c] ** 2)), 1e6) - white]
+            noise += white
+    del none
+    return float(np.clip(energy[0] / max(energy[1], 0.05 * noise), 0.0, 1.0))
 
 
 def _tests(problem: Problem, state: State, excess: float,
@@ -296,8 +320,7 @@ def _how_far(problem: Problem, none: Candidate, best: Candidate) -> dict[str, An
     return {'before': math.sqrt(energy[0]), 'after': math.sqrt(energy[1]), 'noise_floor': floor,
             'explained_fraction': {'value': fraction, 'ci95': interval},
             'per_signal': per_signal,
-            'held_out': ('each recording in turn, predicted from the others' if count > 1 else
-                         'the second half of the recording, predicted from the first')}
+            'held_out': _TURNS if count > 1 else _HALVES}
 
 
 def _unseen(problem: Problem, candidate: Candidate, k: int) -> FloatArray:
@@ -314,15 +337,17 @@ def _unseen(problem: Problem, candidate: Candidate, k: int) -> FloatArray:
     fitted = training.start(state.parameters, state.point(), state.jacobian)
     fitted = training.fit(fitted, 6)
     if len(experiments) > 1:
-        # what belongs to the withheld test alone, such as where its motors started, is free
-        own = [j for j, p in enumerate(fitted.parameters) if p.experiment == k]
-        tied = [p for p in fitted.parameters if p.experiment != k]
+        # The effect is as the other tests have it. Offsets within the tolerance are no part of
+        # it: they are fitted to the withheld test alone, with the effect and without.
+        effects = {p.name for form in candidate.forms for p in form.parameters
+                   if p.experiment != k}
+        own = [j for j, p in enumerate(fitted.parameters) if p.name not in effects]
         values = fitted.point()
-        fixed = {p.name: values[p.name] for p in tied}
+        fixed = {name: values[name] for name in effects}
         testing = _Held(problem.model, [np.full(e.time.size, i == k)
                                         for i, e in enumerate(experiments)], fixed)
         parts = [fitted.parameters[j] for j in own]
-        here = testing.start(parts, state.point(), state.jacobian[:, own])
+        here = testing.start(parts, values, state.jacobian[:, own])
         fitted = testing.fit(here, 6)
         return _z(testing, fitted, k)
     whole = _z(problem, problem.start(state.parameters, fitted.point(), state.jacobian), k)

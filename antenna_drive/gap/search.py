@@ -191,7 +191,8 @@ class Search:
         gradient = across(state.jacobian, state.weight * state.residual) - pull * state.x
         found: dict[str, list[tuple[float, _Tangent]]] = {}
         for tangent in self.tangents:
-            if tangent.effect in besides:
+            if tangent.effect in besides or (besides and len(tangent.form.parameters) > 10):
+                # what is free at every moment explains the remains of anything
                 continue
             live = [j for j, p in enumerate(tangent.form.parameters)
                     if not p.shape and p.name not in names]
@@ -242,17 +243,20 @@ class Search:
             found[i] = self._shaped(found[i], 8)
         found.sort(key=lambda c: c.cost)
         for i in range(min(2, len(found))):
-            found[i] = self._settled(found[i])
+            found[i] = self._settled(found[i], 1)
         found.sort(key=lambda c: c.cost)
         return [*found[:BASES], *(_light(c) for c in found[BASES:])]
 
     def _settled(self, candidate: Candidate, rounds: int = 3) -> Candidate:
         """Fit with fresh derivatives of everything until that gains nothing any more."""
         state = candidate.state
-        for _ in range(rounds):
+        for i in range(rounds):
             cost = state.cost
-            state = self.problem.fit(self.problem.refreshed(state, central=False), 10)
-            if cost - state.cost < SETTLED:
+            point = self.placed(state.point()) if i == 0 else state.point()
+            if point != state.point():
+                state = self.problem.start(state.parameters, point, state.jacobian)
+            state = self.problem.fit(self.problem.refreshed(state, central=i > 0), 10)
+            if cost - state.cost < max(SETTLED, 2e-4 * cost):
                 break
         return replace(candidate, state=state)
 
@@ -302,8 +306,8 @@ class Search:
                ) -> tuple[list[Candidate], list[Candidate]]:
         """Settle the best pair, and fit each of its members alone from where it ends."""
         if not pairs or pairs[0].cost > singles[0].cost - WORTH:
-            return list(singles), list(pairs)
-        best = self._settled(pairs[0], 2)
+            return [self._settled(singles[0]), *singles[1:]], list(pairs)
+        best = self._settled(pairs[0])
         members = {}
         for effect in best.effects:
             alone = self._without(best, effect)

@@ -31,15 +31,21 @@ from antenna_drive.gap.catalogue import Wave
 from antenna_drive.gap.search import Candidate
 import numpy as np
 
-TEMPERATURE = 4.0
-# Price of an effect, of each of its numbers, of a wave whose cycles were searched for.
-EFFECT_PRICE = 8.0
+TEMPERATURE = 8.0
+# Price of an effect, of each of its numbers, of a number that is pulled to nought and so pays
+# in part by that, of a wave whose cycles were searched for.
+EFFECT_PRICE = 20.0
 PARAMETER_PRICE = 4.0
 PULLED_PRICE = 1.5
-WAVE_PRICE = 6.0
-# The unknown: where an excess of slow residual over noise tips the scales, and how sharply.
-EXCESS = 0.10
-SHARPNESS = 2.5
+WAVE_PRICE = 10.0
+# No form of an effect is quite the machine's: a second effect must do more than mend the first,
+# and pays so much, and such a share of what the first explains.
+SECOND_PRICE = 60.0
+SECOND_SHARE = 0.05
+# The unknown: how far the slow residual is above noise, and the share of the gap that is left,
+# each as a logarithm against the value that tips the scales.
+EXCESS, LEFT = 0.6, 0.06
+EXCESS_WEIGHT, LEFT_WEIGHT = 1.6, 1.6
 # Candidates within so much of the best cannot be told from it.
 ALIKE = 14.0
 LARGEST_GROUP = 5
@@ -54,39 +60,71 @@ class Ranked:
     probability: float
 
 
-def score(candidate: Candidate) -> float:
-    """Return the cost of a candidate with the prices of its effects."""
-    price = EFFECT_PRICE * len(candidate.effects)
-    # a number that is pulled to nought pays in part by that
+def score(candidate: Candidate, gap: float) -> float:
+    """
+    Return the cost of a candidate with the prices of its effects.
+
+    Parameters
+    ----------
+    candidate : a fitted one
+    gap : what the best single effect gains over the offsets alone
+
+    """
+    count = len(candidate.effects)
+    price = EFFECT_PRICE * count
     price += sum(PULLED_PRICE if p.spread else PARAMETER_PRICE
                  for form in candidate.forms for p in form.parameters)
     price += WAVE_PRICE * sum(isinstance(form, Wave) for form in candidate.forms)
+    if count > 1:
+        price += (count - 1) * (SECOND_PRICE + SECOND_SHARE * gap)
     return candidate.cost + price
 
 
-def rank(candidates: Sequence[Candidate], excess: float) -> tuple[list[Ranked], float]:
+def gap_of(candidates: Sequence[Candidate]) -> float:
+    """Return what the best single effect gains over the offsets alone."""
+    none = min(c.cost for c in candidates if not c.effects)
+    single = min((c.cost for c in candidates if len(c.effects) == 1), default=none)
+    return max(none - single, 0.0)
+
+
+def unknown_probability(excess: float, left: float) -> float:
     """
-    Return the candidates by probability, and the probability of something unknown.
+    Return how probable it is that something outside the catalogue is at work.
+
+    Parameters
+    ----------
+    excess : slow residual of the best candidate, over white noise, 0 if it is noise
+    left : share of the gap that the best candidate leaves, 0 to 1
+
+    """
+    logit = (EXCESS_WEIGHT * math.log(max(excess, 1e-3) / EXCESS)
+             + LEFT_WEIGHT * math.log(max(left, 1e-3) / LEFT))
+    return 1.0 / (1.0 + math.exp(-min(max(logit, -8.0), 8.0)))
+
+
+def rank(candidates: Sequence[Candidate], unknown: float) -> list[Ranked]:
+    """
+    Return the candidates by probability.
 
     Parameters
     ----------
     candidates : fitted ones, the offsets alone among them
-    excess : how much of the best one's residual is no noise, from `excess`
+    unknown : probability of something else, from `unknown_probability`
 
     """
-    scores = np.array([score(c) for c in candidates])
+    gap = gap_of(candidates)
+    scores = np.array([score(c, gap) for c in candidates])
     weight = np.exp(-(scores - scores.min()) / TEMPERATURE)
     weight /= weight.sum()
-    unknown = 1.0 / (1.0 + math.exp(-SHARPNESS * math.log(max(excess, 1e-6) / EXCESS)))
-    unknown = min(unknown, 0.999)
     ranked = [Ranked(c, float(s), float(w) * (1.0 - unknown))
               for c, s, w in zip(candidates, scores, weight, strict=True)]
-    return sorted(ranked, key=lambda r: r.score), unknown
+    return sorted(ranked, key=lambda r: r.score)
 
 
 def best(candidates: Sequence[Candidate]) -> Candidate:
     """Return the candidate with the least score."""
-    return min(candidates, key=score)
+    gap = gap_of(candidates)
+    return min(candidates, key=lambda c: score(c, gap))
 
 
 def confusable(candidates: Sequence[Candidate]) -> list[list[str]]:
@@ -96,15 +134,15 @@ def confusable(candidates: Sequence[Candidate]) -> list[list[str]]:
     Effects belong together if one in the other's place costs hardly more. A group holds at
     most LARGEST_GROUP, the likeliest of them.
     """
-    top = best(candidates)
-    limit = score(top) + ALIKE
+    top, gap = best(candidates), gap_of(candidates)
+    limit = score(top, gap) + ALIKE
     groups: list[list[str]] = []
     for effect in top.effects:
         rest = set(top.effects) - {effect}
-        others = sorted((score(c), next(iter(set(c.effects) - rest)))
+        others = sorted((score(c, gap), next(iter(set(c.effects) - rest)))
                         for c in candidates
                         if len(c.effects) == len(top.effects) and rest < set(c.effects)
-                        and effect not in c.effects and score(c) < limit)
+                        and effect not in c.effects and score(c, gap) < limit)
         names = list(dict.fromkeys(name for _, name in others))[:LARGEST_GROUP - 1]
         if names:
             groups.append([effect, *names])
