@@ -46,6 +46,8 @@ from rcl_interfaces.srv import SetParameters  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rosbags.highlevel import AnyReader  # noqa: E402
 
+# Times real time: what two cores keep up with while they run the tests as well.
+KEPT_PACE = 0.4
 SQUARE: dict[str, Any] = {'waveform': 'square', 'amplitude': 0.001, 'period': 1.0}
 
 
@@ -161,7 +163,7 @@ def test_the_record_command_loses_nothing_and_changes_nothing(
 def test_a_recorder_joins_a_running_drive_and_keeps_every_step(
         tmp_path: Path, fresh_domain: int) -> None:
     (tmp_path / 'sheet.yaml').write_text('circuit: new\n')
-    with Drive(pace=1.0) as drive:
+    with Drive(pace=KEPT_PACE) as drive:
         drive.until(lambda: drive.step > 1500)  # longer than the nodes remember
         with recorder(f'out:={tmp_path}/run', f'sheet:={tmp_path}/sheet.yaml') as process:
             drive.until(lambda: process.said('recording from step'))
@@ -184,7 +186,7 @@ def test_a_recorder_joins_a_running_drive_and_keeps_every_step(
 
 
 def test_a_killed_recorder_loses_a_second_at_most(tmp_path: Path, fresh_domain: int) -> None:
-    with Drive(pace=1.0) as drive:
+    with Drive(pace=KEPT_PACE) as drive:
         with recorder(f'out:={tmp_path}/run') as process:
             drive.until(lambda: process.said('recording from step'))
             begun = drive.step
@@ -206,7 +208,7 @@ def test_a_killed_recorder_loses_a_second_at_most(tmp_path: Path, fresh_domain: 
 
 
 def test_a_new_run_gets_a_new_bag(tmp_path: Path, fresh_domain: int) -> None:
-    with Drive(pace=1.0) as drive, recorder(f'out:={tmp_path}/run') as process:
+    with Drive(pace=KEPT_PACE) as drive, recorder(f'out:={tmp_path}/run') as process:
         drive.until(lambda: process.said('recording from step'))
         drive.processes.kill('motor_1')
         drive.processes.start('motor_1')
@@ -290,7 +292,7 @@ def test_wrong_arguments_are_refused_in_one_line(tmp_path: Path,
             assert len(process.lines) == 1
             assert words in process.lines[0]
     for arguments, words in (
-            (['--set', 'motor_3.x=1'], '--set motor_3.x=1: allowed is UNIT.NAME=VALUE'),
+            (['--set', 'motor_3.x=1'], '--set motor_3.x=1: motor_3: no such unit, did you mean motor_2'),
             (['--sheet', 'none.yaml'], 'none.yaml: No such file'),
             (['--set', 'motor_1.gear=1'], 'motor_1 has ended with status 2')):
         assert main(['record', '--duration', '1', '--out', str(tmp_path / 'run'),
