@@ -6,13 +6,14 @@ READY := $(VENV)/ready
 PY := $(VENV)/bin/python
 PYTEST_ARGS ?=
 
-.PHONY: help set-up demo test quick lint bench clean
+.PHONY: help set-up demo test trials quick lint bench clean
 
 help:
 	@echo 'make demo    set everything up, then run the saw-tooth test on the old and the new'
 	@echo '             circuit in five ROS 2 processes; results in out/demo'
 	@echo 'make test    the whole suite with the linters and mypy; PYTEST_ARGS="-k backlash"'
 	@echo '             runs a part'
+	@echo 'make trials  what make test leaves out because it takes minutes'
 	@echo 'make quick   the suite without what takes more than a few seconds'
 	@echo 'make lint    the linters and mypy alone'
 	@echo 'make bench   measure speed'
@@ -32,15 +33,19 @@ demo: $(READY)
 	$(VENV)/bin/antenna-drive demo
 
 test: $(READY)
-	$(PY) -m pytest $(PYTEST_ARGS)
+	$(PY) -m pytest -m 'not trial' $(PYTEST_ARGS)
+
+trials: $(READY)
+	$(PY) -m pytest -m trial $(PYTEST_ARGS)
 
 quick: $(READY)
-	$(PY) -m pytest -m 'not slow' $(PYTEST_ARGS)
+	$(PY) -m pytest -m 'not slow and not trial' $(PYTEST_ARGS)
 
 lint: $(READY)
 	$(PY) -m pytest test/lint $(PYTEST_ARGS)
 
 bench: $(READY)
+	$(PY) -m pip install --quiet --disable-pip-version-check --editable '.[bench]'
 	$(VENV)/bin/antenna-drive bench
 
 clean:

@@ -51,7 +51,7 @@ def test_equation_14_alone_splits_the_load_between_the_motors() -> None:
     assert torques[:, 1] - torques[:, 0] == pytest.approx([0.0, 20.0, 0.0])
 
 
-@pytest.mark.slow
+@pytest.mark.trial
 @pytest.mark.parametrize('circuit', ['old_circuit', 'new_circuit'])
 @pytest.mark.parametrize('share', loaded_axis.SHARES)
 def test_the_loaded_axis_keeps_the_bias_and_carries_the_load(circuit: str, share: float) -> None:

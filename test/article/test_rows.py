@@ -111,7 +111,7 @@ def test_field_and_analysis_stand_side_by_side() -> None:
     assert says['T3b.high'] == {'field': 11.4, 'analysis': 11.6}
 
 
-@pytest.mark.slow
+@pytest.mark.trial
 def test_static_profile_and_loaded_axis_rows_pass() -> None:
     found = rows(Results(with_circuits()), ['T5'])
     assert [row.id for row in found if not row.passed] == []

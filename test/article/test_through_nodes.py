@@ -24,7 +24,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 
-@pytest.mark.slow
+@pytest.mark.trial
 def test_five_processes_give_the_rows_of_one(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fresh_domain: int) -> None:
     from antenna_drive.cli import article

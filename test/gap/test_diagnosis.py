@@ -83,7 +83,7 @@ def check_schema(result):
     assert far['before'] >= 0.0 and far['after'] >= 0.0 and far['noise_floor'] > 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.trial
 @pytest.mark.parametrize('effect, value', [
     ('motor_1.torque_constant.change', -0.15), ('axis.viscous_friction.torque_per_rate', 8e7),
     ('tach_2.gain.change', 0.02), ('loop.delay.time', 0.02),
@@ -99,7 +99,7 @@ def test_known_effect_is_named(effect, value):
     assert diagnosis.result['how_far']['explained_fraction']['value'] > 0.9
 
 
-@pytest.mark.slow
+@pytest.mark.trial
 def test_offsets_within_the_tolerance_are_no_gap():
     diagnosis = diagnose(made(OFFSETS, 12.0), load())
     check_schema(diagnosis.result)
@@ -109,7 +109,7 @@ def test_offsets_within_the_tolerance_are_no_gap():
     assert 'http' not in text.replace('http-equiv', '')
 
 
-@pytest.mark.slow
+@pytest.mark.trial
 def test_what_no_effect_can_do_is_unknown():
     recordings = made(OFFSETS, 12.0)
     odd = {}
@@ -125,7 +125,7 @@ def test_what_no_effect_can_do_is_unknown():
     assert diagnosis.result['verdict'] == 'unknown_effect'
 
 
-@pytest.mark.slow
+@pytest.mark.trial
 def test_one_current_alone_still_gives_an_answer(tmp_path):
     recordings = made({'motor_1.torque_constant.change': -0.3}, 8.0, ('square',),
                       ('motor_1/ammeter',))

@@ -48,6 +48,10 @@ class Decay:
         """Return the one form."""
         return effect.forms
 
+    def absorbed(self, point, gone):
+        """Return the offsets as they are."""
+        return dict(point)
+
     def simulate(self, points, only=None, until=math.inf):
         """Return the closed form."""
         time = self.experiments[0].time

@@ -38,7 +38,7 @@ import numpy as np
 import pytest
 
 FEW, MANY = 300, 5000
-COUNTS = [pytest.param(FEW, id='few'), pytest.param(MANY, id='many', marks=pytest.mark.slow)]
+COUNTS = [pytest.param(FEW, id='few'), pytest.param(MANY, id='many', marks=pytest.mark.trial)]
 SHEET = """\
 circuit: new
 bias: {type: fixed_step, voltage_V: 5.69, at_s: 1.0}
