@@ -63,7 +63,8 @@ setup(
     name=PACKAGE,
     version='0.1.0',
     packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
-    package_data={PACKAGE: ['py.typed', '**/*.yaml', '**/*.html', '**/*.js', '**/*.css']},
+    package_data={PACKAGE: ['py.typed', '**/*.yaml', '**/*.html', '**/*.js', '**/*.css',
+                            '**/*.c']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
         (f'share/{PACKAGE}', ['package.xml']),
@@ -102,6 +103,14 @@ setup(
             'flake8-quotes',
             'pydocstyle >= 6.1',
             'vermin',  # tells what the oldest Python lacks
+        ],
+        # what the emulator is measured against, and dask as a cluster; PathSim and Drake change
+        # from release to release, so not older than those that the benchmark was written with
+        'bench': [
+            'control >= 0.10',
+            'pathsim >= 0.27',
+            f'drake >= 1.51 ; {WHEELS_EXIST}',
+            'dask[distributed] >= 2024.1',
         ],
         'colcon': ['colcon-core >= 0.15', 'colcon-ros', 'colcon-common-extensions'],
     },

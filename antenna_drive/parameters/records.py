@@ -16,12 +16,14 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from functools import cache
 from typing import Any, get_type_hints
 
 from antenna_drive.parameters.schema import Entry
 import numpy as np
 
 
+@cache
 def dtype_of(kind: type) -> np.dtype[Any]:
     """
     Return the record type of a parameter set, with a record in it for each set within.
@@ -29,7 +31,7 @@ def dtype_of(kind: type) -> np.dtype[Any]:
     Numbers become float64, choices and whole numbers int64, lists a fixed number of float64 with
     their length in `<name>_count`.
     """
-    hints = get_type_hints(kind)
+    hints: dict[str, Any] = get_type_hints(kind)
     parts: list[tuple[Any, ...]] = []
     for item in fields(kind):
         entry = item.metadata.get('entry')
@@ -47,7 +49,7 @@ def dtype_of(kind: type) -> np.dtype[Any]:
 
 def record_of(parameters: Any) -> np.ndarray[Any, np.dtype[Any]]:
     """Return a parameter set as an array of one record, to vary by field or to repeat."""
-    record = np.zeros(1, dtype_of(type(parameters)))
+    record = np.zeros(1, dtype_of(type(parameters))  # type: ignore[arg-type])
     _fill(record, parameters)
     return record
 

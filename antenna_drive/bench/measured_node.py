@@ -1,0 +1,47 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+One of the drive's nodes as it is, with a watch on its steps.
+
+python -m antenna_drive.bench.measured_node UNIT FILE LAST --ros-args ...
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+from antenna_drive.bench.stamps import Stamps
+from antenna_drive.lockstep.processes import MODULES
+
+
+def main() -> int:
+    """Run the node of UNIT and note its steps; return its exit code."""
+    from antenna_drive.emulator.unit import FloatArray
+    from antenna_drive.lockstep import node
+
+    unit, path, last, *arguments = sys.argv[1:]
+    stamps = Stamps(path, int(last))
+
+    class MeasuredNode(node.DriveNode):
+        def _publish(self, outputs: FloatArray) -> None:
+            super()._publish(outputs)
+            stamps.note(self._member.step)
+
+    node.DriveNode = MeasuredNode  # type: ignore[misc]
+    return int(importlib.import_module(MODULES[unit]).main(arguments))
+
+
+if __name__ == '__main__':
+    sys.exit(main())

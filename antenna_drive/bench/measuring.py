@@ -1,0 +1,92 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Measurements taken in turn, so that whatever else the machine does falls on all alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+import gc
+import os
+from pathlib import Path
+import platform
+import time
+from typing import Any
+
+import numpy as np
+
+Figure = dict[str, Any]
+
+
+def figure(values: Sequence[float], unit: str = '1') -> Figure:
+    """Return median, least and greatest of what was measured, and every single value."""
+    return {'median': float(np.median(values)), 'min': float(min(values)),
+            'max': float(max(values)), 'unit': unit, 'values': [float(v) for v in values]}
+
+
+def ratio(above: Sequence[float], below: Sequence[float]) -> Figure:
+    """Return the figure of the ratios, each of two values of the same turn."""
+    return figure([a / b for a, b in zip(above, below, strict=True)])
+
+
+def in_turn(work: Mapping[str, Callable[[], object]], repetitions: int) -> dict[str, list[float]]:
+    """
+    Time each piece of work once in each turn, A B A B, after one turn that does not count.
+
+    Parameters
+    ----------
+    work
+        by name
+    repetitions
+        turns
+
+    Returns
+    -------
+    wall times [s] by name, one for each turn
+
+    """
+    for piece in work.values():
+        piece()
+    times: dict[str, list[float]] = {name: [] for name in work}
+    gc.collect()
+    for _ in range(repetitions):
+        for name, piece in work.items():
+            began = time.perf_counter()
+            piece()
+            times[name].append(time.perf_counter() - began)
+    return times
+
+
+def machine() -> dict[str, Any]:
+    """Return what a reader must know of the machine, and how busy it was just now."""
+    from importlib import metadata
+
+    versions = {}
+    for name in ('numpy', 'numba', 'scipy', 'control', 'pathsim', 'drake', 'distributed',
+                 'ros-rclpy'):
+        try:
+            versions[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return {'processor': _processor(), 'cores': os.cpu_count(),
+            'system': platform.platform(terse=True), 'python': platform.python_version(),
+            'versions': versions, 'load_average': list(os.getloadavg())}
+
+
+def _processor() -> str:
+    try:
+        lines = Path('/proc/cpuinfo').read_text().splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line.partition(':')[2].strip() for line in lines
+                 if line.startswith('model name')), platform.machine())

@@ -1,0 +1,91 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a user waits for: the import, the first step, the demo."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import os
+from pathlib import Path
+import subprocess
+import sys
+import tempfile
+import time
+from typing import Any
+
+from antenna_drive.bench import measuring
+
+_INTERPRETER = 'pass'
+_LIBRARIES = 'import numba, numpy'
+_IMPORT = 'import antenna_drive.emulator.run'
+_FIRST_STEP = ('from antenna_drive.emulator.run import Emulator; '
+               'from antenna_drive.parameters import load; Emulator(load()).advance(1)')
+_SAY_WHEN = '; import time; print(time.time())'
+
+
+def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> dict[str, Any]:
+    """
+    Measure starts of processes of their own, in turn.
+
+    Returns
+    -------
+    from the start of the process to the import of what, or to the end of the first step [s]:
+    interpreter_s, libraries_s, import_s, second_first_step_s (compiled before) and
+    first_first_step_s (nothing compiled yet); second_over_libraries, and demo_s
+
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        warm = {'NUMBA_CACHE_DIR': str(Path(folder, 'warm'))}
+        progress('starts')
+        work: dict[str, Callable[[], float]] = {
+            'interpreter_s': lambda: _until_said(_INTERPRETER, warm),
+            'libraries_s': lambda: _until_said(_LIBRARIES, warm),
+            'import_s': lambda: _until_said(_IMPORT, warm),
+            'second_first_step_s': lambda: _until_said(_FIRST_STEP, warm)}
+        values: dict[str, list[float]] = {name: [] for name in work}
+        for turn in range(repetitions + 1):
+            for name, piece in work.items():
+                took = piece()
+                if turn:  # the first compiles and fills the disk's cache
+                    values[name].append(took)
+        progress('starts with nothing compiled')
+        values['first_first_step_s'] = [
+            _until_said(_FIRST_STEP, {'NUMBA_CACHE_DIR': str(Path(folder, f'cold {turn}'))})
+            for turn in range(1 if quick else repetitions)]
+    result: dict[str, Any] = {name: measuring.figure(taken, 's')
+                              for name, taken in values.items()}
+    result['second_over_libraries'] = measuring.ratio(values['second_first_step_s'],
+                                                      values['libraries_s'])
+    progress('demo')
+    demo = [_demo() for _ in range(1 if quick else repetitions)]
+    if all(demo):
+        result['demo_s'] = measuring.figure([took for took in demo if took], 's')
+    else:
+        result['left_out'] = {'demo': 'antenna-drive demo cannot be run here'}
+    return result
+
+
+def _until_said(code: str, environment: dict[str, str]) -> float:
+    began = time.time()
+    done = subprocess.run([sys.executable, '-c', code + _SAY_WHEN], capture_output=True,
+                          env={**os.environ, **environment}, text=True, check=True)
+    return float(done.stdout) - began
+
+
+def _demo() -> float | None:
+    with tempfile.TemporaryDirectory() as folder:
+        began = time.monotonic()
+        done = subprocess.run([sys.executable, '-m', 'antenna_drive', 'demo', '--out', folder],
+                              capture_output=True, check=False)
+        return time.monotonic() - began if done.returncode == 0 else None

@@ -1,0 +1,117 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The groups of the benchmark, one after another, and their figures as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+import importlib
+import time
+from typing import Any
+
+from antenna_drive.bench.measuring import machine
+from antenna_drive.errors import UserError
+
+_MODULES = {'transport': 'transport', 'simulation': 'simulation', 'batch': 'batches',
+            'diagnosis': 'diagnosis', 'start': 'start'}
+
+# What each headline figure is to be: at least (+) or at most (-) the number.
+GOALS: dict[str, tuple[str, float]] = {
+    'transport.ratio_to_bare': ('+', 0.8),
+    'transport.rtf_1ms': ('+', 2.0),
+    'transport.late_fraction': ('-', 1e-3),
+    'simulation.speedup.python_control': ('+', 50.0),
+    'simulation.speedup.pathsim': ('+', 50.0),
+    'simulation.speedup.solve_ivp': ('+', 20.0),
+    'simulation.speedup.drake': ('+', 5.0),
+    'simulation.ratio_to_c': ('+', 0.5),
+    'batch.two_core_speedup': ('+', 1.8),
+    'start.second_first_step_s': ('-', 1.5),
+}
+
+
+def measure(groups: Iterable[str], repetitions: int, quick: bool,
+            progress: Callable[[str], None]) -> dict[str, Any]:
+    """
+    Measure groups one after another.
+
+    Parameters
+    ----------
+    groups
+        names of groups
+    repetitions
+        turns of which each median is taken
+    quick
+        shorter runs and fewer settings
+    progress
+        told what is being done
+
+    Returns
+    -------
+    the machine, and for each group its figures; a group that cannot be measured here has instead
+    an entry `left_out` that says why
+
+    """
+    result: dict[str, Any] = {'machine': machine(), 'quick': quick, 'repetitions': repetitions}
+    for group in groups:
+        module = importlib.import_module(f'antenna_drive.bench.{_MODULES[group]}')
+        began = time.monotonic()
+        try:
+            result[group] = module.measure(repetitions, quick, partial(_told, progress, group))
+        except ModuleNotFoundError as error:
+            result[group] = {'left_out': {group: f'{error.name} is not installed'}}
+        except UserError as error:
+            result[group] = {'left_out': {group: str(error)}}
+        result[group]['wall_s'] = time.monotonic() - began
+    result['load_average_after'] = machine()['load_average']
+    return result
+
+
+def _told(progress: Callable[[str], None], group: str, doing: str) -> None:
+    progress(f'{group}: {doing}')
+
+
+def table(result: Mapping[str, Any]) -> str:
+    """Return every figure of a result, one on a line, with the goal where there is one."""
+    lines = [f'{"figure":<52} {"median":>10} {"least":>10} {"greatest":>10}  goal']
+    for name, item in figures(result):
+        goal = ''
+        if name in GOALS:
+            sign, bound = GOALS[name]
+            goal = f'{"at least" if sign == "+" else "at most"} {bound:g}, ' + (
+                'reached' if reached(name, item['median']) else 'not reached')
+        lines.append(f'{name:<52} {item["median"]:10.4g} {item["min"]:10.4g} '
+                     f'{item["max"]:10.4g}  {goal}'.rstrip())
+    for group in _MODULES:
+        for what, why in result.get(group, {}).get('left_out', {}).items():
+            lines.append(f'{group}: {what} left out, {why}')
+    return '\n'.join(lines)
+
+
+def reached(name: str, value: float) -> bool:
+    """Return whether a headline figure is what it is to be."""
+    sign, bound = GOALS[name]
+    return value >= bound if sign == '+' else value <= bound
+
+
+def figures(result: Mapping[str, Any], prefix: str = '') -> Iterable[tuple[str, Any]]:
+    """Yield dotted name and figure of every figure in a result."""
+    for name, item in result.items():
+        if not isinstance(item, Mapping):
+            continue
+        if 'median' in item:
+            yield f'{prefix}{name}', item
+        else:
+            yield from figures(item, f'{prefix}{name}.')

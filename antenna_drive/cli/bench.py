@@ -1,0 +1,73 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Measure speed: every figure a ratio of two things taken in turn, in one run.
+
+Groups:
+  transport   five processes against the bare exchange of the same frames
+  simulation  one process against solve_ivp, python-control, PathSim and Drake at equal accuracy,
+              and against the same loop in C
+  batch       many variants on all cores, through an executor of the caller's
+  diagnosis   wall time and memory of a diagnosis
+  start       import, first step, demo
+
+Peers that are not installed are left out, and the result says so: pip install
+'antenna_drive[bench]' has them all. Each figure is a median of at least five with least and
+greatest; the single values are in the JSON. Leave the machine alone while it measures.
+
+For example:
+  antenna-drive bench --quick
+  antenna-drive bench --json bench.json
+  antenna-drive bench --only simulation --json -
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from antenna_drive.cli.output import add_json_option, STANDARD_OUTPUT, write_json
+
+GROUPS = ('start', 'simulation', 'batch', 'diagnosis', 'transport')
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    parser.add_argument('--quick', action='store_true',
+                        help='shorter runs and fewer settings: within five minutes')
+    parser.add_argument('--only', action='append', choices=GROUPS, metavar='GROUP',
+                        help=f'one of {", ".join(GROUPS)}; may be repeated (default: all)')
+    parser.add_argument('--repetitions', type=int, default=5, metavar='N',
+                        help='turns, of which the median is taken (default: %(default)s)')
+    add_json_option(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure, and print the table or write the JSON; 0 whatever the figures."""
+    from antenna_drive.bench import suite
+    from antenna_drive.errors import UserError
+
+    if arguments.repetitions < 1:
+        raise UserError(f'--repetitions: {arguments.repetitions} given, allowed is 1 or more')
+    result = suite.measure(arguments.only or GROUPS, arguments.repetitions, arguments.quick,
+                           _say)
+    if arguments.json:
+        write_json(result, arguments.json)
+    if arguments.json != STANDARD_OUTPUT:
+        print(suite.table(result))
+    return 0
+
+
+def _say(doing: str) -> None:
+    print(f'bench: {doing}', file=sys.stderr, flush=True)
