@@ -18,7 +18,8 @@ A test is a test sheet (YAML), or one of the built-in ones. For each effect the 
 shows is given, and the groups of effects that pass for each other. With --each every test is
 judged by itself as well.
 
-examples:
+For example:
+
   antenna-drive confusability
   antenna-drive confusability --excitation square triangle --each
   antenna-drive confusability --excitation planned.yaml --json -
@@ -80,8 +81,10 @@ def run(arguments: argparse.Namespace) -> int:
     found = {}
     with Progress('confusability', len(sets)) as progress:
         for i, (name, chosen) in enumerate(sets.items()):
-            found[name] = confusability(chosen, drive,
-                                        lambda share, i=i: progress.update(i + share))
+            def advance(share: float, i: int = i) -> None:
+                progress.update(i + share)
+
+            found[name] = confusability(chosen, drive, advance)
     if arguments.json:
         write_json({name: {
             'effects': [{'effect': effect, 'detectable': size if np.isfinite(size) else None,

@@ -11,16 +11,17 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""
+r"""
 Say where a real drive and the model part, which effect is behind it, and how far it goes.
 
 Give one or more recordings of the same machine (CSV, with the test sheet NAME.yaml beside
 NAME.csv, or a bag). The more different the tests, the surer the verdict: a slow square wave, a
 triangle and a chirp or multisine of half a minute each are a good programme.
 
-examples:
+For example:
+
   antenna-drive diagnose field.csv
-  antenna-drive diagnose rec_a.csv rec_b.csv rec_c.csv --config my_drive.yaml \\
+  antenna-drive diagnose rec_a.csv rec_b.csv rec_c.csv --config my_drive.yaml \
       --json verdict.json --report verdict.html
 """
 

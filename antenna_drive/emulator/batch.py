@@ -111,8 +111,8 @@ _advance = located_runge_kutta(_rates, _switch)
 
 
 @compiled
-def _run(p, steps, keep, x, dx, mode, motor, share, plant, work, y_motor, y_share, y_plant,
-         out):  # type: ignore[no-untyped-def]
+def _run(  # type: ignore[no-untyped-def]
+        p, steps, keep, x, dx, mode, motor, share, plant, work, y_motor, y_share, y_plant, out):
     """Run one variant over a table of steps; write what the sensors say into out."""
     drive = p[0]
     u = (steps[0], motor, share, plant)
@@ -179,8 +179,10 @@ def run(record: np.ndarray[Any, np.dtype[Any]], schedule: Schedule) -> FloatArra
 
     Parameters
     ----------
-    record : of Drive, from `record_of`, shape (1,); left as it is
-    schedule : of the test
+    record
+        of Drive, from `record_of`, shape (1,); left as it is
+    schedule
+        of the test
 
     Returns
     -------

@@ -23,10 +23,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 from antenna_drive.gap.drive_model import CHANNELS, DriveModel
 from antenna_drive.gap.excitation import SheetCommand
-from antenna_drive.gap.fit import FloatArray, Problem
+from antenna_drive.gap.fit import Problem
+from antenna_drive.gap.model import FloatArray
 from antenna_drive.gap.search import starts
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.recording import Recording
@@ -117,17 +119,21 @@ def confusability(tests: Mapping[str, Recording], drive: Drive,
 
     Parameters
     ----------
-    tests : planned or made ones, by name
-    drive : the configuration
-    progress : called with the share that is done
-    threads : simulations at once
+    tests
+        planned or made ones, by name
+    drive
+        the configuration
+    progress
+        called with the share that is done
+    threads
+        simulations at once
 
     """
     model = DriveModel(tests, drive, threads)
     predicted = model.simulate([{}])[0]
     model.experiments = tuple(
-        replace(e, measured=np.asarray(p)) for e, p in zip(model.experiments, predicted,
-                                                          strict=True))
+        replace(e, measured=np.asarray(p))
+        for e, p in zip(model.experiments, predicted, strict=True))
     problem = Problem(model)
     state = problem.start(model.nuisances, {})
     pull = np.array([1.0 / p.spread ** 2 if p.spread else 0.0 for p in state.parameters])
@@ -136,7 +142,7 @@ def confusability(tests: Mapping[str, Recording], drive: Drive,
     count = len(model.effects)
     for i, effect in enumerate(model.effects.values()):
         progress(i / count)
-        form = effect.forms[0]
+        form: Any = effect.forms[0]
         if hasattr(form, 'at'):
             form = form.at(form.orders[min(11, len(form.orders) - 1)])
             model.register(form)

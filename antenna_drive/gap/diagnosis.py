@@ -34,8 +34,8 @@ from typing import Any
 
 from antenna_drive.gap import residuals, verdict
 from antenna_drive.gap.drive_model import DriveModel
-from antenna_drive.gap.fit import FloatArray, Problem, State
-from antenna_drive.gap.model import Model
+from antenna_drive.gap.fit import Problem, State
+from antenna_drive.gap.model import FloatArray, Model
 from antenna_drive.gap.search import Candidate, parameters_of, Search
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.recording import Recording
@@ -111,10 +111,14 @@ def diagnose(recordings: Mapping[str, Recording], drive: Drive,
 
     Parameters
     ----------
-    recordings : of one machine, by name, with their test sheets
-    drive : the configuration of the model
-    progress : called with the share that is done, 0 to 1, and what is being done
-    threads : how many simulations at once
+    recordings
+        of one machine, by name, with their test sheets
+    drive
+        the configuration of the model
+    progress
+        called with the share that is done, 0 to 1, and what is being done
+    threads
+        how many simulations at once
 
     Raises
     ------
@@ -302,7 +306,8 @@ def _how_far(problem: Problem, none: Candidate, best: Candidate) -> dict[str, An
     seen = [np.isfinite(z).sum() for z in before]
     energy = [float(np.nansum(np.concatenate([np.ravel(z) for z in part]) ** 2) / sum(seen))
               for part in (before, after)]
-    fraction, interval = None, [None, None]
+    fraction: float | None = None
+    interval: list[float | None] = [None, None]
     if best.effects:
         sums = [_blocks(problem.experiments[k].time, before[k], after[k]) for k in range(count)]
         blocks = np.concatenate(sums)

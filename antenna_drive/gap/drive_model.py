@@ -25,7 +25,7 @@ from typing import Any
 from antenna_drive.emulator import batch
 from antenna_drive.errors import UserError
 from antenna_drive.gap import catalogue
-from antenna_drive.gap.catalogue import ADD, DriveParameter, SCALE, SET, Setting, Wave
+from antenna_drive.gap.catalogue import ADD, DriveParameter, SCALE, Setting, Wave
 from antenna_drive.gap.excitation import Bias, Command, RecordedCommand, schedule, SheetCommand
 from antenna_drive.gap.model import Effect, Experiment, FloatArray, Form, Point
 from antenna_drive.gap.residuals import Motion
@@ -75,7 +75,7 @@ _CACHE = 400
 
 @dataclass(frozen=True)
 class Sensors:
-    """What the sensors add: standard deviations, steps; where the sheet says nothing, usual ones."""
+    """What the sensors add: standard deviations and steps; usual ones if the sheet is silent."""
 
     current_noise: float = 0.01
     current_step: float = 0.01
@@ -130,10 +130,14 @@ class DriveModel:
 
     Parameters
     ----------
-    recordings : of one machine, by name
-    drive : the configuration
-    threads : how many runs at once
-    tolerance : of the parameters, where no sheet gives it
+    recordings
+        of one machine, by name
+    drive
+        the configuration
+    threads
+        how many runs at once
+    tolerance
+        of the parameters, where no sheet gives it
 
     Raises
     ------
@@ -160,7 +164,7 @@ class DriveModel:
             self.notes.append(f'no sheet gives parameter_tolerance: {tolerance:g} assumed')
         self.tolerance = max(given, default=tolerance)
         self.nuisances = self._nuisances()
-        self._by_name = {item.name: item for item in self.nuisances}
+        self._by_name: dict[str, Any] = {item.name: item for item in self.nuisances}
         for effect in self.effects.values():
             for form in effect.forms:
                 self._by_name.update((item.name, item) for item in form.parameters)
@@ -211,7 +215,9 @@ class DriveModel:
         time = self._times(recording)
         spacing = np.diff(time)
         line = np.polyval(np.polyfit(np.arange(time.size), time, 1), np.arange(time.size))
-        jitter = float(min(np.std(time - line), 0.5 * np.median(spacing))) if time.size > 3 else 0.0
+        jitter = 0.0
+        if time.size > 3:
+            jitter = float(min(np.std(time - line), 0.5 * np.median(spacing)))
         return _Test(name, record, command, bias, time, Sensors.of(sheet.sensors), jitter)
 
     def _bias(self, name: str, given: sheets.Bias | None, drive: Drive) -> tuple[Drive, Bias]:
@@ -331,6 +337,20 @@ class DriveModel:
         """Make a wave's parameters known."""
         for part, item in enumerate(wave.parameters):
             self._waves[item.name] = (wave, part)
+
+    def absorbed(self, point: Point, gone: Point) -> dict[str, float]:
+        """Return the offsets that do as much as they can of what an effect did."""
+        result = dict(point)
+        for name, value in gone.items():
+            item = self._by_name.get(name)
+            if not isinstance(item, DriveParameter) or item.how != SCALE:
+                continue
+            for path in item.fields:
+                offset = self._by_name.get(f'offset:{path}')
+                if offset is not None and offset.name in result:
+                    both = (1.0 + result[offset.name]) * (1.0 + value) - 1.0
+                    result[offset.name] = min(max(both, offset.low), offset.high)
+        return result
 
     def _orders(self, form: Wave, residuals: Sequence[FloatArray]) -> list[float]:
         """Return the cycles per revolution with which the residuals vary most."""
@@ -556,4 +576,3 @@ def _apply(record: np.ndarray[Any, np.dtype[Any]], path: str, how: str, value: f
         field[index] += value
     else:
         field[index] = value
-

@@ -136,11 +136,16 @@ def schedule(command: Command, bias: Bias, samples: FloatArray, longest: float,
 
     Parameters
     ----------
-    command, bias : what the test does
-    samples : when the sensors are read, increasing, none before zero, shape (n,) [s]
-    longest : longest step [s]
-    delay : by which the command comes late [s]
-    torque : times [s] and values [N m] of a torque on the axis, straight lines between
+    command, bias
+        what the test does
+    samples
+        when the sensors are read, increasing, none before zero, shape (n,) [s]
+    longest
+        longest step [s]
+    delay
+        by which the command comes late [s]
+    torque
+        times [s] and values [N m] of a torque on the axis, straight lines between
 
     """
     end = float(samples[-1])

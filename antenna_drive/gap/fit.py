@@ -78,8 +78,10 @@ class Problem:
 
     Parameters
     ----------
-    model : the machine
-    used : for each experiment which samples are fitted, shape (n,) of bool; None for all
+    model
+        the machine
+    used
+        for each experiment which samples are fitted, shape (n,) of bool; None for all
 
     """
 
@@ -120,10 +122,14 @@ class Problem:
 
         Parameters
         ----------
-        point : where
-        parameters : by what
-        residual : at the point, for one-sided differences
-        central : take two sides where the bounds leave room for them
+        point
+            where
+        parameters
+            by what
+        residual
+            at the point, for one-sided differences
+        central
+            take two sides where the bounds leave room for them
 
         """
         variants, only, plan = [], [], []
@@ -274,12 +280,18 @@ def scanned(problem: Problem, point: dict[str, float], names: Sequence[str], exp
 
     Parameters
     ----------
-    problem : what is fitted
-    point : the values of everything else
-    names : the parameters that are tried
-    experiment : the one that they act on
-    grid : values of all of `names`, one row for each trial
-    until : how much of the experiment is looked at [s]
+    problem
+        what is fitted
+    point
+        the values of everything else
+    names
+        the parameters that are tried
+    experiment
+        the one that they act on
+    grid
+        values of all of `names`, one row for each trial
+    until
+        how much of the experiment is looked at [s]
 
     """
     trials = [point, *({**point, **dict(zip(names, values, strict=True))} for values in grid)]
@@ -357,9 +369,12 @@ def bounded_step(curvature: FloatArray, gradient: FloatArray, low: FloatArray,
 
     Parameters
     ----------
-    curvature : symmetric and positive definite, shape (m, m)
-    gradient : shape (m,)
-    low, high : bounds of the step, low <= 0 <= high, shape (m,)
+    curvature
+        symmetric and positive definite, shape (m, m)
+    gradient
+        shape (m,)
+    low, high
+        bounds of the step, low <= 0 <= high, shape (m,)
 
     """
     m = gradient.size
@@ -378,8 +393,8 @@ def bounded_step(curvature: FloatArray, gradient: FloatArray, low: FloatArray,
                 factor = linalg.cho_factor(part + 1e-12 * np.eye(index.size))
                 step[index] = scale[index] * linalg.cho_solve(factor, (scale * rest)[index])
             except linalg.LinAlgError:
-                step[index] = scale[index] * np.linalg.lstsq(part, (scale * rest)[index],
-                                                            rcond=1e-10)[0]
+                step[index] = scale[index] * np.linalg.lstsq(
+                    part, (scale * rest)[index], rcond=1e-10)[0]
         out = free & ((step < low) | (step > high))
         if out.any():
             step = np.clip(step, low, high)

@@ -86,7 +86,7 @@ class Effect:
 
     """
 
-    id: str
+    id: str  # noqa: A003: the word of the verdict's format
     component: str
     cause: str
     look: str
@@ -138,8 +138,23 @@ class Model(Protocol):
 
         Parameters
         ----------
-        effect : of the catalogue
-        residuals : of each experiment: measured less predicted without the effect, shape (n, c)
+        effect
+            of the catalogue
+        residuals
+            of each experiment: measured less predicted without the effect, shape (n, c)
+
+        """
+
+    def absorbed(self, point: Point, gone: Point) -> dict[str, float]:
+        """
+        Return the offsets that do as much as they can of what an effect did.
+
+        Parameters
+        ----------
+        point
+            the offsets
+        gone
+            values of the effect's parameters
 
         """
 
@@ -151,9 +166,12 @@ class Model(Protocol):
 
         Parameters
         ----------
-        points : parameter values by name, one mapping for each variant; the rest is neutral
-        only : for each variant the one experiment that is wanted, None for all
-        until : end of the simulation [s]; what would come later is NaN
+        points
+            parameter values by name, one mapping for each variant; the rest is neutral
+        only
+            for each variant the one experiment that is wanted, None for all
+        until
+            end of the simulation [s]; what would come later is NaN
 
         Returns
         -------

@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""One page about a diagnosis, for a servo engineer with two minutes: self-contained, no network."""
+"""One page about a diagnosis, for an engineer with two minutes: self-contained, no network."""
 
 from __future__ import annotations
 
@@ -51,7 +51,8 @@ _WIDTH, _HEIGHT = 760, 150
 _POINTS = 900
 
 _STYLE = """
-body{font:15px/1.45 system-ui,sans-serif;color:#222;max-width:820px;margin:24px auto;padding:0 16px}
+body{font:15px/1.45 system-ui,sans-serif;color:#222;
+  max-width:820px;margin:24px auto;padding:0 16px}
 h1{font-size:26px;margin:0 0 2px}h2{font-size:18px;margin:28px 0 6px}
 .lead{font-size:17px;color:#444;margin:0 0 14px}
 table{border-collapse:collapse;width:100%}td,th{padding:3px 8px;text-align:left;
@@ -127,7 +128,8 @@ def _which(result: dict[str, Any]) -> str:
             for name, item in entry['parameters'].items())
         rows.append(f'<tr><td class="n">{100.0 * share:.1f} %</td>'
                     f'<td><span class="bar" style="width:{120.0 * share:.0f}px"></span></td>'
-                    f'<td><b>{names}</b><div class="small">{escape(causes)}</div>{values}</td></tr>')
+                    f'<td><b>{names}</b><div class="small">{escape(causes)}</div>'
+                    f'{values}</td></tr>')
     groups = ''.join(f'<p>These data cannot tell apart: {escape(", ".join(group))}.</p>'
                      for group in result['confusable'])
     return ('<h2>Which effect</h2><table><tr><th class="n">probability</th><th></th>'

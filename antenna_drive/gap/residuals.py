@@ -73,7 +73,8 @@ def structure(z: FloatArray) -> float:
 
     Parameters
     ----------
-    z : residual at even times, shape (n,)
+    z
+        residual at even times, shape (n,)
 
     """
     z = z[np.isfinite(z)]
@@ -119,8 +120,10 @@ def dependences(experiments: Sequence[Experiment], motions: Sequence[Motion],
 
     Parameters
     ----------
-    experiments, motions : of each test
-    residuals : in standard deviations, shape (n, c) for each test
+    experiments, motions
+        of each test
+    residuals
+        in standard deviations, shape (n, c) for each test
 
     """
     found = []
@@ -141,4 +144,4 @@ def dependences(experiments: Sequence[Experiment], motions: Sequence[Motion],
             share = dependence(z, np.concatenate(values))
             if share > 0.02:
                 found.append({'signal': channel, 'depends_on': name, 'share': share})
-    return sorted(found, key=lambda item: -float(item['share']))[:8]
+    return sorted(found, key=lambda item: -float(str(item['share'])))[:8]

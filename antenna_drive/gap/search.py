@@ -29,9 +29,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from antenna_drive.gap.fit import (
-    across, bounded_step, FloatArray, Problem, scanned, State, weighted_square,
+    across, bounded_step, Problem, scanned, State, weighted_square,
 )
-from antenna_drive.gap.model import Form, Model, Parameter
+from antenna_drive.gap.model import FloatArray, Form, Model, Parameter
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,7 +43,7 @@ PARTNERS = 4
 WORTH = 12.0
 # The offsets alone are fitted in at most so many rounds; they were stuck if that much of the
 # cost goes once they begin elsewhere.
-ROUNDS = 4
+ROUNDS = 5
 STUCK = 0.02
 # Fresh derivatives that gain less than this end a fit.
 SETTLED = 4.0
@@ -99,8 +99,10 @@ class Search:
 
     Parameters
     ----------
-    problem : the model against its experiments
-    progress : called with the share that is done, 0 to 1, and what is being done
+    problem
+        the model against its experiments
+    progress
+        called with the share that is done, 0 to 1, and what is being done
 
     """
 
@@ -144,7 +146,7 @@ class Search:
             if moved != state.point():
                 state = problem.start(self.model.nuisances, moved, state.jacobian)
             state = problem.fit(problem.refreshed(state, central=False), 10)
-            if cost - state.cost < 0.02 * cost:
+            if cost - state.cost < 0.003 * cost:
                 break
         return Candidate((), (), state)
 
@@ -268,7 +270,10 @@ class Search:
         names = {p.name for p in candidate.forms[gone].parameters}
         state = candidate.state
         own = [j for j, p in enumerate(state.parameters) if p.name not in names]
-        point = {state.parameters[j].name: float(state.x[j]) for j in own}
+        values = state.point()
+        point = self.model.absorbed(
+            {state.parameters[j].name: values[state.parameters[j].name] for j in own},
+            {name: values[name] for name in names})
         again = self.problem.start([state.parameters[j] for j in own], point,
                                    state.jacobian[:, own])
         return Candidate(effects, forms, self.problem.fit(again, 12))

@@ -66,8 +66,10 @@ def score(candidate: Candidate, gap: float) -> float:
 
     Parameters
     ----------
-    candidate : a fitted one
-    gap : what the best single effect gains over the offsets alone
+    candidate
+        a fitted one
+    gap
+        what the best single effect gains over the offsets alone
 
     """
     count = len(candidate.effects)
@@ -93,8 +95,10 @@ def unknown_probability(excess: float, left: float) -> float:
 
     Parameters
     ----------
-    excess : slow residual of the best candidate, over white noise, 0 if it is noise
-    left : share of the gap that the best candidate leaves, 0 to 1
+    excess
+        slow residual of the best candidate, over white noise, 0 if it is noise
+    left
+        share of the gap that the best candidate leaves, 0 to 1
 
     """
     logit = (EXCESS_WEIGHT * math.log(max(excess, 1e-3) / EXCESS)
@@ -108,8 +112,10 @@ def rank(candidates: Sequence[Candidate], unknown: float) -> list[Ranked]:
 
     Parameters
     ----------
-    candidates : fitted ones, the offsets alone among them
-    unknown : probability of something else, from `unknown_probability`
+    candidates
+        fitted ones, the offsets alone among them
+    unknown
+        probability of something else, from `unknown_probability`
 
     """
     gap = gap_of(candidates)

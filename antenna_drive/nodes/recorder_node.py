@@ -58,7 +58,8 @@ def run(arguments: Sequence[str]) -> int:
 
     Parameters
     ----------
-    arguments : command line without the program's name
+    arguments
+        command line without the program's name
 
     Returns
     -------

@@ -49,7 +49,8 @@ def dtype_of(kind: type) -> np.dtype[Any]:
 
 def record_of(parameters: Any) -> np.ndarray[Any, np.dtype[Any]]:
     """Return a parameter set as an array of one record, to vary by field or to repeat."""
-    record = np.zeros(1, dtype_of(type(parameters))  # type: ignore[arg-type])
+    kind: Any = type(parameters)
+    record = np.zeros(1, dtype_of(kind))
     _fill(record, parameters)
     return record
 

@@ -163,6 +163,8 @@ class Channel:
         ----------
         time_ns
             array of shape (m,), int64 [ns]; inside the span of the samples
+        method
+            one of METHODS
 
         Returns
         -------

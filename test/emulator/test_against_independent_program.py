@@ -19,6 +19,8 @@ another integrator (Dormand-Prince with dense output, tolerance 1e-8), other cod
 friction. Where both agree a mistake would have to have been made twice.
 """
 
+from typing import Any
+
 from antenna_drive.article.experiments import experiments
 from antenna_drive.emulator.run import simulate
 from antenna_drive.trial.machine import reference_machine
@@ -33,7 +35,7 @@ STEADY = {'type': 'circuit', 'start': 'steady'}
 ZERO = {'type': 'circuit', 'start': 'zero'}
 
 # Each experiment of ours, told once more in the words of the other program.
-SHEETS = {
+SHEETS: dict[str, tuple[str, dict[str, Any], dict[str, Any], float]] = {
     'T1': ('old', {'type': 'fixed', 'voltage_V': 0.0}, SQUARE, 0.7),
     'T2': ('old', {'type': 'fixed', 'voltage_V': 0.15 * 5.049 * 8.192149}, SQUARE, 0.7),
     'T3a': ('old', STEADY, TRIANGLE, 0.8),

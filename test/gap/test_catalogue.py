@@ -15,6 +15,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from antenna_drive.emulator import batch
 from antenna_drive.emulator.run import simulate
 from antenna_drive.gap.catalogue import catalogue, DriveParameter, Wave
@@ -51,13 +53,13 @@ REQUIRED = {
 
 
 @pytest.fixture(scope='module')
-def model():
+def model() -> Any:
     """Return the drive in two short tests of which nothing was read."""
     return DriveModel({name: planned(BUILT_IN[name], 4.0, 200.0)
                        for name in ('square', 'triangle')}, load(), threads=1)
 
 
-def forms_of(model, effect):
+def forms_of(model: Any, effect: Any) -> Any:
     """Return all forms of an effect, a wave at its first order."""
     for form in model.effects[effect.id].forms:
         if isinstance(form, Wave):
@@ -66,12 +68,12 @@ def forms_of(model, effect):
         yield form
 
 
-def test_catalogue_holds_what_the_specification_names():
+def test_catalogue_holds_what_the_specification_names() -> None:
     assert set(catalogue()) == REQUIRED
 
 
 @pytest.mark.parametrize('effect', catalogue().values(), ids=lambda effect: effect.id)
-def test_effect_is_neutral_until_it_has_a_size(model, effect):
+def test_effect_is_neutral_until_it_has_a_size(model: Any, effect: Any) -> None:
     reference = model.simulate([{}])[0]
     for form in forms_of(model, effect):
         assert form.parameters[0].low <= 0.0 <= form.parameters[0].high
@@ -81,7 +83,7 @@ def test_effect_is_neutral_until_it_has_a_size(model, effect):
 
 
 @pytest.mark.parametrize('effect', catalogue().values(), ids=lambda effect: effect.id)
-def test_effect_changes_some_reading(model, effect):
+def test_effect_changes_some_reading(model: Any, effect: Any) -> None:
     reference = model.simulate([{}])[0]
     changed_one = False
     for form in forms_of(model, effect):
@@ -93,7 +95,7 @@ def test_effect_changes_some_reading(model, effect):
     assert changed_one or effect.id.endswith('current_limit')
 
 
-def test_every_field_of_the_catalogue_is_one_of_the_record():
+def test_every_field_of_the_catalogue_is_one_of_the_record() -> None:
     record = record_of(load())
     for effect in catalogue().values():
         for form in effect.forms:
@@ -106,7 +108,7 @@ def test_every_field_of_the_catalogue_is_one_of_the_record():
                             place = place[part]
 
 
-def test_batch_agrees_with_the_converged_emulator():
+def test_batch_agrees_with_the_converged_emulator() -> None:
     drive = changed(load('new_circuit'), {
         'test_signal.rate.waveform': 'square', 'test_signal.rate.amplitude': 7.4e-4,
         'test_signal.rate.period': 3.0, 'motor_1.start_in_gap': -0.3,

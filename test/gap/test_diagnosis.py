@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import json
 import math
+from typing import Any
 
 from antenna_drive.cli import main
 from antenna_drive.errors import UserError
@@ -43,7 +44,8 @@ OFFSETS = {
 }
 
 
-def made(point, seconds, names=('square', 'triangle'), keep=tuple(CHANNELS), seed=0):
+def made(point: Any, seconds: float, names: tuple[str, ...] = ('square', 'triangle'),
+         keep: tuple[str, ...] = tuple(CHANNELS), seed: int = 0) -> dict[str, Recording]:
     """Return recordings of a drive with these parameter values."""
     tests = {name: planned(BUILT_IN[name], seconds, 100.0) for name in names}
     model = DriveModel(tests, load(), threads=1)
@@ -51,7 +53,7 @@ def made(point, seconds, names=('square', 'triangle'), keep=tuple(CHANNELS), see
         for form in effect.forms:
             if hasattr(form, 'at'):
                 model.register(form.at(12.0))
-    values = model.simulate([point])[0]
+    values: Any = model.simulate([point])[0]
     random = np.random.default_rng(seed)
     recordings = {}
     for (name, test), read in zip(tests.items(), values, strict=True):
@@ -65,7 +67,7 @@ def made(point, seconds, names=('square', 'triangle'), keep=tuple(CHANNELS), see
     return recordings
 
 
-def check_schema(result):
+def check_schema(result: Any) -> Any:
     """Check what the JSON promises."""
     assert json.loads(json.dumps(result, allow_nan=False)) is not None
     assert result['verdict'] in ('no_gap', 'explained', 'partly_explained', 'unknown_effect')
@@ -88,7 +90,7 @@ def check_schema(result):
     ('motor_1.torque_constant.change', -0.15), ('axis.viscous_friction.torque_per_rate', 8e7),
     ('tach_2.gain.change', 0.02), ('loop.delay.time', 0.02),
 ])
-def test_known_effect_is_named(effect, value):
+def test_known_effect_is_named(effect: Any, value: Any) -> None:
     diagnosis = diagnose(made({**OFFSETS, effect: value}, 12.0), load())
     check_schema(diagnosis.result)
     top = diagnosis.result['which'][0]
@@ -100,7 +102,7 @@ def test_known_effect_is_named(effect, value):
 
 
 @pytest.mark.trial
-def test_offsets_within_the_tolerance_are_no_gap():
+def test_offsets_within_the_tolerance_are_no_gap() -> None:
     diagnosis = diagnose(made(OFFSETS, 12.0), load())
     check_schema(diagnosis.result)
     assert diagnosis.result['verdict'] == 'no_gap'
@@ -110,7 +112,7 @@ def test_offsets_within_the_tolerance_are_no_gap():
 
 
 @pytest.mark.trial
-def test_what_no_effect_can_do_is_unknown():
+def test_what_no_effect_can_do_is_unknown() -> None:
     recordings = made(OFFSETS, 12.0)
     odd = {}
     for name, recording in recordings.items():
@@ -126,7 +128,7 @@ def test_what_no_effect_can_do_is_unknown():
 
 
 @pytest.mark.trial
-def test_one_current_alone_still_gives_an_answer(tmp_path):
+def test_one_current_alone_still_gives_an_answer(tmp_path: Any) -> None:
     recordings = made({'motor_1.torque_constant.change': -0.3}, 8.0, ('square',),
                       ('motor_1/ammeter',))
     write_csv(recordings['square'], tmp_path / 'field.csv')
@@ -139,20 +141,20 @@ def test_one_current_alone_still_gives_an_answer(tmp_path):
     assert '</html>' in report.read_text()
 
 
-def test_recording_without_a_command_is_refused():
+def test_recording_without_a_command_is_refused() -> None:
     recording = Recording.from_arrays([0.0, 0.01], {'motor_1/current': [0.0, 1.0]})
     with pytest.raises(UserError, match='rate command'):
         DriveModel({'field': recording}, load())
 
 
-def test_recording_of_a_command_alone_is_refused():
+def test_recording_of_a_command_alone_is_refused() -> None:
     time = np.arange(100) * 0.01
     recording = Recording.from_arrays(time, {'test_signal/rate_command': np.sin(time)})
     with pytest.raises(UserError, match='at least one current'):
         DriveModel({'field': recording}, load())
 
 
-def test_confusability_knows_what_one_elevation_cannot_tell():
+def test_confusability_knows_what_one_elevation_cannot_tell() -> None:
     tests = {name: planned(BUILT_IN['triangle'], 6.0, 100.0) for name in ('a',)}
     found = confusability(tests, load(), threads=1)
     at = {effect: i for i, effect in enumerate(found.effects)}

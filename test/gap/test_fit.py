@@ -16,6 +16,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from antenna_drive.gap.fit import bounded_step, huber_sum, Problem
 from antenna_drive.gap.model import Effect, Experiment, Form, Parameter
@@ -44,22 +45,22 @@ class Decay:
             'toy', time, ('y',), ('1',), (clean + noise * random.normal(size=400))[:, np.newaxis],
             np.full((400, 1), noise)),)
 
-    def forms(self, effect, residuals):
+    def forms(self, effect: Any, residuals: Any) -> Any:
         """Return the one form."""
         return effect.forms
 
-    def absorbed(self, point, gone):
+    def absorbed(self, point: Any, gone: Any) -> Any:
         """Return the offsets as they are."""
         return dict(point)
 
-    def simulate(self, points, only=None, until=math.inf):
+    def simulate(self, points: Any, only: Any = None, until: Any = math.inf) -> Any:
         """Return the closed form."""
         time = self.experiments[0].time
         return [[(np.exp(-p.get('rate', 0.0) * time) + p.get('offset', 0.0))[:, np.newaxis]]
                 for p in points]
 
 
-def test_fit_finds_the_known_answer():
+def test_fit_finds_the_known_answer() -> None:
     model = Decay(0.7, 0.01)
     problem = Problem(model)
     state = problem.fit(problem.start((OFFSET, RATE), {}), 20)
@@ -67,14 +68,14 @@ def test_fit_finds_the_known_answer():
     assert state.value('offset') == pytest.approx(0.0, abs=0.01)
 
 
-def test_fit_never_leaves_the_bounds():
+def test_fit_never_leaves_the_bounds() -> None:
     model = Decay(5.0, 0.01)
     problem = Problem(model)
     state = problem.fit(problem.start((OFFSET, RATE), {}), 20)
     assert 0.0 <= state.value('rate') <= 3.0 and -1.0 <= state.value('offset') <= 1.0
 
 
-def test_central_differences_are_the_derivative():
+def test_central_differences_are_the_derivative() -> None:
     problem = Problem(Decay(0.7, 0.01))
     point = {'rate': 0.5, 'offset': 0.1}
     residual = problem.residuals([point])[0]
@@ -84,7 +85,7 @@ def test_central_differences_are_the_derivative():
     assert columns[:, 1] == pytest.approx(-100.0 * time * np.exp(-0.5 * time), abs=1e-2)
 
 
-def test_what_was_not_measured_counts_for_nothing():
+def test_what_was_not_measured_counts_for_nothing() -> None:
     model = Decay(0.7, 0.01)
     model.experiments[0].measured[100:] = np.nan
     problem = Problem(model)
@@ -92,7 +93,7 @@ def test_what_was_not_measured_counts_for_nothing():
     assert not problem.residuals([{'rate': 2.0}])[0][100:].any()
 
 
-def test_an_outlier_does_not_pull():
+def test_an_outlier_does_not_pull() -> None:
     model = Decay(0.7, 0.01)
     model.experiments[0].measured[50] += 100.0
     problem = Problem(model)
@@ -102,7 +103,7 @@ def test_an_outlier_does_not_pull():
 
 @given(st.integers(1, 12), st.integers(0, 10_000))
 @settings(max_examples=60, deadline=None)
-def test_bounded_step_agrees_with_an_independent_solver(m, seed):
+def test_bounded_step_agrees_with_an_independent_solver(m: Any, seed: Any) -> None:
     random = np.random.default_rng(seed)
     matrix = random.normal(size=(3 * m, m))
     target = random.normal(size=3 * m) * 3.0
@@ -110,13 +111,13 @@ def test_bounded_step_agrees_with_an_independent_solver(m, seed):
     step = bounded_step(matrix.T @ matrix, matrix.T @ target, low, high)
     best = lsq_linear(matrix, target, (low, high), method='bvls', tol=1e-12)
 
-    def cost(x):
+    def cost(x: Any) -> Any:
         return 0.5 * float(np.sum((matrix @ x - target) ** 2))
 
     assert np.all(step >= low) and np.all(step <= high)
     assert cost(step) <= cost(best.x) + 1e-6 * (1.0 + cost(best.x))
 
 
-def test_huber_sum_is_the_square_within_and_linear_beyond():
+def test_huber_sum_is_the_square_within_and_linear_beyond() -> None:
     assert huber_sum(np.array([2.0])) == 2.0
     assert huber_sum(np.array([10.0])) - huber_sum(np.array([9.0])) == pytest.approx(3.0)

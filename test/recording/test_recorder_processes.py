@@ -292,7 +292,7 @@ def test_wrong_arguments_are_refused_in_one_line(tmp_path: Path,
             assert len(process.lines) == 1
             assert words in process.lines[0]
     for arguments, words in (
-            (['--set', 'motor_3.x=1'], '--set motor_3.x=1: motor_3: no such unit, did you mean motor_2'),
+            (['--set', 'motor_3.x=1'], 'motor_3: no such unit, did you mean motor_2'),
             (['--sheet', 'none.yaml'], 'none.yaml: No such file'),
             (['--set', 'motor_1.gear=1'], 'motor_1 has ended with status 2')):
         assert main(['record', '--duration', '1', '--out', str(tmp_path / 'run'),
