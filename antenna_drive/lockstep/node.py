@@ -16,6 +16,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+import gc
 import json
 from threading import Thread
 import time
@@ -169,6 +170,8 @@ class DriveNode:
         services = Thread(target=_serve, args=(executor,), daemon=True)
         services.start()
         try:
+            # What is there now stays: the collector need not look through all of it again.
+            gc.freeze()
             self._hello()
             while not self._stop:
                 outputs = self._go_on()
