@@ -32,7 +32,8 @@ from antenna_drive.bench import equations
 from antenna_drive.bench.equations import BODIES, FloatArray, IntArray, STATES
 import numpy as np
 
-GRID_S = 4e-3
+# 200 Hz, as drives are recorded: what every run puts out, its own steps may be shorter or longer.
+GRID_S = 5e-3
 # The rates decide: see `equations`.
 BY_RATE = 2
 # A guard that falls below zero within this time has jumped there: no smaller step comes closer.

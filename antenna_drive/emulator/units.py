@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 import math
 from typing import Any, ClassVar
 
@@ -27,7 +28,7 @@ from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.schema import (
     check_changes, Entry, nearest, ParameterError, Value,
 )
-from antenna_drive.parameters.sets import changed, Drive, values
+from antenna_drive.parameters.sets import changed, Drive, TestSignal, values
 from antenna_drive.physics import motor_drive, structure, test_signal, torque_share
 from antenna_drive.physics.integrator import work_space
 import numpy as np
@@ -166,7 +167,7 @@ class TestSignalUnit(_DriveUnit):
     def __init__(self, name: str, drive: Drive) -> None:
         """Take the test signal's parameters from the drive's."""
         super().__init__(name, drive.test_signal)
-        self._bits = test_signal.prbs_bits()
+        self._bits = _bits_for(self._set)
         self._origins = np.zeros(2)
         self._next = 0
 
@@ -190,6 +191,7 @@ class TestSignalUnit(_DriveUnit):
         anew at the step at which it takes effect.
         """
         super().tune(changes)
+        self._bits = _bits_for(self._set)
         for name in changes:
             part, _, key = self._path(name).partition('.')
             if part in ('rate', 'torque') and key not in self._SCALES:
@@ -217,7 +219,18 @@ class TestSignalUnit(_DriveUnit):
         parameters = super()._changed(changes)
         check_waveform(parameters.rate, 'rate')
         check_waveform(parameters.torque, 'torque')
+        _bits_for(parameters)  # in the thread that asks first, not in the one that steps
         return parameters
+
+
+_NO_BITS = np.ones(1)
+_prbs_bits = cache(test_signal.prbs_bits)
+
+
+def _bits_for(parameters: TestSignal) -> FloatArray:
+    """Return the binary sequence if a waveform needs it: to make it imports half of scipy."""
+    kinds = (parameters.rate.waveform, parameters.torque.waveform)
+    return _prbs_bits() if 'prbs' in kinds else _NO_BITS
 
 
 _UNITS: dict[str, type[Any]] = {
