@@ -26,11 +26,14 @@ from typing import Any
 
 from antenna_drive.bench import measuring
 
-_INTERPRETER = 'pass'
-_LIBRARIES = 'import numba, numpy'
-_IMPORT = 'import antenna_drive.emulator.run'
 _FIRST_STEP = ('from antenna_drive.emulator.run import Emulator; '
                'from antenna_drive.parameters import load; Emulator(load()).advance(1)')
+_STARTS = {
+    'interpreter_s': 'pass',
+    'libraries_s': 'import numba, numpy',
+    'import_s': 'import antenna_drive.emulator.run',
+    'second_first_step_s': _FIRST_STEP,
+}
 _SAY_WHEN = '; import time; print(time.time())'
 
 
@@ -45,41 +48,39 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
     first_first_step_s (nothing compiled yet); second_over_libraries, and demo_s
 
     """
-    with tempfile.TemporaryDirectory() as folder:
-        warm = {'NUMBA_CACHE_DIR': str(Path(folder, 'warm'))}
-        progress('starts')
-        work: dict[str, Callable[[], float]] = {
-            'interpreter_s': lambda: _until_said(_INTERPRETER, warm),
-            'libraries_s': lambda: _until_said(_LIBRARIES, warm),
-            'import_s': lambda: _until_said(_IMPORT, warm),
-            'second_first_step_s': lambda: _until_said(_FIRST_STEP, warm)}
-        values: dict[str, list[float]] = {name: [] for name in work}
-        for turn in range(repetitions + 1):
-            for name, piece in work.items():
-                took = piece()
-                if turn:  # the first compiles and fills the disk's cache
-                    values[name].append(took)
+    progress('starts')
+    values: dict[str, list[float]] = {name: [] for name in _STARTS}
+    for turn in range(repetitions + 1):
+        for name, code in _STARTS.items():
+            took = _until_said(code)
+            if turn:  # the first compiles and fills the disk's cache, if need be
+                values[name].append(took)
+    result: dict[str, Any] = {}
+    if quick:
+        result['left_out'] = {'first start and demo': 'they take long'}
+    else:
         progress('starts with nothing compiled')
-        values['first_first_step_s'] = [
-            _until_said(_FIRST_STEP, {'NUMBA_CACHE_DIR': str(Path(folder, f'cold {turn}'))})
-            for turn in range(1 if quick else repetitions)]
-    result: dict[str, Any] = {name: measuring.figure(taken, 's')
-                              for name, taken in values.items()}
+        with tempfile.TemporaryDirectory() as folder:
+            values['first_first_step_s'] = [
+                _until_said(_FIRST_STEP, str(Path(folder, str(turn))))
+                for turn in range(repetitions)]
+        progress('demo')
+        demo = [_demo() for _ in range(repetitions)]
+        if all(demo):
+            values['demo_s'] = [took for took in demo if took]
+        else:
+            result['left_out'] = {'demo': 'antenna-drive demo cannot be run here'}
+    result |= {name: measuring.figure(taken, 's') for name, taken in values.items()}
     result['second_over_libraries'] = measuring.ratio(values['second_first_step_s'],
                                                       values['libraries_s'])
-    progress('demo')
-    demo = [_demo() for _ in range(1 if quick else repetitions)]
-    if all(demo):
-        result['demo_s'] = measuring.figure([took for took in demo if took], 's')
-    else:
-        result['left_out'] = {'demo': 'antenna-drive demo cannot be run here'}
     return result
 
 
-def _until_said(code: str, environment: dict[str, str]) -> float:
+def _until_said(code: str, cache: str | None = None) -> float:
     began = time.time()
-    done = subprocess.run([sys.executable, '-c', code + _SAY_WHEN], capture_output=True,
-                          env={**os.environ, **environment}, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, '-c', code + _SAY_WHEN], capture_output=True, text=True, check=True,
+        env={**os.environ, **({'NUMBA_CACHE_DIR': cache} if cache else {})})
     return float(done.stdout) - began
 
 

@@ -167,17 +167,8 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
             progress(f'macro-step of {1e3 * step_s:g} ms')
             runs = [own(steps, step_s, publish_rate=100.0) for _ in range(repetitions)]
             result[name] = measuring.figure([run.rate * step_s for run in runs])
-    paced: dict[str, list[Exchange]] = {'own': [], 'bare': []}
-    for turn in range(repetitions):
-        progress(f'at real-time pace, turn {turn + 1} of {repetitions}')
-        paced['own'].append(own(steps, pace=1.0))
-        paced['bare'].append(bare(steps, pace=1.0))
-    result['paced_latency_s'] = {name: _percentiles([run.latencies for run in runs])
-                                 for name, runs in paced.items()}
-    result['paced_latency_over_bare'] = measuring.ratio(
-        [float(np.median(run.latencies)) for run in paced['own']],
-        [float(np.median(run.latencies)) for run in paced['bare']])
-    result['paced_cpu_per_step_s'] = {name: _cpu(runs) for name, runs in paced.items()}
+    if not quick:
+        result |= _paced(repetitions, steps, progress)
     duration = 15.0 if quick else 600.0
     progress(f'{duration:g} s at real-time pace')
     long = own(round(duration / STEP_S), pace=1.0, publish_rate=100.0)
@@ -187,6 +178,22 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
         'total': float(late.mean()), 'late_steps': int(late.sum()), 'duration_s': duration}
     result['late_run_latency_s'] = _percentiles([long.latencies])
     return result
+
+
+def _paced(repetitions: int, steps: int, progress: Callable[[str], None]) -> dict[str, Any]:
+    """Measure both at real-time pace: how long a step takes when nothing hurries it."""
+    paced: dict[str, list[Exchange]] = {'own': [], 'bare': []}
+    for turn in range(repetitions):
+        progress(f'at real-time pace, turn {turn + 1} of {repetitions}')
+        paced['own'].append(own(steps, pace=1.0))
+        paced['bare'].append(bare(steps, pace=1.0))
+    return {
+        'paced_latency_s': {name: _percentiles([run.latencies for run in runs])
+                            for name, runs in paced.items()},
+        'paced_latency_over_bare': measuring.ratio(
+            [float(np.median(run.latencies)) for run in paced['own']],
+            [float(np.median(run.latencies)) for run in paced['bare']]),
+        'paced_cpu_per_step_s': {name: _cpu(runs) for name, runs in paced.items()}}
 
 
 def _percentiles(runs: list[Any]) -> dict[str, Any]:
