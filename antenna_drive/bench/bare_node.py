@@ -64,8 +64,8 @@ def main() -> int:
     message = frame.encode(1.0, 1, 1e-3, np.zeros((len(OUTPUTS[unit]), 2)))
     period = float(step_s) / float(pace) if float(pace) > 0.0 and unit == TEST_SIGNAL else 0.0
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    publish(message)
     stamps.note(0)
+    publish(message)
     _exchange(int(last), message, publish, takes, wait_set, stamps, period)
     signal.pause()
     return 0
@@ -86,7 +86,6 @@ def _exchange(last: int, message: bytes, publish: Callable[[bytes], None], takes
               wait_set: Any, stamps: Stamps, period: float) -> None:
     from std_msgs.msg import Float64MultiArray
 
-    began = 0.0
     for step in range(1, last + 1):
         for handle in takes:
             while handle.take_message(Float64MultiArray, True) is None:
@@ -94,12 +93,12 @@ def _exchange(last: int, message: bytes, publish: Callable[[bytes], None], takes
                 wait_set.add_subscription(handle)
                 wait_set.wait(_NEVER_NS)
         if period:
-            began = began or time.monotonic()
-            rest = began + step * period - time.monotonic()
-            if rest > 0.0:
+            if step == 1:
+                stamps.due_s = time.monotonic()
+            while (rest := stamps.due_s + step * period - time.monotonic()) > 0.0:
                 time.sleep(rest)
-        publish(message)
         stamps.note(step)
+        publish(message)
 
 
 if __name__ == '__main__':

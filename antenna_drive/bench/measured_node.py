@@ -36,8 +36,11 @@ def main() -> int:
 
     class MeasuredNode(node.DriveNode):
         def _publish(self, outputs: FloatArray) -> None:
+            step = self._member.step
+            if step == 0 and self._pace is not None and self._pace.factor > 0.0:
+                stamps.due_s = self._pace.due(0, self._member.step_s)
+            stamps.note(step)
             super()._publish(outputs)
-            stamps.note(self._member.step)
 
     node.DriveNode = MeasuredNode  # type: ignore[misc]
     return int(importlib.import_module(MODULES[unit]).main(arguments))

@@ -74,7 +74,7 @@ class Exchange:
 
     @property
     def latencies(self) -> Any:
-        """Return, from each step of the conductor, when all others have put out their next [s]."""
+        """Return, from each step of the conductor, when all others have made their next [s]."""
         others = [node.times for unit, node in self.nodes.items() if unit != TEST_SIGNAL]
         done = np.max([times[WARM_STEPS + 1:] for times in others], axis=0)
         return done - self.nodes[TEST_SIGNAL].times[WARM_STEPS:-1]
@@ -84,11 +84,16 @@ class Exchange:
         node = self.nodes[unit]
         return node.cpu_s / (node.times.size - 1 - WARM_STEPS)
 
+    @property
+    def delays(self) -> Any:
+        """Return how long after it was due the conductor made each step from step 1 on [s]."""
+        conductor = self.nodes[TEST_SIGNAL]
+        due = conductor.due_s + np.arange(conductor.times.size) * (self.step_s / self.pace)
+        return (conductor.times - due)[1:]
+
     def late(self) -> Any:
         """Return of each step whether it came more than a step's time after it was due."""
-        times = self.nodes[TEST_SIGNAL].times
-        period = self.step_s / self.pace
-        return times - times[0] - np.arange(times.size) * period > period
+        return self.delays > self.step_s / self.pace
 
 
 def own(steps: int, step_s: float = STEP_S, pace: float = 0.0, publish_rate: float = 0.0,

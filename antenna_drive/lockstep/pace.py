@@ -48,11 +48,13 @@ class Pace:
         self._start = now
         self._first_step = step
 
+    def due(self, step: int, step_s: float) -> float:
+        """Return when `step` is due at this pace, which is not 0, on the caller's clock [s]."""
+        return self._start + (step - self._first_step) * step_s / self.factor
+
     def remaining(self, step: int, step_s: float, now: float) -> float:
         """Return how long it is until `step` is due [s], zero or less if it is."""
-        if self.factor <= 0.0:
-            return 0.0
-        return self._start + (step - self._first_step) * step_s / self.factor - now
+        return self.due(step, step_s) - now if self.factor > 0.0 else 0.0
 
     def note(self, step: int, step_s: float, now: float) -> None:
         """Count `step`, made at `now`, if it is late."""

@@ -116,9 +116,7 @@ def test_five_processes_note_every_step(exchange: transport.Run, pace: float,
         assert run.cpu_per_step(unit) > 0.0
     assert np.all(run.latencies > 0.0)  # nobody makes a step before the conductor's is there
     if pace:
-        # step k is never made before k macro-steps have passed
-        conductor = run.nodes['test_signal'].times
-        assert np.all(conductor - conductor[1] >= (np.arange(last + 1) - 1) * 1e-3 - 1e-3)
+        assert np.all(run.delays > 0.0)  # step k is never made before it is due
 
 
 @pytest.mark.parametrize(('value', 'goal'), [(0.9, 'reached'), (0.7, 'not reached')])
