@@ -43,7 +43,7 @@ class DriveParameter(Parameter):
 @dataclass(frozen=True)
 class Wave(Form):
     """
-    A form with a sine and a cosine part: amplitude, cycles and phase of some fields.
+    A wave of two harmonics by their sine and cosine parts, with its cycles per revolution.
 
     Attributes
     ----------
@@ -68,10 +68,13 @@ class Wave(Form):
         return replace(self, name=f'{order:g} cycles per revolution', parameters=parameters,
                        order=order)
 
-    def settings(self, sine: float, cosine: float, change: float) -> list[Setting]:
-        """Return what a sine and a cosine part set in the record."""
+    def settings(self, sine: float, cosine: float, change: float, second_sine: float,
+                 second_cosine: float) -> list[Setting]:
+        """Return what the sine and cosine parts of both harmonics set in the record."""
         values = (('', math.hypot(sine, cosine)), ('_phase', math.atan2(cosine, sine)),
-                  ('_cycles', self.order * (1.0 + change)))
+                  ('_cycles', self.order * (1.0 + change)),
+                  ('_second', math.hypot(second_sine, second_cosine)),
+                  ('_second_phase', math.atan2(second_cosine, second_sine)))
         return [(f'{path}.{self.stem}{end}', SET, value)
                 for path in self.paths for end, value in values]
 
@@ -111,10 +114,14 @@ def _renamed(part: DriveParameter, name: str) -> DriveParameter:
 
 def _wave(key: str, unit: str, limit: float, step: float, paths: tuple[str, ...], angle: str,
           orders: tuple[float, ...], stem: str, reading: bool = False) -> Wave:
-    parts = (*(DriveParameter(f'{key}.{part}', unit, -limit, limit, step, reading=reading)
-               for part in ('sine', 'cosine')),
+    def amplitude(part: str, shape: bool = False) -> DriveParameter:
+        return DriveParameter(f'{key}.{part}', unit, -limit, limit, step, reading=reading,
+                              shape=shape)
+
+    parts = (amplitude('sine'), amplitude('cosine'),
              DriveParameter(f'{key}.cycles_change', '1', -0.05, 0.05, 2e-4, reading=reading,
-                            shape=True))
+                            shape=True),
+             amplitude('second_sine', shape=True), amplitude('second_cosine', shape=True))
     return Wave('', parts, stem=stem, paths=paths, angle=angle, orders=orders)
 
 
@@ -156,10 +163,11 @@ def _motor_effects(into: _Catalogue, component: str, paths: tuple[str, ...]) -> 
                    'torque_ripple'))
     one('torque_constant', 'weak or hot magnets, a wrong winding',
         'more or less current for the same motion',
-        _parameter('change', '1', -0.6, 0.6, 5e-3, SCALE, *at('motor.torque_constant')))
+        _parameter('change', '1', -0.6, 0.6, 5e-3, SCALE, *at('motor.torque_constant'),
+                   *at('armature.back_emf_constant')))
     one('armature_resistance', 'hot or worn winding, brushes or cable',
         'current follows its demand with another gain and lag',
-        _parameter('change', '1', -0.8, 3.0, 5e-3, SCALE, *at('armature.resistance')))
+        _parameter('change', 'ohm', -0.4, 3.0, 4e-3, ADD, *at('armature.resistance_change')))
     one('amplifier_gain', 'amplifier 1 set or drifted to another gain',
         'stiffer or softer rate loop: currents at reversals',
         _parameter('change', '1', -0.8, 1.5, 5e-3, SCALE, *at('amplifier.rate_gain')))
@@ -214,7 +222,10 @@ def _share_effects(into: _Catalogue) -> None:
                  name='transfer function 3'),
              _form(f'{key}.share_filter', _parameter(
                  'share_rate_change', '1', -0.8, 3.0, 5e-3, SCALE, f'{share}.s_2',
-                 f'{share}.k_2'), name='transfer functions 2 and 4'))
+                 f'{share}.k_2'), name='transfer functions 2 and 4'),
+             _form(f'{key}.share_filter', _parameter(
+                 'rate_change', '1', -0.8, 3.0, 5e-3, SCALE, f'{share}.s_2', f'{share}.k_2',
+                 f'{share}.k_3'), name='all transfer functions'))
     one('filter_1_gain', 'resistors of Filter 1 set or drifted',
         'difference of the currents follows the bias with another error and speed',
         _parameter('change', '1', -0.8, 2.0, 5e-3, SCALE, f'{filter_1}.gain'))
@@ -360,7 +371,11 @@ def catalogue() -> dict[str, Effect]:
     _sensor_effects(into)
     into.add('axis', 'wind_gust', 'gusts on the dish, other ones in each test',
              'both currents vary with time, by no angle or rate')
-    into.add('loop', 'delay', 'the command passes a computer or a network first',
-             'everything comes late', _form('loop.delay', _parameter(
-                 'time', 's', 0.0, 0.2, 5e-4, SET)))
+    into.add('loop', 'delay', 'a computer or a network in the command or in the rate loop',
+             'everything comes late, or the rate loop rings',
+             _form('loop.delay', _parameter('time', 's', 0.0, 0.2, 5e-4, SET),
+                   name='of the command'),
+             _form('loop.delay', _parameter(
+                 'error_time', 's', 0.0, 0.05, 2e-4, ADD, 'motor_1.amplifier.delay',
+                 'motor_2.amplifier.delay'), name='of the rate error'))
     return into.effects

@@ -25,8 +25,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from antenna_drive.gap.drive_model import CHANNELS, DriveModel
+from antenna_drive.gap.drive_model import DriveModel
 from antenna_drive.gap.excitation import SheetCommand
+from antenna_drive.gap.field_test import CHANNELS
 from antenna_drive.gap.fit import Problem
 from antenna_drive.gap.model import FloatArray
 from antenna_drive.gap.search import starts

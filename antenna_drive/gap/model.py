@@ -132,6 +132,9 @@ class Model(Protocol):
     def effects(self) -> Mapping[str, Effect]:
         """Return the catalogue, by id."""
 
+    def brief(self) -> Model:
+        """Return the model with as much of its tests as a search needs, or the model itself."""
+
     def forms(self, effect: Effect, residuals: Sequence[FloatArray]) -> Sequence[Form]:
         """
         Return the forms of an effect that are worth a trial.

@@ -29,7 +29,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from antenna_drive.gap.fit import (
-    across, bounded_step, Problem, scanned, State, weighted_square,
+    across, bounded_step, huber_sum, Problem, scanned, State, weighted_square,
 )
 from antenna_drive.gap.model import FloatArray, Form, Model, Parameter
 import numpy as np
@@ -39,12 +39,20 @@ SINGLES = 14
 FINALISTS = 6
 BASES = 3
 PARTNERS = 4
+# How many are fitted to the whole tests in the end.
+FULL_SINGLES = 5
+FULL_PAIRS = 4
+# Of those, what costs so much more than the best is not fitted any further.
+REACH = 400.0
 # A partner that could gain less than this in half a chi-square is not fitted.
 WORTH = 12.0
 # The offsets alone are fitted in at most so many rounds; they were stuck if that much of the
 # cost goes once they begin elsewhere.
 ROUNDS = 5
 STUCK = 0.02
+# Beyond this chi-square per sample the offsets say nothing any more.
+FAR = 4.0
+_SPAN = (-0.9, -0.6, -0.4, -0.25, -0.15, -0.08, 0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 0.9)
 # Fresh derivatives that gain less than this end a fit.
 SETTLED = 4.0
 _EARLY_S = 1.5
@@ -108,9 +116,12 @@ class Search:
 
     def __init__(self, problem: Problem, progress: Callable[[float, str], None]) -> None:
         """Prepare to search."""
-        self.problem = problem
-        self.model: Model = problem.model
+        self.whole = problem
+        self.problem = Problem(problem.model.brief())
+        self.model: Model = self.problem.model
         self.progress = progress
+        # derivatives by the offsets where all are nought
+        self.nominal = np.empty((0, 0), np.float32)
         self.tangents: list[_Tangent] = []
         self.screened: list[tuple[str, float]] = []
 
@@ -127,11 +138,10 @@ class Search:
             none = again
             if not stuck:
                 break
-        self.progress(0.7, 'pairs of effects')
+        self.progress(0.6, 'pairs of effects')
         pairs = self._pairs(none, singles)
-        singles, pairs = self._again(singles, pairs)
-        self.progress(1.0, 'done')
-        return [none, *singles, *pairs]
+        self.progress(0.8, 'the likeliest in full')
+        return self._in_full(none, singles, pairs)
 
     def _offsets(self) -> Candidate:
         problem, point = self.problem, {}
@@ -139,6 +149,7 @@ class Search:
         point = self.placed({})
         self.progress(0.03, 'offsets')
         state = problem.start(self.model.nuisances, point)
+        self.nominal = state.jacobian
         state = problem.fit(state, 12)
         for _ in range(ROUNDS):
             cost = state.cost
@@ -182,6 +193,18 @@ class Search:
             self.progress(0.2 + 0.2 * i / count, 'what each effect would do')
             for form in self.model.forms(effect, residuals):
                 self.tangents.append(_Tangent(effect.id, form, self._columns(state, form)))
+
+    def _waves_anew(self, state: State) -> None:
+        """Look for waves in what a candidate leaves, which another effect may have hidden."""
+        residuals = self._residuals(state)
+        others = []
+        for effect in self.model.effects.values():
+            forms = self.model.forms(effect, residuals)
+            if any(hasattr(form, 'at') for form in forms):
+                others += [_Tangent(effect.id, form, self._columns(state, form))
+                           for form in forms]
+        names = {tangent.effect for tangent in others}
+        self.tangents = [t for t in self.tangents if t.effect not in names] + others
 
     def _screen(self, state: State, besides: Sequence[str] = ()) -> list[tuple[float, _Tangent]]:
         """Return the gain that each form promises, the greatest first, best forms only."""
@@ -240,6 +263,9 @@ class Search:
             self.progress(0.4 + 0.15 * i / len(chosen), 'single effects')
             found.append(self._fitted(none, tangent, False, 5))
         found.sort(key=lambda c: c.cost)
+        if none.cost > FAR * self.problem.samples / 2.0:
+            found = [*(self._from_afar(c) for c in found[:FINALISTS]), *found[FINALISTS:]]
+            found.sort(key=lambda c: c.cost)
         # those that are far behind after a few turns stay there
         for i in range(min(FINALISTS, len(found))):
             found[i] = self._shaped(found[i], 8)
@@ -261,6 +287,34 @@ class Search:
             if cost - state.cost < max(SETTLED, 2e-4 * cost):
                 break
         return replace(candidate, state=state)
+
+    def _from_afar(self, candidate: Candidate) -> Candidate:
+        """
+        Fit a strong effect from the configuration's own values instead of from the offsets.
+
+        Offsets that were fitted without a strong effect are bent far out of place. The truth is
+        never far from no offsets at all, once the effect's size is about right: that is tried
+        out.
+        """
+        form, problem = candidate.forms[-1], self.problem
+        first = form.parameters[0]
+        known = candidate.state.value(first.name)
+        base = {p.name: candidate.state.value(p.name) for p in form.parameters if p.shape}
+        begin = {name: value for name, value in candidate.state.point().items()
+                 if name.startswith('start:')}
+        if any(not p.shape for p in form.parameters[1:]):
+            return candidate
+        span = [share * (first.high if share > 0.0 else -first.low)
+                for share in _SPAN if (share > 0.0 or first.low < 0.0)]
+        trials = [{**begin, **base, first.name: value} for value in (known, *span)]
+        costs = [huber_sum(z) for z in problem.residuals(trials)]
+        point = self.placed(trials[int(np.argmin(costs))])
+        columns = problem.columns(point, form.parameters, problem.residuals([point])[0],
+                                  central=True)
+        state = problem.start((*self.model.nuisances, *form.parameters), point,
+                              np.column_stack([self.nominal, columns]))
+        state = problem.fit(state, 12)
+        return replace(candidate, state=state) if state.cost < candidate.cost else candidate
 
     def _without(self, candidate: Candidate, effect: str) -> Candidate:
         """Fit a candidate without one of its effects, from the offsets that it has with it."""
@@ -291,6 +345,9 @@ class Search:
         found: dict[tuple[str, ...], Candidate] = {}
         share = 0.3 / (BASES * PARTNERS)
         worth = max(WORTH, 0.02 * (none.cost - singles[0].cost))
+        if none.cost - singles[0].cost < WORTH:
+            return []
+        self._waves_anew(singles[0].state)
         for base in singles[:BASES]:
             partners = [(gain, tangent) for gain, tangent in self._screen(
                 base.state, base.effects) if gain > worth][:PARTNERS]
@@ -307,22 +364,69 @@ class Search:
         pairs = sorted(found.values(), key=lambda c: c.cost)
         return [*pairs[:1], *(_light(pair) for pair in pairs[1:])]
 
-    def _again(self, singles: Sequence[Candidate], pairs: Sequence[Candidate],
-               ) -> tuple[list[Candidate], list[Candidate]]:
-        """Settle the best pair, and fit each of its members alone from where it ends."""
-        if not pairs or pairs[0].cost > singles[0].cost - WORTH:
-            return [self._settled(singles[0]), *singles[1:]], list(pairs)
-        best = self._settled(pairs[0])
-        members = {}
-        for effect in best.effects:
-            alone = self._without(best, effect)
-            members[alone.effects[0]] = alone
-        better = [members[c.effects[0]]
-                  if c.effects[0] in members and members[c.effects[0]].cost < c.cost else c
-                  for c in singles]
-        known = {c.effects[0] for c in singles}
-        better += [c for name, c in members.items() if name not in known]
-        return sorted(better, key=lambda c: c.cost), [best, *pairs[1:]]
+    def _in_full(self, none: Candidate, singles: Sequence[Candidate],
+                 pairs: Sequence[Candidate]) -> list[Candidate]:
+        """
+        Fit the likeliest candidates to the whole tests, the offsets alone first.
+
+        All share the derivatives by the offsets, which are taken twice: where the search has
+        ended, and where the best single effect is then.
+        """
+        chosen = [*singles[:FULL_SINGLES], *pairs[:FULL_PAIRS]]
+        if not chosen:
+            return [self._in_full_alone(none)]
+        if pairs and pairs[0].cost < singles[0].cost:
+            # a member that passed for the pair's whole effect, with the offsets the pair has
+            known = {c.effects for c in chosen}
+            chosen += [c for c in (self._dropped(pairs[0], e) for e in pairs[0].effects)
+                       if c.effects not in known]
+        anchor = min(chosen, key=lambda c: c.cost)
+        for turns in (5, 8):
+            point = anchor.state.point()
+            offsets = self.whole.columns(point, self.model.nuisances,
+                                         self.whole.residuals([point])[0], central=False)
+            chosen = sorted((self._refitted(c, offsets, turns) for c in chosen),
+                            key=lambda c: c.cost)
+            singles = [c for c in chosen if len(c.effects) == 1]
+            none = min((self._refitted(c, offsets, turns) for c in (
+                none, *(self._dropped(c, c.effects[0]) for c in singles[:3]))),
+                key=lambda c: c.cost)
+            # what is far behind stays there
+            chosen = [*singles[:1], *(c for c in chosen if c is not singles[0]
+                                      and c.cost < min(chosen[0].cost, none.cost) + REACH)]
+            anchor = singles[0]
+        return [none, *sorted(chosen, key=lambda c: c.cost)]
+
+    def _in_full_alone(self, none: Candidate) -> Candidate:
+        state = self.whole.start(self.model.nuisances, none.state.point())
+        state = self.whole.fit(state, 8)
+        return replace(none, state=self.whole.fit(self.whole.refreshed(state), 8))
+
+    def _dropped(self, candidate: Candidate, effect: str) -> Candidate:
+        """Return a candidate without one of its effects, not fitted yet."""
+        gone = candidate.effects.index(effect)
+        names = {p.name for p in candidate.forms[gone].parameters}
+        state, values = candidate.state, candidate.state.point()
+        own = [j for j, p in enumerate(state.parameters) if p.name not in names]
+        point = self.model.absorbed(
+            {state.parameters[j].name: values[state.parameters[j].name] for j in own},
+            {name: values[name] for name in names})
+        bare = replace(state, parameters=tuple(state.parameters[j] for j in own),
+                       x=np.array([point[state.parameters[j].name] for j in own]))
+        return Candidate(
+            tuple(e for i, e in enumerate(candidate.effects) if i != gone),
+            tuple(f for i, f in enumerate(candidate.forms) if i != gone), bare)
+
+    def _refitted(self, candidate: Candidate, offsets: NDArray[np.float32],
+                  turns: int) -> Candidate:
+        """Fit a candidate to the whole tests, with these derivatives by the offsets."""
+        point = candidate.state.point()
+        own = [p for form in candidate.forms for p in form.parameters]
+        residual = self.whole.residuals([point])[0]
+        columns = self.whole.columns(point, own, residual, central=True)
+        state = self.whole.start((*self.model.nuisances, *own), point,
+                                 np.column_stack([offsets, columns]))
+        return replace(candidate, state=self.whole.fit(state, turns))
 
 
 def _light(candidate: Candidate) -> Candidate:

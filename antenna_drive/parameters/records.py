@@ -47,6 +47,31 @@ def dtype_of(kind: type) -> np.dtype[Any]:
     return np.dtype(parts, align=True)
 
 
+@cache
+def place_of(kind: np.dtype[Any], path: str) -> int:
+    """
+    Return where a number lies in a record, in numbers: every field takes eight bytes.
+
+    Parameters
+    ----------
+    kind
+        of the record, from `dtype_of`
+    path
+        names of the fields with dots between; the last one may be the index of a list
+
+    """
+    at = 0
+    for part in path.split('.'):
+        if kind.subdtype is not None:
+            kind, _ = kind.subdtype
+            at += int(part) * kind.itemsize
+        else:
+            assert kind.fields is not None
+            kind, offset = kind.fields[part][:2]
+            at += offset
+    return at // 8
+
+
 def record_of(parameters: Any) -> np.ndarray[Any, np.dtype[Any]]:
     """Return a parameter set as an array of one record, to vary by field or to repeat."""
     kind: Any = type(parameters)

@@ -83,6 +83,8 @@ class Amplifier:
     offset: float = _effect(0.0, 'V', -1.0, 1.0, 'offset at the input of amplifier 1')
     dead_zone: float = _effect(
         0.0, 'V', 0.0, 1.0, 'half the width within which amplifier 1 does not answer')
+    delay: float = _effect(
+        0.0, 's', 0.0, 0.1, 'time by which the rate error comes late, to first order')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,6 +97,8 @@ class Armature:
     physical_amperes_per_article_ampere: float = _given(
         '1', 0.1, 100.0, 'real amperes in one article ampere [kappa]')
     voltage_limit: float = _given('V', 1.0, 1e4, 'greatest armature voltage [V_max]')
+    resistance_change: float = _effect(
+        0.0, 'ohm', -1e3, 1e3, 'resistance beyond the one that amplifier 2 is made for')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,6 +129,9 @@ class Motor:
     torque_ripple_cycles: float = _effect(
         12.0, '1', 0.1, 200.0, 'cycles of the torque ripple per motor revolution')
     torque_ripple_phase: float = _effect(0.0, *_PHASE, 'phase of the torque ripple')
+    torque_ripple_second: float = _effect(
+        0.0, 'N m', 0.0, 20.0, 'amplitude of the second harmonic of the torque ripple')
+    torque_ripple_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,6 +150,9 @@ class Gearbox:
     transmission_error_cycles: float = _effect(
         1.0, '1', 0.001, 200.0, 'cycles of the transmission error per motor revolution')
     transmission_error_phase: float = _effect(0.0, *_PHASE, 'phase of the transmission error')
+    transmission_error_second: float = _effect(
+        0.0, 'rad', 0.0, 1.0, 'amplitude of the second harmonic of the transmission error')
+    transmission_error_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,6 +164,9 @@ class Tachometer:
     ripple: float = _effect(0.0, '1', 0.0, 1.0, 'amplitude of the ripple, as a share of the rate')
     ripple_cycles: float = _effect(1.0, '1', 0.1, 200.0, 'cycles of the ripple per revolution')
     ripple_phase: float = _effect(0.0, *_PHASE, 'phase of the ripple')
+    ripple_second: float = _effect(
+        0.0, '1', 0.0, 1.0, 'amplitude of the second harmonic of the ripple')
+    ripple_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -220,6 +233,9 @@ class Axis:
     friction_wave_cycles: float = _effect(
         100.0, '1', 0.1, 1e5, 'cycles of that variation per turn of the axis')
     friction_wave_phase: float = _effect(0.0, *_PHASE, 'phase of that variation')
+    friction_wave_second: float = _effect(
+        0.0, '1', 0.0, 0.9, 'amplitude of the second harmonic of that variation')
+    friction_wave_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
     gravity_torque: float = _effect(
         0.0, 'N m', -1e7, 1e7, 'imbalance: torque at zero elevation, pulling down')
     steady_wind_torque: float = _effect(0.0, 'N m', -1e7, 1e7, 'torque of a steady wind')
@@ -240,6 +256,9 @@ class Encoder:
     cyclic_error_cycles: float = _effect(
         4096.0, '1', 1.0, 1e6, 'cycles of the cyclic error per turn')
     cyclic_error_phase: float = _effect(0.0, *_PHASE, 'phase of the cyclic error')
+    cyclic_error_second: float = _effect(
+        0.0, 'rad', 0.0, 0.1, 'amplitude of the second harmonic of the cyclic error')
+    cyclic_error_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,11 +15,10 @@
 
 from __future__ import annotations
 
-import math
-
 from antenna_drive.parameters.sets import Gearbox
 from antenna_drive.physics.backlash import contact_torque
 from antenna_drive.physics.compiling import inner
+from antenna_drive.physics.wave import wave, wave_slope
 
 
 @inner
@@ -38,9 +37,10 @@ def twist(motor_angle: float, axis_angle: float, gear_ratio: float, p: Gearbox) 
 
     """
     angle = motor_angle - gear_ratio * axis_angle
-    if p.transmission_error != 0.0:
-        angle += p.transmission_error * math.sin(
-            p.transmission_error_cycles * motor_angle + p.transmission_error_phase)
+    if p.transmission_error != 0.0 or p.transmission_error_second != 0.0:
+        angle += wave(motor_angle, p.transmission_error, p.transmission_error_second,
+                      p.transmission_error_cycles, p.transmission_error_phase,
+                      p.transmission_error_second_phase)
     return angle
 
 
@@ -50,9 +50,11 @@ def twist_rate(
 ) -> float:
     """Return the time derivative of `twist` [rad/s]; rates in rad/s, otherwise as there."""
     rate = motor_rate - gear_ratio * axis_rate
-    if p.transmission_error != 0.0:
-        rate += p.transmission_error * p.transmission_error_cycles * motor_rate * math.cos(
-            p.transmission_error_cycles * motor_angle + p.transmission_error_phase)
+    if p.transmission_error != 0.0 or p.transmission_error_second != 0.0:
+        rate += motor_rate * wave_slope(
+            motor_angle, p.transmission_error, p.transmission_error_second,
+            p.transmission_error_cycles, p.transmission_error_phase,
+            p.transmission_error_second_phase)
     return rate
 
 

@@ -15,11 +15,10 @@
 
 from __future__ import annotations
 
-import math
-
 from antenna_drive.parameters.sets import Ammeter, Motor, Tachometer
 from antenna_drive.physics.compiling import inner
 from antenna_drive.physics.friction import slip_level
+from antenna_drive.physics.wave import wave
 
 
 @inner
@@ -38,9 +37,9 @@ def driving_torque(current: float, angle: float, p: Motor) -> float:
 
     """
     torque = p.torque_constant * current
-    if p.torque_ripple != 0.0:
-        torque += p.torque_ripple * math.sin(p.torque_ripple_cycles * angle
-                                             + p.torque_ripple_phase)
+    if p.torque_ripple != 0.0 or p.torque_ripple_second != 0.0:
+        torque += wave(angle, p.torque_ripple, p.torque_ripple_second, p.torque_ripple_cycles,
+                       p.torque_ripple_phase, p.torque_ripple_second_phase)
     return torque
 
 
@@ -80,8 +79,9 @@ def tachometer(rate: float, angle: float, p: Tachometer) -> float:
 
     """
     reading = p.gain * rate + p.offset
-    if p.ripple != 0.0:
-        reading += p.ripple * rate * math.sin(p.ripple_cycles * angle + p.ripple_phase)
+    if p.ripple != 0.0 or p.ripple_second != 0.0:
+        reading += rate * wave(angle, p.ripple, p.ripple_second, p.ripple_cycles,
+                               p.ripple_phase, p.ripple_second_phase)
     return reading
 
 

@@ -75,15 +75,6 @@ def _gear(
 
 
 @inner
-def _demand(t: float, x: FloatArray, u: FloatArray, p: MotorDrive) -> tuple[float, float, float]:
-    """Return error, demand before its limit, and centre of the limit [article A] at t."""
-    bias_command = p.sign * p.amplifier.bias_command_gain * _held(u, COUNTER_TORQUE, t)
-    tach_rate = tachometer(x[RATE], x[ANGLE], p.tachometer)
-    error = rate_error(x[VOLTAGE], tach_rate, bias_command, p.amplifier)
-    return error, error + x[INTEGRAL], limit_centre(x[RATE], p.amplifier, p.armature)
-
-
-@inner
 def _acceleration(x: FloatArray, mode: IntArray, torque: float, p: MotorDrive) -> float:
     """Return the rotor's acceleration [rad/s^2] against the gear torque [N m], Eq. (2)."""
     if mode[SLIP] == 0:
@@ -94,14 +85,38 @@ def _acceleration(x: FloatArray, mode: IntArray, torque: float, p: MotorDrive) -
 
 
 @inner
+def _error_slope(
+        t: float, x: FloatArray, u: FloatArray, error: float, acceleration: float, p: MotorDrive,
+) -> float:
+    """Return the time derivative of the rate error [article A/s]."""
+    return error_slope(
+        error, command_voltage_rate(x[VOLTAGE], _held(u, RATE_COMMAND, t), p.rate_command),
+        p.tachometer.gain * acceleration,
+        p.sign * p.amplifier.bias_command_gain * u[COUNTER_TORQUE, 1], p.amplifier)
+
+
+@inner
+def _demand(
+        t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: MotorDrive,
+) -> tuple[float, float, float]:
+    """Return error, demand before its limit, and centre of the limit [article A] at t."""
+    bias_command = p.sign * p.amplifier.bias_command_gain * _held(u, COUNTER_TORQUE, t)
+    tach_rate = tachometer(x[RATE], x[ANGLE], p.tachometer)
+    error = rate_error(x[VOLTAGE], tach_rate, bias_command, p.amplifier)
+    if p.amplifier.delay > 0.0:
+        # the error of a little while ago, to first order
+        _, torque = _gear(t, x, mode, u, p)
+        error -= p.amplifier.delay * _error_slope(
+            t, x, u, error, _acceleration(x, mode, torque, p), p)
+    return error, error + x[INTEGRAL], limit_centre(x[RATE], p.amplifier, p.armature)
+
+
+@inner
 def _needed(
         t: float, x: FloatArray, u: FloatArray, error: float, acceleration: float, p: MotorDrive,
 ) -> float:
     """Return the rate at which the integral would keep the demand at its limit [article A/s]."""
-    slope = error_slope(
-        error, command_voltage_rate(x[VOLTAGE], _held(u, RATE_COMMAND, t), p.rate_command),
-        p.tachometer.gain * acceleration,
-        p.sign * p.amplifier.bias_command_gain * u[COUNTER_TORQUE, 1], p.amplifier)
+    slope = _error_slope(t, x, u, error, acceleration, p)
     needed = limit_centre(acceleration, p.amplifier, p.armature) - slope
     return needed if error > 0.0 else -needed
 
@@ -116,7 +131,7 @@ def _current_rate(x: FloatArray, p: MotorDrive) -> float:
 def _rates(
         t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: MotorDrive, dx: FloatArray,
 ) -> None:
-    error, demand, centre = _demand(t, x, u, p)
+    error, demand, centre = _demand(t, x, mode, u, p)
     rate, torque = _gear(t, x, mode, u, p)
     dx[VOLTAGE] = command_voltage_rate(x[VOLTAGE], _held(u, RATE_COMMAND, t), p.rate_command)
     acceleration = _acceleration(x, mode, torque, p)
@@ -139,7 +154,7 @@ def _switch(
         twist(x[ANGLE], _axis_angle(u, t), p.gear_ratio, gear),
         twist_rate(x[ANGLE], x[RATE], _held(u, AXIS_RATE, t), p.gear_ratio, gear),
         gear.half_gap, gear.stiffness, gear.contact_damping)
-    error, demand, centre = _demand(t, x, u, p)
+    error, demand, centre = _demand(t, x, mode, u, p)
     excess = (demand - centre if error > 0.0 else centre - demand) - p.motor.current_limit
     winding = mode[WINDING]
     if excess > 0.0 or winding != FREE:

@@ -28,7 +28,8 @@ from antenna_drive.cli import main
 from antenna_drive.errors import UserError
 from antenna_drive.gap.confusability import BUILT_IN, confusability, planned
 from antenna_drive.gap.diagnosis import diagnose
-from antenna_drive.gap.drive_model import CHANNELS, DriveModel
+from antenna_drive.gap.drive_model import DriveModel
+from antenna_drive.gap.field_test import CHANNELS
 from antenna_drive.gap.report import page
 from antenna_drive.parameters import load
 from antenna_drive.recording.csv_format import write_csv
@@ -38,7 +39,7 @@ import pytest
 
 NOISE = {'ammeter': 0.01, 'tach_rate': 0.0035, 'encoder': 1e-6, 'bias_voltage': 0.01}
 OFFSETS = {
-    'offset:motor_1.armature.resistance': 0.012, 'offset:motor_2.amplifier.rate_gain': -0.009,
+    'offset:motor_1.motor.torque_constant': 0.012, 'offset:motor_2.amplifier.rate_gain': -0.009,
     'offset:plant.axis.inertia_hub': 0.008, 'offset:plant.axis.coulomb_torque': -0.013,
     'offset:torque_share.filter_1.gain': 0.01,
 }

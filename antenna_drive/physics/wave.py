@@ -1,0 +1,51 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What repeats with an angle: teeth, slots, scales and rails are seldom pure sines."""
+
+from __future__ import annotations
+
+import math
+
+from antenna_drive.physics.compiling import inner
+
+
+@inner
+def wave(angle: float, amplitude: float, second: float, cycles: float, phase: float,
+         second_phase: float) -> float:
+    """
+    Return a wave of two harmonics, in the unit of its amplitudes.
+
+    Parameters
+    ----------
+    angle
+        that it follows [rad]
+    amplitude, second
+        of the first and the second harmonic
+    cycles
+        of the first harmonic per revolution
+    phase, second_phase
+        of either harmonic at angle zero [rad]
+
+    """
+    turned = cycles * angle
+    return amplitude * math.sin(turned + phase) + second * math.sin(2.0 * turned + second_phase)
+
+
+@inner
+def wave_slope(angle: float, amplitude: float, second: float, cycles: float, phase: float,
+               second_phase: float) -> float:
+    """Return the derivative of `wave` by the angle, per rad; everything as there."""
+    turned = cycles * angle
+    return cycles * (amplitude * math.cos(turned + phase)
+                     + 2.0 * second * math.cos(2.0 * turned + second_phase))
