@@ -31,7 +31,7 @@ import numpy as np
 CHANNELS = ('position', 'speed', 'duty')
 UNITS = ('rad', 'rad/s', '1')
 POSITION, SPEED, DUTY = range(3)
-STEP_S = 2e-3
+STEP_S = 2.8e-3
 # Neighbouring samples err alike when it is the model that errs: so many a second are judged.
 JUDGED_HZ = 20.0
 # The servo reports the mean rate of the last so many seconds.
@@ -200,7 +200,8 @@ class ServoModel:
                  free: Sequence[str], without: Iterable[str] = (),
                  noise: Sequence[float] | None = None, threads: int = 1) -> None:
         """Prepare the experiments and the catalogue of what is absent."""
-        self._executor = ThreadPoolExecutor(threads)
+        # one thread after another would only wait for each other
+        self._executor = ThreadPoolExecutor(threads) if threads > 1 else None
         self.tests = list(tests)
         self.values = dict(values)
         self.notes: list[str] = []
@@ -266,7 +267,8 @@ class ServoModel:
                     plan.append((i, k))
                     wanted.append((k, values, until))
         results: list[list[FloatArray | None]] = [[None] * len(self.tests) for _ in points]
-        for (i, k), found in zip(plan, self._executor.map(self._run, wanted), strict=True):
+        runs = map if self._executor is None else self._executor.map
+        for (i, k), found in zip(plan, runs(self._run, wanted), strict=True):
             results[i][k] = found
         return results
 
@@ -300,12 +302,3 @@ def _left(forms: Sequence[Form], present: Mapping[str, float]) -> Iterable[Form]
         if any(name in taken for p in own for name in servo_catalogue.TIED.get(p.name, ())):
             continue
         yield Form(form.name, tuple(p for p in own if p.name not in taken))
-
-
-def effect_of(name: str) -> str:
-    """Return the id of the effect that a number belongs to; '' for motor and plain friction."""
-    for effect in servo_catalogue.catalogue().values():
-        for form in effect.forms:
-            if any(p.name == name and not p.shape for p in form.parameters):
-                return effect.id
-    return ''

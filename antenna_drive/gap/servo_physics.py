@@ -133,7 +133,8 @@ def swing(values: FloatArray, mass: float, length: float, gain: float, supply: f
     step
         of integration, at most [s]
     out
-        position [rad], rate [rad/s], duty and current [A] at each sample, shape (n, 4); written
+        position [rad], rate [rad/s], duty and current [A] at each sample, but for the position
+        as of the last step before it, shape (n, 4); written
 
     """
     kt, resistance, armature, coulomb, viscous = (
@@ -180,6 +181,8 @@ def swing(values: FloatArray, mass: float, length: float, gain: float, supply: f
         if k > 0:
             span = time[k] - t
             count = max(1, int(math.ceil(span / step - 1e-9)))
+            if elastic:
+                count *= 2  # the teeth are stiff
             h = span / count
             for _ in range(count):
                 # a change of the goal within the step counts with its part of it

@@ -16,9 +16,9 @@ What a servo's model lacks, one effect after the other, each judged on withheld 
 
 Begun from a motor with Coulomb and viscous friction alone. In each round the numbers so far are
 fitted, the generic search ranks what could be added, and the likeliest are tried out: fitted to
-a part of the tests and judged on the rest, each gain and each trajectory withheld once. The best
-stays if it lowers that error by more than `WORTH`; else the search is over. Nothing but the
-given tests takes part in any choice.
+a part of the tests and judged on the rest, each test withheld once. The best stays if it lowers
+that error by more than its price; what it makes superfluous goes; when nothing is worth its
+price the search is over. Nothing but the given tests takes part in any choice.
 """
 
 from __future__ import annotations
@@ -30,17 +30,19 @@ from typing import Any
 from antenna_drive.gap import servo_refit, verdict
 from antenna_drive.gap.fit import Problem
 from antenna_drive.gap.search import Candidate, Search
-from antenna_drive.gap.servo_catalogue import BASE, vector
+from antenna_drive.gap.servo_catalogue import BASE, catalogue, vector
 from antenna_drive.gap.servo_model import ServoModel, ServoTest
 from antenna_drive.gap.servo_refit import Fit
 import numpy as np
 
 Progress = Callable[[float, str], None]
-# Each round must lower the withheld error by such a share.
-WORTH = 0.02
-ROUNDS = 8
+# The effects of a model with the names of their forms, in the order in which they came.
+Structure = tuple[tuple[str, str], ...]
+# Each new number must lower the withheld error by such a share.
+WORTH = 0.01
+ROUNDS = 7
 # What is tried out of the verdict's ranking, pairs among it, and of all single effects.
-TRIED_RANKED, TRIED_SINGLES = 2, 7
+TRIED_RANKED, TRIED_SINGLES = 3, 9
 TURNS = 5
 
 
@@ -75,26 +77,35 @@ class Found:
 
     Attributes
     ----------
+    effects : what was added and stayed
     names : the numbers of the model that is reached
     fit : their values
     rounds : for each round its ranking and what was added, as plain data
 
     """
 
+    effects: tuple[str, ...]
     names: tuple[str, ...]
     fit: Fit
     rounds: list[dict[str, Any]]
 
 
 def folds(tests: Sequence[ServoTest]) -> list[Fold]:
-    """Return folds that withhold each gain once and each trajectory once, where others are."""
-    found = []
-    for key in ('kp', 'trajectory'):
-        levels = list(dict.fromkeys(getattr(test, key) for test in tests))
-        for level in levels if len(levels) > 1 else []:
-            found.append(Fold(tuple(t for t in tests if getattr(t, key) != level),
-                              tuple(t for t in tests if getattr(t, key) == level)))
-    return found
+    """
+    Return folds that withhold each test once, together with none of its gain or trajectory.
+
+    So every fold is fitted to all gains and all trajectories, where there are two or more of
+    each.
+    """
+    gains = sorted({test.kp for test in tests})
+    trajectories = sorted({test.trajectory for test in tests})
+    count = max(len(gains), len(trajectories), 2)
+    turn = [(gains.index(test.kp) + trajectories.index(test.trajectory)) % count
+            for test in tests]
+    parts = [Fold(tuple(t for t, k in zip(tests, turn, strict=True) if k != i),
+                  tuple(t for t, k in zip(tests, turn, strict=True) if k == i))
+             for i in range(count)]
+    return [part for part in parts if part.fitted and part.withheld]
 
 
 def lacking(tests: Sequence[ServoTest], effort: Effort, without: Sequence[str] = (),
@@ -115,49 +126,101 @@ def lacking(tests: Sequence[ServoTest], effort: Effort, without: Sequence[str] =
 
     """
     parts = folds(tests)
-    names: tuple[str, ...] = BASE
-    fit = servo_refit.refit(tests, names, (), effort.runs)
-    scale = _scale(tests, fit)
-    kept = [settled(part.fitted, names, fit.values, scale) for part in parts]
-    judged = _judged(parts, kept)
+    structure: Structure = ()
+    fit = servo_refit.refit(tests, BASE, (), effort.runs)
     rounds: list[dict[str, Any]] = []
     for turn in range(ROUNDS):
         progress(turn / ROUNDS, 'what the model lacks')
         scale = _scale(tests, fit)
-        problem = Problem(ServoModel(tests, fit.values, names, without, scale))
+        judged = _judged(parts, structure, fit.values, scale)
+        problem = Problem(ServoModel(tests, fit.values, numbers(structure), without, scale))
         candidates = Search(problem, lambda share, doing: None).run()
         ranked = verdict.rank(candidates, 0.0)
         likeliest = _likeliest([r.candidate for r in ranked], _singles(problem))
-        trials = [_tried(parts, kept, names, c, scale) for c in likeliest]
-        errors = [_judged(parts, fits) for fits in trials]
-        report: dict[str, Any] = {
-            'withheld_mrad_before': 1e3 * judged,
+        trials = [_Trial.of(c, structure, fit.values, parts, scale) for c in likeliest]
+        rounds.append({
+            'withheld_mrad': 1e3 * judged,
             'ranked': [{'effects': list(r.candidate.effects), 'probability': r.probability}
                        for r in ranked[:6]],
             'confusable': verdict.confusable(candidates),
             'tried': [{'effects': list(c.effects), 'forms': [f.name for f in c.forms],
-                       'withheld_mrad': 1e3 * e}
-                      for c, e in zip(likeliest, errors, strict=True)],
-            'added': None,
-        }
-        rounds.append(report)
-        if not errors or min(errors) > (1.0 - WORTH) * judged:
+                       'withheld_mrad': 1e3 * trial.judged}
+                      for c, trial in zip(likeliest, trials, strict=True)],
+            'added': [], 'dropped': [],
+        })
+        if not trials:
             break
-        k = int(np.argmin(errors))
-        best = likeliest[k]
-        judged, kept = errors[k], trials[k]
-        start = {**fit.values, **_values(best)}
-        names = (*names, *_new(names, best))
-        fit = servo_refit.nearby(tests, names, start, effort.near_runs)
-        report['added'] = list(best.effects)
-        report['forms'] = [form.name for form in best.forms]
-        report['withheld_mrad_after'] = 1e3 * judged
+        best = min(trials, key=lambda trial: trial.priced)
+        if best.priced > judged:
+            break
+        before, structure = structure, best.structure
+        rounds[-1]['added'] = [effect for effect, _ in structure[len(before):]]
+        fit = servo_refit.nearby(tests, numbers(structure), best.values, effort.near_runs)
+        worth = _judged(parts, structure, fit.values, scale)
+        for piece in structure:
+            shorter = tuple(p for p in structure if p != piece)
+            price = 1.0 + WORTH * (len(numbers(structure)) - len(numbers(shorter)))
+            bare = _judged(parts, shorter, fit.values, scale)
+            if bare <= price * worth:
+                rounds[-1]['dropped'].append(piece[0])
+                structure, worth = shorter, bare
+        if rounds[-1]['dropped']:
+            fit = servo_refit.nearby(tests, numbers(structure), fit.values, effort.near_runs)
+        if set(structure) <= set(before):
+            break
     progress(1.0, 'what the model lacks')
-    return Found(names, fit, rounds)
+    return Found(tuple(effect for effect, _ in structure), numbers(structure), fit, rounds)
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """
+    A model with a candidate's effects, judged on what folds withhold.
+
+    Attributes
+    ----------
+    structure : all its effects
+    values : of its numbers, where a fit may begin
+    judged : mean error on what was withheld [rad]
+    priced : the same with the price of what is new [rad]
+
+    """
+
+    structure: Structure
+    values: dict[str, float]
+    judged: float
+    priced: float
+
+    @classmethod
+    def of(cls, candidate: Candidate, structure: Structure, values: Mapping[str, float],
+           parts: Sequence[Fold], scale: Sequence[float]) -> _Trial:
+        point = candidate.state.point()
+        own = {p.name: point[p.name] for form in candidate.forms for p in form.parameters}
+        wider = (*structure, *zip(candidate.effects, (form.name for form in candidate.forms),
+                                  strict=True))
+        start = {**values, **own}
+        judged = _judged(parts, wider, start, scale)
+        return cls(wider, start, judged, judged * (1.0 + WORTH * len(own)))
+
+
+def numbers(structure: Structure) -> tuple[str, ...]:
+    """Return the numbers of a model with these effects."""
+    effects = catalogue()
+    own = [p.name for effect, form in structure
+           for known in effects[effect].forms if known.name == form for p in known.parameters]
+    return tuple(dict.fromkeys((*BASE, *own)))
+
+
+def _judged(parts: Sequence[Fold], structure: Structure, start: Mapping[str, float],
+            scale: Sequence[float]) -> float:
+    """Return the mean error of the folds on what they withheld [rad]."""
+    names = numbers(structure)
+    return float(np.mean([servo_refit.error(
+        part.withheld, settled(part.fitted, names, start, scale).values) for part in parts]))
 
 
 def _scale(tests: Sequence[ServoTest], fit: Fit) -> list[float]:
-    """Return the scale of what a fit leaves in position, speed and duty, a sensor's step at least."""
+    """Return the scale of what a fit leaves, in each channel a sensor's step at least."""
     row = vector(fit.values)
     left = np.concatenate([test.measured - test.readings(row) for test in tests])
     steps = np.max([test.steps for test in tests], axis=0)
@@ -190,25 +253,6 @@ def _likeliest(ranked: Sequence[Candidate], singles: Sequence[Candidate]) -> lis
     return chosen + [c for c in singles if c.effects not in known][:TRIED_SINGLES]
 
 
-def _new(names: Sequence[str], candidate: Candidate) -> tuple[str, ...]:
-    added = [p.name for form in candidate.forms for p in form.parameters]
-    return tuple(dict.fromkeys(name for name in added if name not in names))
-
-
-def _values(candidate: Candidate) -> dict[str, float]:
-    """Return where the candidate's own numbers came to lie."""
-    point = candidate.state.point()
-    return {p.name: point[p.name] for form in candidate.forms for p in form.parameters}
-
-
-def _tried(parts: Sequence[Fold], kept: Sequence[Fit], names: Sequence[str],
-           candidate: Candidate, scale: Sequence[float]) -> list[Fit]:
-    """Fit a candidate to each fold, from where the fold's simpler model is."""
-    everything = (*names, *_new(names, candidate))
-    return [settled(part.fitted, everything, {**before.values, **_values(candidate)}, scale)
-            for part, before in zip(parts, kept, strict=True)]
-
-
 def settled(tests: Sequence[ServoTest], names: Sequence[str], start: Mapping[str, float],
             scale: Sequence[float]) -> Fit:
     """
@@ -226,18 +270,12 @@ def settled(tests: Sequence[ServoTest], names: Sequence[str], start: Mapping[str
         that residuals are measured by, in position, speed and duty
 
     """
-    model = ServoModel(tests, start, names, noise=scale)
+    model = ServoModel(tests, {name: start[name] for name in names}, names, noise=scale)
     problem = Problem(model)
     state = problem.fit(problem.start(model.nuisances, {}), 2 * TURNS)
     state = problem.fit(problem.refreshed(state), TURNS)
     values = model.numbers(state.point())
     return Fit(values, servo_refit.error(tests, values))
-
-
-def _judged(parts: Sequence[Fold], fits: Sequence[Fit]) -> float:
-    """Return the mean error of folds on what they withheld [rad]."""
-    return float(np.mean([servo_refit.error(part.withheld, fit.values)
-                          for part, fit in zip(parts, fits, strict=True)]))
 
 
 def plain(values: Mapping[str, float]) -> dict[str, float]:

@@ -115,7 +115,7 @@ def compared(tests: Sequence[ServoTest], direction: Direction, effort: Effort,
         'split': direction.split,
         'fitted': list(direction.fitted),
         'models': {name: _model(fit, fitted, withheld) for name, fit in fits.items()},
-        'found': [effect for turn in found.rounds for effect in turn['added'] or ()],
+        'found': list(found.effects),
         'rounds': found.rounds,
         'seconds': time.monotonic() - began,
     }

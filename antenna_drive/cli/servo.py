@@ -1,0 +1,84 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+r"""
+Say what the model of an ordinary servo lacks, and prove it on tests that were withheld.
+
+DIR holds logs of a position-controlled servo with a pendulum, as the BAM project records them
+(JSON). The model begins as a motor with Coulomb and viscous friction. For each two gains, and
+each two trajectories, the diagnosis finds in their logs what is missing; then the servo is run
+free over the other logs, beside BAM's friction models m1 to m6 refitted to the same logs with
+the same effort. Errors are mean absolute position errors over whole runs, in milliradians.
+
+For example:
+
+  antenna-drive servo logs/
+  antenna-drive servo logs/ --split gain --runs 500 --jobs 2 --json result.json
+  antenna-drive servo logs/ --without gearbox.load_dependent_friction --json -
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+import sys
+
+from antenna_drive.cli.output import add_json_option, Progress, STANDARD_OUTPUT, write_json
+from antenna_drive.errors import UserError
+from antenna_drive.recording.bam import read_bam
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.add_argument('directory', metavar='DIR', help='folder with the logs, *.json')
+    parser.add_argument('--split', choices=('gain', 'trajectory', 'both'), default='both',
+                        help='what is withheld (default: both, one after the other)')
+    parser.add_argument('--without', action='append', default=[], metavar='EFFECT',
+                        help='leave an effect out of the catalogue; may be given several times')
+    parser.add_argument('--runs', type=int, default=2000, metavar='N',
+                        help='runs of all fitted logs for each fit (default: 2000; fewer are '
+                             'faster and worse for every model)')
+    parser.add_argument('--jobs', type=int, default=1, metavar='N',
+                        help='processes at once (default: 1)')
+    add_json_option(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Compare; 0 if the diagnosis has the lower withheld error in every split, else 1."""
+    # the compiled physics takes a while to load: not before it is needed
+    from antenna_drive.gap.servo_model import ServoTest
+    from antenna_drive.gap.servo_search import Effort
+    from antenna_drive.gap.servo_study import directions, SPLITS, study, text
+
+    for name, least in (('runs', 20), ('jobs', 1)):
+        if getattr(arguments, name) < least:
+            raise UserError(f'--{name}: {getattr(arguments, name)} given, '
+                            f'allowed is {least} or more')
+    folder = Path(arguments.directory)
+    if not folder.is_dir():
+        raise UserError(f'{folder}: no such folder; a folder with *.json logs is needed')
+    paths = sorted(folder.glob('*.json'))
+    if not paths:
+        raise UserError(f'{folder}: holds no *.json logs')
+    tests = [ServoTest.of(path.stem, read_bam(path)) for path in paths]
+    splits = tuple(SPLITS) if arguments.split == 'both' else (arguments.split,)
+    chosen = directions(tests, splits)
+    effort = Effort(arguments.runs, max(20, int(0.3 * arguments.runs)))
+    with Progress('servo', 1.0) as progress:
+        result = study(tests, chosen, effort, arguments.without, arguments.jobs,
+                       lambda share, doing: progress.update(share))
+    if arguments.json:
+        write_json(result, arguments.json)
+    print(text(result), file=sys.stderr if arguments.json == STANDARD_OUTPUT else sys.stdout)
+    return 0 if all(part['lower_than_best_of_ladder']
+                    for part in result['summary'].values()) else 1
