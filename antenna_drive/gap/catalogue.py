@@ -66,7 +66,7 @@ class Wave(Form):
         parameters = tuple(replace(part, name=f'{part.name}@{order:g}')
                            for part in self.parameters)
         return replace(self, name=f'{order:g} cycles per revolution', parameters=parameters,
-                       order=order)
+                       order=order, sought=True)
 
     def settings(self, sine: float, cosine: float, change: float, second_sine: float,
                  second_cosine: float) -> list[Setting]:
@@ -161,13 +161,25 @@ def _motor_effects(into: _Catalogue, component: str, paths: tuple[str, ...]) -> 
              _wave(f'{component}.torque_ripple', 'N m', 10.0, 0.02,
                    tuple(f'{path}.motor' for path in paths), paths[0], MOTOR_ORDERS,
                    'torque_ripple'))
-    one('torque_constant', 'weak or hot magnets, a wrong winding',
-        'more or less current for the same motion',
-        _parameter('change', '1', -0.6, 0.6, 5e-3, SCALE, *at('motor.torque_constant'),
-                   *at('armature.back_emf_constant')))
-    one('armature_resistance', 'hot or worn winding, brushes or cable',
-        'current follows its demand with another gain and lag',
-        _parameter('change', 'ohm', -0.4, 3.0, 4e-3, ADD, *at('armature.resistance_change')))
+    # whether the amplifier was trimmed to the motor as it is or as it should be, who knows
+    key = f'{component}.torque_constant'
+    into.add(component, 'torque_constant', 'weak or hot magnets, a wrong winding',
+             'more or less current for the same motion',
+             *(_form(key, _parameter(name, '1', -0.6, 0.6, 5e-3, SCALE,
+                                     *at('motor.torque_constant'), *other), name=words)
+               for name, words, other in (
+                   ('change', 'torque and back-EMF', at('armature.back_emf_share')),
+                   ('trimmed_change', 'torque and back-EMF, the limiter trimmed to it',
+                    at('armature.back_emf_constant')),
+                   ('torque_change', 'torque alone', ()))))
+    key = f'{component}.armature_resistance'
+    into.add(component, 'armature_resistance', 'hot or worn winding, brushes or cable',
+             'current follows its demand with another gain and lag',
+             _form(key, _parameter('change', 'ohm', -0.4, 3.0, 4e-3, ADD,
+                                   *at('armature.resistance_change')), name='of the winding'),
+             _form(key, _parameter('trimmed_change', '1', -0.8, 3.0, 5e-3, SCALE,
+                                   *at('armature.resistance')),
+                   name='of the winding, the amplifier trimmed to it'))
     one('amplifier_gain', 'amplifier 1 set or drifted to another gain',
         'stiffer or softer rate loop: currents at reversals',
         _parameter('change', '1', -0.8, 1.5, 5e-3, SCALE, *at('amplifier.rate_gain')))
@@ -191,11 +203,19 @@ def _gearbox_effects(into: _Catalogue, component: str, path: str) -> None:
     one('stiffness', 'loose housing, cracked shaft or other teeth',
         'frequency of the oscillation after a contact',
         _parameter('change', '1', -0.8, 4.0, 5e-3, SCALE, f'{path}.gearbox.stiffness'))
-    one('hysteresis', 'friction within the gear train as it winds up',
-        'torque lags behind the wind-up at each change of direction',
-        _parameter('torque', 'N m', 0.0, 10.0, 0.02, ADD, f'{path}.gearbox.hysteresis'),
-        _parameter('angle', 'rad', 2e-3, 0.5, 2e-3, SET, f'{path}.gearbox.hysteresis_angle',
-                   start=0.03))
+    key = f'{component}.hysteresis'
+    into.add(component, 'hysteresis', 'friction within the gear train as it winds up',
+             'torque lags behind the wind-up at each change of direction',
+             _form(key, _parameter('torque', 'N m', 0.0, 10.0, 0.02, ADD,
+                                   f'{path}.gearbox.hysteresis'),
+                   _parameter('angle', 'rad', 2e-3, 0.5, 2e-3, SET,
+                              f'{path}.gearbox.hysteresis_angle', start=0.03),
+                   name='the same at any load'),
+             _form(key, _parameter('share', '1', 0.0, 0.9, 4e-3, ADD,
+                                   f'{path}.gearbox.hysteresis_share'),
+                   _parameter('share_angle', 'rad', 2e-3, 0.5, 2e-3, SET,
+                              f'{path}.gearbox.hysteresis_angle', start=0.03),
+                   name='a share of the load'))
     into.add(component, 'transmission_error', 'eccentric or uneven teeth',
              'rate and current vary with the angle of the shaft, while the teeth touch',
              _wave(f'{component}.transmission_error', 'rad', 0.3, 5e-4, (f'{path}.gearbox',), path,

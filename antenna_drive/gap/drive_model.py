@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The antenna drive of a configuration, in the tests that were recorded, as a diagnosis needs it."""
+"""The antenna drive of a configuration, in the tests that were recorded, for a diagnosis."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ from concurrent.futures import ThreadPoolExecutor
 import copy
 from dataclasses import dataclass, replace
 import math
-from typing import Any
 
 from antenna_drive.emulator import batch
 from antenna_drive.gap import catalogue
@@ -289,7 +288,6 @@ class DriveModel:
 
     def _read(self, k: int, out: FloatArray, point: Point) -> FloatArray:
         """Return the readings of a run: what sensors do that nothing feeds back."""
-        test = self._tests[k]
         values = out[:, :, 0].copy()
         shift = np.zeros(len(CHANNELS))
         gain = np.ones(len(CHANNELS))

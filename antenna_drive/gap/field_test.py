@@ -42,7 +42,7 @@ CURRENT_1, CURRENT_2, TACH_1, TACH_2, ENCODER, BIAS = range(6)
 _ALIASES = {'motor_1/ammeter': ('motor_1/current',), 'motor_2/ammeter': ('motor_2/current',)}
 _RATE_COMMAND = 'test_signal/rate_command'
 # Samples are thinned to about this rate; they are never averaged, which would hide a ripple.
-SAMPLE_RATE = 110.0
+SAMPLE_RATE = 70.0
 # What a sheet's word for a circuit sets.
 _CIRCUITS = {'circuit': ('torque_share.torque_share', ('k_2', 's_2', 'k_3', 'g_4')),
              'filter_1': ('torque_share.filter_1', ('gain', 'pole'))}

@@ -82,12 +82,17 @@ class Problem:
         the machine
     used
         for each experiment which samples are fitted, shape (n,) of bool; None for all
+    scale
+        by what the expected noise is multiplied: while a model lacks something strong, what it
+        lacks is the noise, and the offsets must not be bent to fit it
 
     """
 
-    def __init__(self, model: Model, used: Sequence[NDArray[np.bool_]] | None = None) -> None:
+    def __init__(self, model: Model, used: Sequence[NDArray[np.bool_]] | None = None,
+                 scale: float = 1.0) -> None:
         """Lay the measured samples out in one row."""
         self.model = model
+        self.scale = scale
         self.experiments = list(model.experiments)
         self.sizes = [e.measured.size for e in self.experiments]
         self.ends = np.cumsum(self.sizes)
@@ -96,6 +101,9 @@ class Problem:
              & (np.ones(e.time.size, bool) if used is None else used[k])[:, np.newaxis]).ravel()
             for k, e in enumerate(self.experiments)])
         self.samples = int(self.valid.sum())
+        wanted = [k for k in range(len(self.experiments)) if self.valid[self.rows(k)].any()]
+        # the one experiment that counts, if it is one: the others need not be simulated
+        self._alone = wanted[0] if len(wanted) == 1 else None
 
     def rows(self, experiment: int) -> slice:
         """Return where an experiment's residuals lie."""
@@ -104,16 +112,26 @@ class Problem:
 
     def _scaled(self, k: int, predicted: FloatArray | None) -> FloatArray:
         experiment = self.experiments[k]
-        assert predicted is not None
-        z = ((experiment.measured - predicted) / experiment.noise).ravel()
+        if predicted is None:
+            return np.zeros(self.sizes[k])
+        z = ((experiment.measured - predicted) / (self.scale * experiment.noise)).ravel()
         z[~self.valid[self.rows(k)]] = 0.0
         # a prediction that has run away is a bad one, not a broken one
         return np.asarray(np.clip(np.nan_to_num(z, nan=1e4, posinf=1e4, neginf=-1e4), -1e4, 1e4))
 
     def residuals(self, points: Sequence[dict[str, float]]) -> list[FloatArray]:
         """Return the residuals of several variants, shape (n,) each."""
+        only = [self._alone] * len(points) if self._alone is not None else None
         return [np.concatenate([self._scaled(k, values) for k, values in enumerate(result)])
-                for result in self.model.simulate(points)]
+                for result in self.model.simulate(points, only)]
+
+    def level(self, residual: FloatArray) -> float:
+        """Return the size of residuals in standard deviations; few large ones count less."""
+        z = np.abs(residual[self.valid]) * self.scale
+        level = float(np.sqrt(np.mean(z ** 2)))
+        for _ in range(10):
+            level = float(np.sqrt(np.mean(np.minimum(z, HUBER * level) ** 2)))
+        return level
 
     def columns(self, point: dict[str, float], parameters: Sequence[Parameter],
                 residual: FloatArray, central: bool) -> NDArray[np.float32]:
@@ -304,7 +322,7 @@ def scanned(problem: Problem, point: dict[str, float], names: Sequence[str], exp
         for trial, result in zip(part, results, strict=True):
             predicted = result[experiment]
             assert predicted is not None
-            z = (here.measured[early] - predicted[early]) / here.noise[early]
+            z = (here.measured[early] - predicted[early]) / (problem.scale * here.noise[early])
             cost = huber_sum(z[np.isfinite(z)])
             if cost < best_cost:
                 best, best_cost = trial, cost
@@ -380,32 +398,44 @@ def bounded_step(curvature: FloatArray, gradient: FloatArray, low: FloatArray,
     m = gradient.size
     step = np.zeros(m)
     diagonal = np.diag(curvature)
-    free = diagonal > 1e-30  # what changes nothing stays where it is
-    dead = ~free
-    scale = np.where(free, 1.0 / np.sqrt(np.where(free, diagonal, 1.0)), 0.0)
+    dead = diagonal <= 1e-30  # what changes nothing stays where it is
+    scale = np.where(dead, 0.0, 1.0 / np.sqrt(np.where(dead, 1.0, diagonal)))
     scaled = curvature * np.outer(scale, scale)
-    for _ in range(4 * m):
-        rest = gradient - curvature @ np.where(free, 0.0, step)
+    scaled[np.diag_indices(m)] += 1e-12
+    room = (high > low) & ~dead
+    free = room & ~((low >= 0.0) & (gradient < 0.0)) & ~((high <= 0.0) & (gradient > 0.0))
+    for turn in range(4 * m):
         index = np.flatnonzero(free)
         if index.size:
-            part = scaled[np.ix_(index, index)]
-            try:
-                factor = linalg.cho_factor(part + 1e-12 * np.eye(index.size))
-                step[index] = scale[index] * linalg.cho_solve(factor, (scale * rest)[index])
-            except linalg.LinAlgError:
-                step[index] = scale[index] * np.linalg.lstsq(
-                    part, (scale * rest)[index], rcond=1e-10)[0]
+            rest = gradient - curvature @ np.where(free, 0.0, step)
+            step[index] = scale[index] * _solved(scaled[np.ix_(index, index)],
+                                                 (scale * rest)[index])
         out = free & ((step < low) | (step > high))
         if out.any():
-            step = np.clip(step, low, high)
+            np.clip(step, low, high, out=step)
             free &= ~out
             continue
         slope = gradient - curvature @ step
-        wrong = ~free & (((step <= low) & (slope > 0.0)) | ((step >= high) & (slope < 0.0)))
-        wrong &= (high > low) & ~dead
+        wrong = ~free & room & (((step <= low) & (slope > 0.0)) | ((step >= high) & (slope < 0.0)))
+        # what is nearly level gains nothing
+        wrong &= np.abs(slope) * scale > 1e-6
         if not wrong.any():
             break
-        # one at a time, the steepest: letting all go at once may cycle
-        worst = np.argmax(np.where(wrong, np.abs(slope) * scale, -1.0))
-        free[worst] = True
+        if turn < _AT_ONCE:
+            free |= wrong
+        else:
+            # one at a time, the steepest: letting all go at once may cycle
+            free[np.argmax(np.where(wrong, np.abs(slope) * scale, -1.0))] = True
     return np.asarray(np.clip(step, low, high))
+
+
+# For so many turns of the search for the active bounds all wrong ones are let go at once.
+_AT_ONCE = 12
+
+
+def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve for a symmetric matrix, by its Cholesky factor if it has one."""
+    factor, failed = linalg.lapack.dpotrf(matrix, lower=1)
+    if failed:
+        return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-10)[0])
+    return np.asarray(linalg.lapack.dpotrs(factor, right, lower=1)[0])

@@ -21,7 +21,7 @@ machine would have shown, had its parameters been other ones.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import math
 from typing import Protocol
 
@@ -65,10 +65,20 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Form:
-    """One mathematical form of an effect; its first parameters vanish with the effect."""
+    """
+    One mathematical form of an effect; its first parameters vanish with the effect.
+
+    Attributes
+    ----------
+    name : for people
+    parameters : of the form
+    sought : True if the form itself was looked for among many
+
+    """
 
     name: str
     parameters: tuple[Parameter, ...]
+    sought: bool = field(default=False, kw_only=True)
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,8 @@ def _of_the_machine(test: FieldTest, tolerance: float) -> Iterator[DriveParamete
             yield scaled(f'{motor}.{name}')
         # a motor's magnets make its torque and its back-EMF
         yield scaled(f'{motor}.motor.torque_constant', f'{motor}.motor.torque_constant',
-                     f'{motor}.armature.back_emf_constant')
+                     f'{motor}.armature.back_emf_share')
+        yield scaled(f'{motor}.armature.back_emf_constant')
         # its amplifier is made for the resistance that the winding should have
         ohms = tolerance * float(test.record[motor]['armature']['resistance'][0])
         path = f'{motor}.armature.resistance_change'

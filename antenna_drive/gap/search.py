@@ -14,13 +14,15 @@
 """
 Which effect: from the offsets alone over single effects to pairs.
 
-1. The offsets within the tolerance are fitted without any effect: 'none'.
+1. The offsets within the tolerance are fitted without any effect: 'none'. While something strong
+   is missing, what is missing counts as noise: the offsets stay where they may be.
 2. One derivative by each effect's parameters, taken there, says how much of what is left each
    effect could explain. That is a filter, no judgement.
-3. The likeliest dozen are fitted in earnest, each together with all offsets.
-4. 'None' is fitted once more from the offsets of the best effect: a fit that got stuck must not
-   raise an alarm.
-5. Several of the best are given each a partner, and the partners are fitted in earnest too.
+3. The likeliest dozen are fitted in earnest, each together with all offsets. If the best explains
+   much, the noise is set down to what it leaves, and the likeliest are fitted anew.
+4. Several of the best are given each a partner, and the partners are fitted in earnest too.
+5. What is left of all these is fitted to the whole tests, at the sensors' own noise, and so is
+   'none' once more, from the offsets of the best too: a fit that got stuck must raise no alarm.
 """
 
 from __future__ import annotations
@@ -32,29 +34,34 @@ from antenna_drive.gap.fit import (
     across, bounded_step, huber_sum, Problem, scanned, State, weighted_square,
 )
 from antenna_drive.gap.model import FloatArray, Form, Model, Parameter
+from antenna_drive.gap.price import price
 import numpy as np
 from numpy.typing import NDArray
 
 SINGLES = 14
-FINALISTS = 6
+FINALISTS = 5
 BASES = 3
 PARTNERS = 4
-# How many are fitted to the whole tests in the end.
-FULL_SINGLES = 5
-FULL_PAIRS = 4
-# Of those, what costs so much more than the best is not fitted any further.
-REACH = 400.0
 # A partner that could gain less than this in half a chi-square is not fitted.
 WORTH = 12.0
-# The offsets alone are fitted in at most so many rounds; they were stuck if that much of the
-# cost goes once they begin elsewhere.
-ROUNDS = 5
-STUCK = 0.02
-# Beyond this chi-square per sample the offsets say nothing any more.
-FAR = 4.0
-_SPAN = (-0.9, -0.6, -0.4, -0.25, -0.15, -0.08, 0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 0.9)
-# Fresh derivatives that gain less than this end a fit.
+# How many are fitted to the whole tests in the end, and in at most how many passes.
+FULL_SINGLES = 5
+FULL_PAIRS = 4
+PASSES = 3
+# Of those, what costs so much more than the best is not fitted any further.
+REACH = 250.0
+# Beyond this residual, in standard deviations, something strong is missing; below it, the noise
+# is the sensors'.
+FAR = 1.5
+# The noise is set down when so little of it is left.
+SHARPER = 0.7
+# A single effect that leaves more than this, in standard deviations, may have a partner.
+WANTING = 1.03
+# A pass that gains less than this ends the fits.
 SETTLED = 4.0
+# Forms with more parameters than this are free at every moment: a gust.
+FREE = 10
+_SPAN = (-0.9, -0.6, -0.4, -0.25, -0.15, -0.08, 0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 0.9)
 _EARLY_S = 1.5
 _GRID = np.linspace(-0.95, 0.95, 13)
 
@@ -85,6 +92,11 @@ class Candidate:
     def cost(self) -> float:
         """Return half a chi-square, robust, with the pull of the offsets."""
         return self.state.cost
+
+    @property
+    def priced(self) -> float:
+        """Return the cost with the price of the effects."""
+        return self.state.cost + price(self.forms)
 
 
 @dataclass(frozen=True)
@@ -120,46 +132,67 @@ class Search:
         self.problem = Problem(problem.model.brief())
         self.model: Model = self.problem.model
         self.progress = progress
-        # derivatives by the offsets where all are nought
+        # derivatives by the offsets where all are nought, at the sensors' own noise
         self.nominal = np.empty((0, 0), np.float32)
         self.tangents: list[_Tangent] = []
         self.screened: list[tuple[str, float]] = []
 
     def run(self) -> list[Candidate]:
         """Return every candidate that was fitted in earnest, the offsets alone first."""
+        self.progress(0.0, 'offsets')
         none = self._offsets()
-        for _ in range(2):
-            self.progress(0.2, 'what each effect would do')
-            self._take_tangents(none.state)
-            self.progress(0.4, 'single effects')
-            singles = self._singles(none)
-            again = self._none_again(none, singles)
-            stuck = again.cost < (1.0 - STUCK) * none.cost
-            none = again
-            if not stuck:
-                break
-        self.progress(0.6, 'pairs of effects')
-        pairs = self._pairs(none, singles)
-        self.progress(0.8, 'the likeliest in full')
+        self.progress(0.15, 'what each effect would do')
+        self._take_tangents(none.state)
+        self.progress(0.25, 'single effects')
+        singles = self._sharpened(self._singles(none))
+        self.progress(0.5, 'pairs of effects')
+        pairs = self._pairs(singles)
+        if pairs:
+            pairs = self._sharpened(pairs)
+        self.progress(0.7, 'the likeliest in full')
         return self._in_full(none, singles, pairs)
 
     def _offsets(self) -> Candidate:
-        problem, point = self.problem, {}
-        self.progress(0.0, 'where the motors start')
+        """Fit the offsets alone, the noise being what they leave."""
         point = self.placed({})
-        self.progress(0.03, 'offsets')
-        state = problem.start(self.model.nuisances, point)
-        self.nominal = state.jacobian
-        state = problem.fit(state, 12)
-        for _ in range(ROUNDS):
-            cost = state.cost
-            moved = self.placed(state.point())
-            if moved != state.point():
-                state = problem.start(self.model.nuisances, moved, state.jacobian)
-            state = problem.fit(problem.refreshed(state, central=False), 10)
-            if cost - state.cost < 0.003 * cost:
+        first = self.problem.start(self.model.nuisances, point)
+        self.nominal = first.jacobian
+        self.problem = self._at(self.problem.level(first.residual))
+        state = self.problem.start(self.model.nuisances, point, self.nominal / self.problem.scale)
+        state = self.problem.fit(state, 8)
+        for _ in range(5):
+            before, cost = self.problem.scale, state.cost
+            self.problem = self._at(min(before, self.problem.level(state.residual)))
+            point = self.placed(state.point())
+            state = self.problem.fit(self.problem.start(self.model.nuisances, point), 8)
+            if self.problem.scale > SHARPER * before and (
+                    before > 1.0 or cost - state.cost < 0.003 * cost):
                 break
         return Candidate((), (), state)
+
+    def _at(self, level: float) -> Problem:
+        """Return the problem with so much noise."""
+        return Problem(self.model, scale=level if level > FAR else 1.0)
+
+    def _sharpened(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+        """Set the noise down to what the best candidate leaves, and fit the likeliest anew."""
+        found = list(candidates)
+        for _ in range(3):
+            best = found[0].state
+            problem = self._at(min(self.problem.scale, self.problem.level(best.residual)))
+            if problem.scale > SHARPER * self.problem.scale:
+                break
+            self.tangents = [replace(t, columns=t.columns * (self.problem.scale / problem.scale))
+                             for t in self.tangents]
+            self.problem = problem
+            offsets = self._offset_columns(problem, best.point())
+            found = sorted((self._refitted(problem, c, offsets, 8) for c in found[:FINALISTS]),
+                           key=lambda c: c.priced)
+        return found
+
+    def _offset_columns(self, problem: Problem, point: dict[str, float]) -> NDArray[np.float32]:
+        return problem.columns(point, self.model.nuisances, problem.residuals([point])[0],
+                               central=False)
 
     def placed(self, point: dict[str, float]) -> dict[str, float]:
         """Return the point with the starting places that fit the first seconds best."""
@@ -173,7 +206,8 @@ class Search:
 
     def _residuals(self, state: State) -> list[FloatArray]:
         """Return the residuals in the readings' own units, shape (n, c) for each experiment."""
-        return [state.residual[self.problem.rows(k)].reshape(e.measured.shape) * e.noise
+        scale = self.problem.scale
+        return [state.residual[self.problem.rows(k)].reshape(e.measured.shape) * e.noise * scale
                 for k, e in enumerate(self.problem.experiments)]
 
     def _columns(self, state: State, form: Form) -> NDArray[np.float32]:
@@ -186,25 +220,10 @@ class Search:
         return columns
 
     def _take_tangents(self, state: State) -> None:
-        self.tangents = []
         residuals = self._residuals(state)
-        count = len(self.model.effects)
-        for i, effect in enumerate(self.model.effects.values()):
-            self.progress(0.2 + 0.2 * i / count, 'what each effect would do')
-            for form in self.model.forms(effect, residuals):
-                self.tangents.append(_Tangent(effect.id, form, self._columns(state, form)))
-
-    def _waves_anew(self, state: State) -> None:
-        """Look for waves in what a candidate leaves, which another effect may have hidden."""
-        residuals = self._residuals(state)
-        others = []
-        for effect in self.model.effects.values():
-            forms = self.model.forms(effect, residuals)
-            if any(hasattr(form, 'at') for form in forms):
-                others += [_Tangent(effect.id, form, self._columns(state, form))
-                           for form in forms]
-        names = {tangent.effect for tangent in others}
-        self.tangents = [t for t in self.tangents if t.effect not in names] + others
+        self.tangents = [_Tangent(effect.id, form, self._columns(state, form))
+                         for effect in self.model.effects.values()
+                         for form in self.model.forms(effect, residuals)]
 
     def _screen(self, state: State, besides: Sequence[str] = ()) -> list[tuple[float, _Tangent]]:
         """Return the gain that each form promises, the greatest first, best forms only."""
@@ -216,7 +235,7 @@ class Search:
         gradient = across(state.jacobian, state.weight * state.residual) - pull * state.x
         found: dict[str, list[tuple[float, _Tangent]]] = {}
         for tangent in self.tangents:
-            if tangent.effect in besides or (besides and len(tangent.form.parameters) > 10):
+            if tangent.effect in besides or (besides and len(tangent.form.parameters) > FREE):
                 # what is free at every moment explains the remains of anything
                 continue
             live = [j for j, p in enumerate(tangent.form.parameters)
@@ -257,36 +276,23 @@ class Search:
     def _singles(self, none: Candidate) -> list[Candidate]:
         screened = self._screen(none.state)
         self.screened = [(tangent.effect, gain) for gain, tangent in screened]
-        chosen = screened[:SINGLES]
-        found = []
-        for i, (_, tangent) in enumerate(chosen):
-            self.progress(0.4 + 0.15 * i / len(chosen), 'single effects')
-            found.append(self._fitted(none, tangent, False, 5))
-        found.sort(key=lambda c: c.cost)
-        if none.cost > FAR * self.problem.samples / 2.0:
-            found = [*(self._from_afar(c) for c in found[:FINALISTS]), *found[FINALISTS:]]
-            found.sort(key=lambda c: c.cost)
+        found = sorted((self._fitted(none, tangent, False, 5)
+                        for _, tangent in screened[:SINGLES]), key=lambda c: c.priced)
         # those that are far behind after a few turns stay there
-        for i in range(min(FINALISTS, len(found))):
-            found[i] = self._shaped(found[i], 8)
-        found.sort(key=lambda c: c.cost)
-        for i in range(min(2, len(found))):
-            found[i] = self._settled(found[i], 1)
-        found.sort(key=lambda c: c.cost)
-        return [*found[:BASES], *(_light(c) for c in found[BASES:])]
+        self.progress(0.35, 'single effects')
+        leading = found[:FINALISTS]
+        if self.problem.scale > 1.0:
+            leading = [self._from_afar(c) for c in leading]
+        leading = sorted((self._shaped(c, 8) for c in leading), key=lambda c: c.priced)
+        leading[:2] = [self._settled(c) for c in leading[:2]]
+        leading.sort(key=lambda c: c.priced)
+        return [*leading, *(_light(c) for c in found[FINALISTS:])]
 
-    def _settled(self, candidate: Candidate, rounds: int = 3) -> Candidate:
-        """Fit with fresh derivatives of everything until that gains nothing any more."""
-        state = candidate.state
-        for i in range(rounds):
-            cost = state.cost
-            point = self.placed(state.point()) if i == 0 else state.point()
-            if point != state.point():
-                state = self.problem.start(state.parameters, point, state.jacobian)
-            state = self.problem.fit(self.problem.refreshed(state, central=i > 0), 10)
-            if cost - state.cost < max(SETTLED, 2e-4 * cost):
-                break
-        return replace(candidate, state=state)
+    def _settled(self, candidate: Candidate) -> Candidate:
+        """Fit with fresh derivatives of everything."""
+        point = self.placed(candidate.state.point())
+        state = self.problem.start(candidate.state.parameters, point)
+        return replace(candidate, state=self.problem.fit(state, 10))
 
     def _from_afar(self, candidate: Candidate) -> Candidate:
         """
@@ -308,99 +314,73 @@ class Search:
                 for share in _SPAN if (share > 0.0 or first.low < 0.0)]
         trials = [{**begin, **base, first.name: value} for value in (known, *span)]
         costs = [huber_sum(z) for z in problem.residuals(trials)]
-        point = self.placed(trials[int(np.argmin(costs))])
+        point = trials[int(np.argmin(costs))]
         columns = problem.columns(point, form.parameters, problem.residuals([point])[0],
                                   central=True)
         state = problem.start((*self.model.nuisances, *form.parameters), point,
-                              np.column_stack([self.nominal, columns]))
+                              np.column_stack([self.nominal / problem.scale, columns]))
         state = problem.fit(state, 12)
         return replace(candidate, state=state) if state.cost < candidate.cost else candidate
 
-    def _without(self, candidate: Candidate, effect: str) -> Candidate:
-        """Fit a candidate without one of its effects, from the offsets that it has with it."""
-        gone = candidate.effects.index(effect)
-        effects = tuple(e for i, e in enumerate(candidate.effects) if i != gone)
-        forms = tuple(f for i, f in enumerate(candidate.forms) if i != gone)
-        names = {p.name for p in candidate.forms[gone].parameters}
-        state = candidate.state
-        own = [j for j, p in enumerate(state.parameters) if p.name not in names]
-        values = state.point()
-        point = self.model.absorbed(
-            {state.parameters[j].name: values[state.parameters[j].name] for j in own},
-            {name: values[name] for name in names})
-        again = self.problem.start([state.parameters[j] for j in own], point,
-                                   state.jacobian[:, own])
-        return Candidate(effects, forms, self.problem.fit(again, 12))
-
-    def _none_again(self, none: Candidate, singles: Sequence[Candidate]) -> Candidate:
-        """Fit the offsets alone once more from those of the best effect."""
-        best = none
-        for single in singles[:2]:
-            again = self._without(single, single.effects[0])
-            if again.cost < best.cost:
-                best = again
-        return best
-
-    def _pairs(self, none: Candidate, singles: Sequence[Candidate]) -> list[Candidate]:
+    def _pairs(self, singles: Sequence[Candidate]) -> list[Candidate]:
+        """Give the best singles each a few partners."""
+        best = singles[0]
+        # what the best leaves is looked at anew, if it leaves anything: another effect may have
+        # hidden a wave, or be strong
+        if self.problem.level(best.state.residual) > WANTING:
+            self._take_tangents(best.state)
+        worth = max(WORTH, 0.001 * best.cost)
         found: dict[tuple[str, ...], Candidate] = {}
-        share = 0.3 / (BASES * PARTNERS)
-        worth = max(WORTH, 0.02 * (none.cost - singles[0].cost))
-        if none.cost - singles[0].cost < WORTH:
-            return []
-        self._waves_anew(singles[0].state)
-        for base in singles[:BASES]:
-            partners = [(gain, tangent) for gain, tangent in self._screen(
-                base.state, base.effects) if gain > worth][:PARTNERS]
-            for _, tangent in partners:
+        for i, base in enumerate(singles[:BASES]):
+            self.progress(0.5 + 0.2 * i / BASES, 'pairs of effects')
+            if base.priced > 3.0 * best.priced + REACH:
+                continue
+            for gain, tangent in self._screen(base.state, base.effects)[:PARTNERS]:
                 key = tuple(sorted((*base.effects, tangent.effect)))
-                if key in found:
+                if gain < worth or key in found:
                     continue
-                self.progress(0.7 + share * len(found), 'pairs of effects')
                 pair = self._fitted(base, tangent, True, 5)
-                if pair.cost < singles[0].cost:
+                if pair.cost < best.cost:
                     pair = self._shaped(pair, 6)
-                best = min((c.cost for c in found.values()), default=np.inf)
-                found[key] = pair if pair.cost < best else _light(pair)
-        pairs = sorted(found.values(), key=lambda c: c.cost)
-        return [*pairs[:1], *(_light(pair) for pair in pairs[1:])]
+                found[key] = _light(pair)
+        return sorted(found.values(), key=lambda c: c.priced)
 
     def _in_full(self, none: Candidate, singles: Sequence[Candidate],
                  pairs: Sequence[Candidate]) -> list[Candidate]:
         """
         Fit the likeliest candidates to the whole tests, the offsets alone first.
 
-        All share the derivatives by the offsets, which are taken twice: where the search has
-        ended, and where the best single effect is then.
+        All share the derivatives by the offsets, which are taken anew in every pass, where the
+        best candidate is then.
         """
-        chosen = [*singles[:FULL_SINGLES], *pairs[:FULL_PAIRS]]
-        if not chosen:
-            return [self._in_full_alone(none)]
-        if pairs and pairs[0].cost < singles[0].cost:
+        whole = self.whole
+        least = min(c.priced for c in (*singles, *pairs))
+        chosen = [singles[0], *(c for c in (*singles[1:FULL_SINGLES], *pairs[:FULL_PAIRS])
+                                if c.priced < least + REACH)]
+        if pairs and pairs[0].priced < singles[0].priced:
             # a member that passed for the pair's whole effect, with the offsets the pair has
             known = {c.effects for c in chosen}
             chosen += [c for c in (self._dropped(pairs[0], e) for e in pairs[0].effects)
                        if c.effects not in known]
-        anchor = min(chosen, key=lambda c: c.cost)
-        for turns in (5, 8):
-            point = anchor.state.point()
-            offsets = self.whole.columns(point, self.model.nuisances,
-                                         self.whole.residuals([point])[0], central=False)
-            chosen = sorted((self._refitted(c, offsets, turns) for c in chosen),
-                            key=lambda c: c.cost)
+        anchor = min(chosen, key=lambda c: c.priced)
+        before = np.inf
+        for number in range(PASSES):
+            self.progress(0.7 + 0.3 * number / PASSES, 'the likeliest in full')
+            offsets = self._offset_columns(whole, anchor.state.point())
+            chosen = sorted((self._refitted(whole, c, offsets, 6) for c in chosen),
+                            key=lambda c: c.priced)
             singles = [c for c in chosen if len(c.effects) == 1]
-            none = min((self._refitted(c, offsets, turns) for c in (
-                none, *(self._dropped(c, c.effects[0]) for c in singles[:3]))),
-                key=lambda c: c.cost)
+            bare = [none] if number else [none, self._dropped(singles[0], singles[0].effects[0])]
+            none = min((self._refitted(whole, c, offsets, 6) for c in bare),
+                       key=lambda c: c.cost)
             # what is far behind stays there
-            chosen = [*singles[:1], *(c for c in chosen if c is not singles[0]
-                                      and c.cost < min(chosen[0].cost, none.cost) + REACH)]
-            anchor = singles[0]
-        return [none, *sorted(chosen, key=lambda c: c.cost)]
-
-    def _in_full_alone(self, none: Candidate) -> Candidate:
-        state = self.whole.start(self.model.nuisances, none.state.point())
-        state = self.whole.fit(state, 8)
-        return replace(none, state=self.whole.fit(self.whole.refreshed(state), 8))
+            anchor = chosen[0] if chosen[0].priced < none.cost else none
+            chosen = [singles[0], *(c for c in chosen if c is not singles[0]
+                                    and c.priced < anchor.priced + REACH)]
+            if number and before - anchor.priced < max(SETTLED, 1e-3 * anchor.priced):
+                break
+            before = anchor.priced
+        return [none, *sorted(chosen, key=lambda c: c.priced)]
 
     def _dropped(self, candidate: Candidate, effect: str) -> Candidate:
         """Return a candidate without one of its effects, not fitted yet."""
@@ -417,16 +397,16 @@ class Search:
             tuple(e for i, e in enumerate(candidate.effects) if i != gone),
             tuple(f for i, f in enumerate(candidate.forms) if i != gone), bare)
 
-    def _refitted(self, candidate: Candidate, offsets: NDArray[np.float32],
+    def _refitted(self, problem: Problem, candidate: Candidate, offsets: NDArray[np.float32],
                   turns: int) -> Candidate:
-        """Fit a candidate to the whole tests, with these derivatives by the offsets."""
+        """Fit a candidate to another problem, with these derivatives by the offsets."""
         point = candidate.state.point()
         own = [p for form in candidate.forms for p in form.parameters]
-        residual = self.whole.residuals([point])[0]
-        columns = self.whole.columns(point, own, residual, central=True)
-        state = self.whole.start((*self.model.nuisances, *own), point,
-                                 np.column_stack([offsets, columns]))
-        return replace(candidate, state=self.whole.fit(state, turns))
+        columns = problem.columns(point, own, problem.residuals([point])[0],
+                                  central=len(own) <= FREE)
+        state = problem.start((*self.model.nuisances, *own), point,
+                              np.column_stack([offsets, columns]))
+        return replace(candidate, state=problem.fit(state, turns))
 
 
 def _light(candidate: Candidate) -> Candidate:

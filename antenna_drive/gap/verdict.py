@@ -27,17 +27,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
-from antenna_drive.gap.catalogue import Wave
 from antenna_drive.gap.search import Candidate
 import numpy as np
 
 TEMPERATURE = 8.0
-# Price of an effect, of each of its numbers, of a number that is pulled to nought and so pays
-# in part by that, of a wave whose cycles were searched for.
-EFFECT_PRICE = 20.0
-PARAMETER_PRICE = 4.0
-PULLED_PRICE = 1.5
-WAVE_PRICE = 10.0
 # No form of an effect is quite the machine's: a second effect must do more than mend the first,
 # and pays so much, and such a share of what the first explains.
 SECOND_PRICE = 60.0
@@ -73,13 +66,10 @@ def score(candidate: Candidate, gap: float) -> float:
 
     """
     count = len(candidate.effects)
-    price = EFFECT_PRICE * count
-    price += sum(PULLED_PRICE if p.spread else PARAMETER_PRICE
-                 for form in candidate.forms for p in form.parameters)
-    price += WAVE_PRICE * sum(isinstance(form, Wave) for form in candidate.forms)
+    total = candidate.priced
     if count > 1:
-        price += (count - 1) * (SECOND_PRICE + SECOND_SHARE * gap)
-    return candidate.cost + price
+        total += (count - 1) * (SECOND_PRICE + SECOND_SHARE * gap)
+    return total
 
 
 def gap_of(candidates: Sequence[Candidate]) -> float:

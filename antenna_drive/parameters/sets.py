@@ -97,6 +97,8 @@ class Armature:
     physical_amperes_per_article_ampere: float = _given(
         '1', 0.1, 100.0, 'real amperes in one article ampere [kappa]')
     voltage_limit: float = _given('V', 1.0, 1e4, 'greatest armature voltage [V_max]')
+    back_emf_share: float = _effect(
+        1.0, '1', 0.1, 10.0, "back-EMF as a share of what the amplifier's limiter is made for")
     resistance_change: float = _effect(
         0.0, 'ohm', -1e3, 1e3, 'resistance beyond the one that amplifier 2 is made for')
 
@@ -143,6 +145,8 @@ class Gearbox:
     contact_damping: float = _given(
         'N m s/rad', 0.0, 1e3, 'damping of the touching flanks [d_g]')
     hysteresis: float = _effect(0.0, 'N m', 0.0, 20.0, 'torque of the internal friction')
+    hysteresis_share: float = _effect(
+        0.0, '1', 0.0, 0.9, 'internal friction as a share of the elastic torque')
     hysteresis_angle: float = _effect(
         0.02, 'rad', 1e-4, 1.0, 'wind-up over which the internal friction builds up')
     transmission_error: float = _effect(

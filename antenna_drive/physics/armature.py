@@ -33,9 +33,9 @@ def current_rate(voltage: float, current: float, rate: float, p: Armature) -> fl
     rate
         w of the motor [rad/s]
     p
-        Armature; resistance_change is zero in the article
+        Armature; resistance_change is zero and back_emf_share 1 in the article
 
     """
     kappa = p.physical_amperes_per_article_ampere
-    return ((voltage - p.back_emf_constant * rate) / kappa
+    return ((voltage - p.back_emf_constant * p.back_emf_share * rate) / kappa
             - (p.resistance + p.resistance_change) * current) / p.inductance

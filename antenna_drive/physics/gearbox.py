@@ -76,8 +76,8 @@ def gear_torque(side: int, angle: float, rate: float, presliding: float, p: Gear
 
     """
     torque = contact_torque(side, angle, rate, p.half_gap, p.stiffness, p.contact_damping)
-    if p.hysteresis != 0.0 and torque != 0.0:
-        torque += p.hysteresis * presliding
+    if torque != 0.0 and (p.hysteresis != 0.0 or p.hysteresis_share != 0.0):
+        torque += (p.hysteresis + p.hysteresis_share * abs(torque)) * presliding
         torque = max(torque, 0.0) if side > 0 else min(torque, 0.0)
     return torque
 
@@ -88,11 +88,12 @@ def presliding_rate(side: int, rate: float, presliding: float, p: Gearbox) -> fl
     Return the time derivative of the hysteresis' state [1/s].
 
     The state follows Dahl's law: it comes to +-1 once the teeth have moved by a few
-    hysteresis_angle in one direction. It is forgotten while the teeth do not touch.
+    hysteresis_angle in one direction. A friction that is there without load is forgotten while
+    the teeth do not touch.
     """
-    if p.hysteresis == 0.0:
+    if p.hysteresis == 0.0 and p.hysteresis_share == 0.0:
         return 0.0
-    if side == 0:
+    if side == 0 and p.hysteresis != 0.0:
         return -presliding / _FORGETTING_S
     return (rate - abs(rate) * presliding) / p.hysteresis_angle
 
