@@ -366,8 +366,8 @@ def _sensor_effects(into: _Catalogue) -> None:
 
 DELAY = 'loop.delay.time'
 GUST = 'axis.wind_gust'
-# The gust's torque is free at times so far apart [s], with straight lines between.
-GUST_KNOT_S = 1.0
+# The gust's torque is free at times so far apart [s], and smooth between.
+GUST_KNOT_S = 0.5
 
 
 def gust_form(durations: Sequence[float]) -> Form:

@@ -367,8 +367,9 @@ class _Held(Problem):
         super().__init__(model, used)
         self._fixed = fixed
 
-    def residuals(self, points: Sequence[dict[str, float]]) -> list[FloatArray]:
-        return super().residuals([{**self._fixed, **point} for point in points])
+    def residuals(self, points: Sequence[dict[str, float]],
+                  alone: int | None = None) -> list[FloatArray]:
+        return super().residuals([{**self._fixed, **point} for point in points], alone)
 
 
 def _blocks(time_s: FloatArray, before: FloatArray, after: FloatArray) -> FloatArray:

@@ -32,21 +32,24 @@ from antenna_drive.gap.field_test import (
 from antenna_drive.gap.model import Effect, Experiment, FloatArray, Form, Point
 from antenna_drive.gap.offsets import CLOCK, offsets, SUPPLY, ZERO
 from antenna_drive.gap.residuals import Motion
-from antenna_drive.gap.waves import order_scores
+from antenna_drive.gap.waves import likely_orders
 from antenna_drive.parameters.records import place_of
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.recording import Recording
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 LONGEST_STEP = 2.5e-3
 # A search looks at so much of a test [s], with longer steps.
 BRIEF_S = 15.0
 BRIEF_LONGEST_STEP = 3.4e-3
 # How many cycles per revolution are tried of each wave.
-_WAVES = 2
+_WAVES = 3
 # The mode that the record has room for and the configuration has not.
 _EXTRA = 3
 _CACHE = 400
+# A gust's torque is smooth; within so much time it may be a straight line [s].
+_GUST_S = 0.02
 
 
 @dataclass(frozen=True)
@@ -154,7 +157,7 @@ class DriveModel:
             if not isinstance(form, Wave):
                 found.append(form)
                 continue
-            for order in self._orders(form, residuals):
+            for order in likely_orders(form, self.experiments, residuals, _WAVES):
                 wave = form.at(order)
                 self.register(wave)
                 found.append(wave)
@@ -166,21 +169,6 @@ class DriveModel:
             assert isinstance(item, DriveParameter)
             self._waves[item.name] = (wave, part)
             self._by_name[item.name] = item
-
-    def _orders(self, form: Wave, residuals: Sequence[FloatArray]) -> list[float]:
-        """Return the cycles per revolution with which the residuals vary most."""
-        score = np.zeros(len(form.orders))
-        orders = np.array(form.orders)
-        for experiment, residual in zip(self.experiments, residuals, strict=True):
-            score += order_scores(form, experiment, residual, orders)
-        best: list[float] = []
-        for j in np.argsort(score)[::-1]:
-            if form.angle == 'axis' and any(abs(math.log(orders[j] / b)) < 0.15 for b in best):
-                continue
-            best.append(float(orders[j]))
-            if len(best) == _WAVES:
-                break
-        return best
 
     def absorbed(self, point: Point, gone: Point) -> dict[str, float]:
         """Return the offsets that do as much as they can of what an effect did."""
@@ -253,7 +241,8 @@ class DriveModel:
         torque = None
         if gust:
             knots = np.array(sorted(gust))
-            torque = (knots[:, 0], knots[:, 1])
+            fine = np.arange(0.0, knots[-1, 0] + _GUST_S, _GUST_S)
+            torque = (fine, CubicSpline(knots[:, 0], knots[:, 1])(fine))
         plan = self._plan(job.experiment, bias, delay, torque)
         samples = int(np.count_nonzero(test.time < job.until))
         if samples == test.time.size:

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from antenna_drive.gap.model import FloatArray, Model, Parameter
 import numpy as np
@@ -47,21 +48,33 @@ class State:
     x : their values, shape (m,)
     residual : measured less predicted, in standard deviations, shape (n,); zero where nothing was
         measured
-    jacobian : derivative of the prediction [standard deviations per unit], shape (n, m), in
-        single precision: it is large, and a direction is all that it gives
+    taken : derivative of the prediction [standard deviations per unit] as it was taken last,
+        shape (n, m), in single precision: it is large, and a direction is all that it gives
     weight : Huber weight of each residual, shape (n,)
-    hessian : jacobian, weight, jacobian, shape (m, m)
     cost : Huber's sum over the residuals, half a chi-square, and the pull of the offsets
+    errors, directions : outer products that the fit has corrected the derivative by, shapes (n,)
+        and (m,) each
 
     """
 
     parameters: tuple[Parameter, ...]
     x: FloatArray
     residual: FloatArray
-    jacobian: NDArray[np.float32]
+    taken: NDArray[np.float32]
     weight: FloatArray
-    hessian: FloatArray
     cost: float
+    errors: tuple[FloatArray, ...] = ()
+    directions: tuple[FloatArray, ...] = ()
+
+    @cached_property
+    def jacobian(self) -> NDArray[np.float32]:
+        """Return the derivative of the prediction, shape (n, m)."""
+        return _with(self.taken, self.errors, self.directions)
+
+    @cached_property
+    def hessian(self) -> FloatArray:
+        """Return derivative, weight, derivative, shape (m, m)."""
+        return weighted_square(self.jacobian, self.weight)
 
     def point(self) -> dict[str, float]:
         """Return the values by name."""
@@ -119,9 +132,11 @@ class Problem:
         # a prediction that has run away is a bad one, not a broken one
         return np.asarray(np.clip(np.nan_to_num(z, nan=1e4, posinf=1e4, neginf=-1e4), -1e4, 1e4))
 
-    def residuals(self, points: Sequence[dict[str, float]]) -> list[FloatArray]:
-        """Return the residuals of several variants, shape (n,) each."""
-        only = [self._alone] * len(points) if self._alone is not None else None
+    def residuals(self, points: Sequence[dict[str, float]],
+                  alone: int | None = None) -> list[FloatArray]:
+        """Return the residuals of several variants, shape (n,) each; those of one test alone."""
+        alone = self._alone if alone is None else alone
+        only = [alone] * len(points) if alone is not None else None
         return [np.concatenate([self._scaled(k, values) for k, values in enumerate(result)])
                 for result in self.model.simulate(points, only)]
 
@@ -204,21 +219,15 @@ class Problem:
         everything = (*state.parameters, *parameters)
         point = dict(zip((p.name for p in everything), x.tolist(), strict=True))
         residual = self.residuals([point])[0]
-        cross = weighted_square(state.jacobian, state.weight, columns)
-        hessian = np.block([[state.hessian, cross],
-                            [cross.T, weighted_square(columns, state.weight)]])
         return _state(everything, x, residual, np.column_stack([state.jacobian, columns]),
-                      state.weight, hessian)
+                      state.weight)
 
     def replaced(self, state: State, where: Sequence[int],
                  columns: NDArray[np.float32]) -> State:
         """Return the state with other derivatives by some of its parameters."""
         jacobian = state.jacobian.copy()
         jacobian[:, where] = columns
-        hessian = state.hessian.copy()
-        hessian[:, where] = weighted_square(jacobian, state.weight, columns)
-        hessian[where, :] = hessian[:, where].T
-        return _state(state.parameters, state.x, state.residual, jacobian, state.weight, hessian)
+        return _state(state.parameters, state.x, state.residual, jacobian, state.weight)
 
     def fit(self, state: State, turns: int = 10, gain: float = 1.0) -> State:
         """
@@ -285,8 +294,8 @@ class Problem:
                     break
             else:
                 damping = min(max(damping, 1e-3) * 6.0, 1e4)
-        jacobian = _with(state.jacobian, errors, directions)
-        return _state(state.parameters, x, residual, jacobian, weight)
+        return State(state.parameters, x, residual, state.jacobian, weight, cost,
+                     tuple(errors), tuple(directions))
 
 
 def scanned(problem: Problem, point: dict[str, float], names: Sequence[str], experiment: int,
@@ -372,11 +381,8 @@ def _cost(residual: FloatArray, x: FloatArray, pull: FloatArray) -> float:
 
 
 def _state(parameters: tuple[Parameter, ...], x: FloatArray, residual: FloatArray,
-           jacobian: NDArray[np.float32], weight: FloatArray,
-           hessian: FloatArray | None = None) -> State:
-    if hessian is None:
-        hessian = weighted_square(jacobian, weight)
-    return State(parameters, x, residual, jacobian, weight, hessian,
+           jacobian: NDArray[np.float32], weight: FloatArray) -> State:
+    return State(parameters, x, residual, jacobian, weight,
                  _cost(residual, x, _pull(parameters)))
 
 

@@ -38,10 +38,10 @@ from antenna_drive.gap.price import price
 import numpy as np
 from numpy.typing import NDArray
 
-SINGLES = 14
+SINGLES = 16
 FINALISTS = 5
 BASES = 3
-PARTNERS = 4
+PARTNERS = 5
 # A partner that could gain less than this in half a chi-square is not fitted.
 WORTH = 12.0
 # How many are fitted to the whole tests in the end, and in at most how many passes.
@@ -61,6 +61,10 @@ WANTING = 1.03
 SETTLED = 4.0
 # Forms with more parameters than this are free at every moment: a gust.
 FREE = 10
+# From how many values far away a fit is begun, and where they are sought: shares of the bounds,
+# and of the best of these.
+SCANNED = 5
+_NEARBY = (0.7, 0.8, 0.87, 0.94, 1.06, 1.13, 1.2, 1.3)
 _SPAN = (-0.9, -0.6, -0.4, -0.25, -0.15, -0.08, 0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 0.9)
 _EARLY_S = 1.5
 _GRID = np.linspace(-0.95, 0.95, 13)
@@ -132,8 +136,6 @@ class Search:
         self.problem = Problem(problem.model.brief())
         self.model: Model = self.problem.model
         self.progress = progress
-        # derivatives by the offsets where all are nought, at the sensors' own noise
-        self.nominal = np.empty((0, 0), np.float32)
         self.tangents: list[_Tangent] = []
         self.screened: list[tuple[str, float]] = []
 
@@ -156,9 +158,9 @@ class Search:
         """Fit the offsets alone, the noise being what they leave."""
         point = self.placed({})
         first = self.problem.start(self.model.nuisances, point)
-        self.nominal = first.jacobian
         self.problem = self._at(self.problem.level(first.residual))
-        state = self.problem.start(self.model.nuisances, point, self.nominal / self.problem.scale)
+        state = self.problem.start(self.model.nuisances, point,
+                                   first.jacobian / self.problem.scale)
         state = self.problem.fit(state, 8)
         for _ in range(5):
             before, cost = self.problem.scale, state.cost
@@ -226,7 +228,7 @@ class Search:
                          for form in self.model.forms(effect, residuals)]
 
     def _screen(self, state: State, besides: Sequence[str] = ()) -> list[tuple[float, _Tangent]]:
-        """Return the gain that each form promises, the greatest first, best forms only."""
+        """Return the gain that each form promises, the greatest first, the best forms only."""
         names = [p.name for p in state.parameters]
         low = np.array([p.low for p in state.parameters]) - state.x
         high = np.array([p.high for p in state.parameters]) - state.x
@@ -251,7 +253,11 @@ class Search:
                                 np.r_[high, [p.high for p in parts]])
             gain = float(slope @ step - 0.5 * step @ full @ step)
             found.setdefault(tangent.effect, []).append((gain, tangent))
-        best = [max(forms, key=lambda pair: pair[0]) for forms in found.values()]
+        best: list[tuple[float, _Tangent]] = []
+        for forms in found.values():
+            # a screening does not tell an effect's forms apart: the second is kept if it is close
+            first, *others = sorted(forms, key=lambda pair: -pair[0])
+            best += [first, *(pair for pair in others[:1] if pair[0] > 0.7 * first[0])]
         return sorted(best, key=lambda pair: -pair[0])
 
     def _fitted(self, base: Candidate, tangent: _Tangent, fresh: bool, turns: int) -> Candidate:
@@ -276,17 +282,58 @@ class Search:
     def _singles(self, none: Candidate) -> list[Candidate]:
         screened = self._screen(none.state)
         self.screened = [(tangent.effect, gain) for gain, tangent in screened]
-        found = sorted((self._fitted(none, tangent, False, 5)
-                        for _, tangent in screened[:SINGLES]), key=lambda c: c.priced)
-        # those that are far behind after a few turns stay there
-        self.progress(0.35, 'single effects')
-        leading = found[:FINALISTS]
+        found = [self._fitted(none, tangent, False, 5) for _, tangent in screened[:SINGLES]]
         if self.problem.scale > 1.0:
-            leading = [self._from_afar(c) for c in leading]
-        leading = sorted((self._shaped(c, 8) for c in leading), key=lambda c: c.priced)
+            found += [self._from_afar(none, tangent, value)
+                      for tangent, value in self._scanned(none.state)]
+        self.progress(0.35, 'single effects')
+        # those that are far behind after a few turns stay there
+        found.sort(key=lambda c: c.priced)
+        leading = sorted((self._shaped(c, 8) for c in found[:FINALISTS]),
+                         key=lambda c: c.priced)
         leading[:2] = [self._settled(c) for c in leading[:2]]
-        leading.sort(key=lambda c: c.priced)
-        return [*leading, *(_light(c) for c in found[FINALISTS:])]
+        return sorted(leading, key=lambda c: c.priced)
+
+    def _scanned(self, state: State, besides: Sequence[str] = (),
+                 ) -> list[tuple[_Tangent, float]]:
+        """
+        Return the forms of which some value far away fits best, with that value.
+
+        A strong effect may bend the misfit so much that its derivative tells nothing: a mode at
+        another frequency, a limit that was not reached before. Only the test that fits worst is
+        looked at. Effects that are there already are left out (`besides`).
+        """
+        problem, here = self.problem, state.point()
+        worst = int(np.argmax([huber_sum(state.residual[problem.rows(k)])
+                               for k in range(len(problem.experiments))]))
+        found: list[tuple[float, _Tangent, float]] = []
+        for tangent in self.tangents:
+            live = [p for p in tangent.form.parameters if not p.shape]
+            if len(live) != 1 or tangent.effect in besides:
+                continue
+            begin = {**here, **starts(tangent.form)}
+            values = [share * (live[0].high if share > 0.0 else -live[0].low)
+                      for share in _SPAN if share > 0.0 or live[0].low < 0.0]
+            cost, value = self._best_of(begin, live[0].name, values, worst)
+            found.append((cost, tangent, value))
+        found.sort(key=lambda item: item[0])
+        finer = []
+        for cost, tangent, value in found[:2 * SCANNED]:
+            name = next(p.name for p in tangent.form.parameters if not p.shape)
+            finer.append((*min((cost, value), self._best_of(
+                {**here, **starts(tangent.form)}, name,
+                [value * share for share in _NEARBY], worst)), tangent))
+        finer.sort(key=lambda item: item[0])
+        return [(tangent, value) for _, value, tangent in finer[:SCANNED]]
+
+    def _best_of(self, point: dict[str, float], name: str, values: Sequence[float],
+                 experiment: int) -> tuple[float, float]:
+        """Return the least cost of one test over the values of a parameter, and that value."""
+        rows = self.problem.rows(experiment)
+        costs = [huber_sum(z[rows]) for z in self.problem.residuals(
+            [{**point, name: value} for value in values], experiment)]
+        best = int(np.argmin(costs))
+        return costs[best], values[best]
 
     def _settled(self, candidate: Candidate) -> Candidate:
         """Fit with fresh derivatives of everything."""
@@ -294,33 +341,17 @@ class Search:
         state = self.problem.start(candidate.state.parameters, point)
         return replace(candidate, state=self.problem.fit(state, 10))
 
-    def _from_afar(self, candidate: Candidate) -> Candidate:
-        """
-        Fit a strong effect from the configuration's own values instead of from the offsets.
-
-        Offsets that were fitted without a strong effect are bent far out of place. The truth is
-        never far from no offsets at all, once the effect's size is about right: that is tried
-        out.
-        """
-        form, problem = candidate.forms[-1], self.problem
-        first = form.parameters[0]
-        known = candidate.state.value(first.name)
-        base = {p.name: candidate.state.value(p.name) for p in form.parameters if p.shape}
-        begin = {name: value for name, value in candidate.state.point().items()
-                 if name.startswith('start:')}
-        if any(not p.shape for p in form.parameters[1:]):
-            return candidate
-        span = [share * (first.high if share > 0.0 else -first.low)
-                for share in _SPAN if (share > 0.0 or first.low < 0.0)]
-        trials = [{**begin, **base, first.name: value} for value in (known, *span)]
-        costs = [huber_sum(z) for z in problem.residuals(trials)]
-        point = trials[int(np.argmin(costs))]
+    def _from_afar(self, base: Candidate, tangent: _Tangent, value: float) -> Candidate:
+        """Fit an effect on top of a candidate, from a value far away."""
+        form, problem = tangent.form, self.problem
+        name = next(p.name for p in form.parameters if not p.shape)
+        point = {**base.state.point(), **starts(form), name: value}
         columns = problem.columns(point, form.parameters, problem.residuals([point])[0],
                                   central=True)
-        state = problem.start((*self.model.nuisances, *form.parameters), point,
-                              np.column_stack([self.nominal / problem.scale, columns]))
-        state = problem.fit(state, 12)
-        return replace(candidate, state=state) if state.cost < candidate.cost else candidate
+        state = problem.start((*base.state.parameters, *form.parameters), point,
+                              np.column_stack([base.state.jacobian, columns]))
+        return Candidate((*base.effects, tangent.effect), (*base.forms, form),
+                         problem.fit(state, 8))
 
     def _pairs(self, singles: Sequence[Candidate]) -> list[Candidate]:
         """Give the best singles each a few partners."""
@@ -335,14 +366,18 @@ class Search:
             self.progress(0.5 + 0.2 * i / BASES, 'pairs of effects')
             if base.priced > 3.0 * best.priced + REACH:
                 continue
-            for gain, tangent in self._screen(base.state, base.effects)[:PARTNERS]:
-                key = tuple(sorted((*base.effects, tangent.effect)))
-                if gain < worth or key in found:
-                    continue
-                pair = self._fitted(base, tangent, True, 5)
+            given = [self._fitted(base, tangent, True, 5)
+                     for gain, tangent in self._screen(base.state, base.effects)[:PARTNERS]
+                     if gain > worth]
+            if self.problem.scale > 1.0 and i == 0:
+                given += [self._from_afar(base, tangent, value)
+                          for tangent, value in self._scanned(base.state, base.effects)]
+            for pair in given:
+                key = tuple(sorted(pair.effects))
                 if pair.cost < best.cost:
                     pair = self._shaped(pair, 6)
-                found[key] = _light(pair)
+                if key not in found or pair.priced < found[key].priced:
+                    found[key] = _light(pair)
         return sorted(found.values(), key=lambda c: c.priced)
 
     def _in_full(self, none: Candidate, singles: Sequence[Candidate],
@@ -359,9 +394,9 @@ class Search:
                                 if c.priced < least + REACH)]
         if pairs and pairs[0].priced < singles[0].priced:
             # a member that passed for the pair's whole effect, with the offsets the pair has
-            known = {c.effects for c in chosen}
+            known = {(c.effects, c.forms) for c in chosen}
             chosen += [c for c in (self._dropped(pairs[0], e) for e in pairs[0].effects)
-                       if c.effects not in known]
+                       if (c.effects, c.forms) not in known]
         anchor = min(chosen, key=lambda c: c.priced)
         before = np.inf
         for number in range(PASSES):
@@ -380,7 +415,9 @@ class Search:
             if number and before - anchor.priced < max(SETTLED, 1e-3 * anchor.priced):
                 break
             before = anchor.priced
-        return [none, *sorted(chosen, key=lambda c: c.priced)]
+        # of an effect's forms the best counts
+        unique = {frozenset(c.effects): c for c in sorted(chosen, key=lambda c: -c.priced)}
+        return [none, *sorted(unique.values(), key=lambda c: c.priced)]
 
     def _dropped(self, candidate: Candidate, effect: str) -> Candidate:
         """Return a candidate without one of its effects, not fitted yet."""
@@ -411,8 +448,8 @@ class Search:
 
 def _light(candidate: Candidate) -> Candidate:
     """Return the candidate without its derivatives, which take most of the memory."""
-    return replace(candidate, state=replace(candidate.state, jacobian=np.empty((0, 0), np.float32),
-                                            weight=np.empty(0)))
+    return replace(candidate, state=replace(candidate.state, taken=np.empty((0, 0), np.float32),
+                                            errors=(), directions=()))
 
 
 def parameters_of(candidate: Candidate) -> list[tuple[Parameter, float]]:

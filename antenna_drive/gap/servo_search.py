@@ -42,7 +42,7 @@ Structure = tuple[tuple[str, str], ...]
 WORTH = 0.01
 ROUNDS = 7
 # What is tried out of the verdict's ranking, pairs among it, and of all single effects.
-TRIED_RANKED, TRIED_SINGLES = 3, 9
+TRIED_RANKED, TRIED_SINGLES = 2, 7
 TURNS = 5
 
 
@@ -58,8 +58,8 @@ class Effort:
 
     """
 
-    runs: int = 2000
-    near_runs: int = 600
+    runs: int = 2400
+    near_runs: int = 500
 
 
 @dataclass(frozen=True)
@@ -272,8 +272,8 @@ def settled(tests: Sequence[ServoTest], names: Sequence[str], start: Mapping[str
     """
     model = ServoModel(tests, {name: start[name] for name in names}, names, noise=scale)
     problem = Problem(model)
-    state = problem.fit(problem.start(model.nuisances, {}), 2 * TURNS)
-    state = problem.fit(problem.refreshed(state), TURNS)
+    state = problem.fit(problem.start(model.nuisances, {}), TURNS)
+    state = problem.fit(problem.refreshed(state, central=False), TURNS)
     values = model.numbers(state.point())
     return Fit(values, servo_refit.error(tests, values))
 

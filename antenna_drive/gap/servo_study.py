@@ -26,7 +26,10 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from dataclasses import dataclass
+import hashlib
 from itertools import combinations
+import json
+from pathlib import Path
 import time
 from typing import Any
 
@@ -105,12 +108,14 @@ def compared(tests: Sequence[ServoTest], direction: Direction, effort: Effort,
     """
     began = time.monotonic()
     fitted, withheld = direction.parted(tests)
-    fits: dict[str, Fit] = {}
-    for name, numbers in LADDER.items():
-        begins = [fits[parent].values for parent in PARENTS[name]]
-        fits[name] = servo_refit.refit(fitted, numbers, begins, effort.runs)
     found = lacking(fitted, effort, without)
-    fits[DIAGNOSED] = servo_refit.refit(fitted, found.names, [found.fit.values], effort.runs)
+    diagnosed = servo_refit.refit(fitted, found.names, [found.fit.values], effort.runs)
+    fits: dict[str, Fit] = {}
+    for name, names in LADDER.items():
+        # the ladder may begin where the diagnosis has ended, too
+        begins = [*(fits[parent].values for parent in PARENTS[name]), diagnosed.values]
+        fits[name] = servo_refit.refit(fitted, names, begins, effort.runs)
+    fits[DIAGNOSED] = diagnosed
     return {
         'split': direction.split,
         'fitted': list(direction.fitted),
@@ -131,7 +136,7 @@ def _model(fit: Fit, fitted: Sequence[ServoTest], withheld: Sequence[ServoTest],
 
 
 def study(tests: Sequence[ServoTest], chosen: Sequence[Direction], effort: Effort,
-          without: Sequence[str] = (), jobs: int = 1,
+          without: Sequence[str] = (), jobs: int = 1, keep: Path | None = None,
           progress: Progress = lambda share, doing: None) -> dict[str, Any]:
     """
     Compare in several directions and sum up, as plain data.
@@ -148,6 +153,8 @@ def study(tests: Sequence[ServoTest], chosen: Sequence[Direction], effort: Effor
         effects that the diagnosis does not consider
     jobs
         how many processes at once
+    keep
+        folder in which each direction's result is kept, and taken from where it is there
     progress
         called with the share that is done, 0 to 1, and what is being done
 
@@ -162,19 +169,28 @@ def study(tests: Sequence[ServoTest], chosen: Sequence[Direction], effort: Effor
                             f'{", ".join(catalogue())}')
     began = time.monotonic()
     results: dict[int, dict[str, Any]] = {}
+    shelf = _Shelf(keep, tests, effort, without)
     with ProcessPoolExecutor(jobs) as pool:
-        running = {pool.submit(compared, tests, direction, effort, without): i
-                   for i, direction in enumerate(chosen)}
+        running = {}
+        for i, direction in enumerate(chosen):
+            known = shelf.find(direction)
+            if known is None:
+                running[pool.submit(compared, tests, direction, effort, without)] = i
+            else:
+                results[i] = known
         waiting = set(running)
         try:
             while waiting:
+                progress(len(results) / len(chosen), 'directions')
                 done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
                 for future in done:
-                    results[running[future]] = future.result()
-                progress(len(results) / len(chosen), 'directions')
+                    i = running[future]
+                    results[i] = future.result()
+                    shelf.put(chosen[i], results[i])
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+    progress(1.0, 'directions')
     ordered = [results[i] for i in range(len(chosen))]
     return {'recordings': [test.name for test in tests],
             'runs_per_fit': effort.runs,
@@ -182,6 +198,50 @@ def study(tests: Sequence[ServoTest], chosen: Sequence[Direction], effort: Effor
             'summary': summed(ordered),
             'directions': ordered,
             'seconds': time.monotonic() - began}
+
+
+class _Shelf:
+    """Results of directions, each in a file of its own, found again by what they came from."""
+
+    def __init__(self, folder: Path | None, tests: Sequence[ServoTest], effort: Effort,
+                 without: Sequence[str]) -> None:
+        self._folder = folder
+        digest = hashlib.sha256(repr((effort, sorted(without))).encode())
+        for test in tests:
+            for part in (test.time, test.goal, test.measured):
+                digest.update(part.tobytes())
+        for source in sorted(Path(__file__).parent.glob('*.py')):
+            digest.update(source.read_bytes())
+        self._key = digest.hexdigest()
+
+    def _path(self, direction: Direction) -> Path | None:
+        if self._folder is None:
+            return None
+        values = '-'.join(str(value) for value in direction.fitted)
+        return self._folder / f'{direction.split}-{values}.json'
+
+    def find(self, direction: Direction) -> dict[str, Any] | None:
+        path = self._path(direction)
+        try:
+            stored = json.loads(path.read_text()) if path is not None else None
+        except (OSError, ValueError):
+            return None
+        if not isinstance(stored, dict) or stored.get('key') != self._key:
+            return None
+        result: dict[str, Any] = stored['result']
+        return result
+
+    def put(self, direction: Direction, result: dict[str, Any]) -> None:
+        path = self._path(direction)
+        if path is None:
+            return
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            draft = path.with_suffix('.draft')
+            draft.write_text(json.dumps({'key': self._key, 'result': result}))
+            draft.replace(path)
+        except OSError as failed:
+            raise UserError(f'{path}: cannot be written, {failed.strerror}') from failed
 
 
 def summed(results: Sequence[dict[str, Any]]) -> dict[str, Any]:
