@@ -45,11 +45,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='what is withheld (default: both, one after the other)')
     parser.add_argument('--without', action='append', default=[], metavar='EFFECT',
                         help='leave an effect out of the catalogue; may be given several times')
-    parser.add_argument('--runs', type=int, default=2000, metavar='N',
-                        help='runs of all fitted logs for each fit (default: 2000; fewer are '
+    parser.add_argument('--runs', type=int, default=2400, metavar='N',
+                        help='runs of all fitted logs for each fit (default: 2400; fewer are '
                              'faster and worse for every model)')
     parser.add_argument('--jobs', type=int, default=1, metavar='N',
                         help='processes at once (default: 1)')
+    parser.add_argument('--keep', metavar='FOLDER',
+                        help="keep each direction's result in FOLDER; a run that was interrupted "
+                             'goes on from there')
     add_json_option(parser)
 
 
@@ -73,9 +76,10 @@ def run(arguments: argparse.Namespace) -> int:
     tests = [ServoTest.of(path.stem, read_bam(path)) for path in paths]
     splits = tuple(SPLITS) if arguments.split == 'both' else (arguments.split,)
     chosen = directions(tests, splits)
-    effort = Effort(arguments.runs, max(20, int(0.3 * arguments.runs)))
+    effort = Effort(arguments.runs, max(20, arguments.runs // 5))
     with Progress('servo', 1.0) as progress:
         result = study(tests, chosen, effort, arguments.without, arguments.jobs,
+                       Path(arguments.keep) if arguments.keep else None,
                        lambda share, doing: progress.update(share))
     if arguments.json:
         write_json(result, arguments.json)

@@ -185,8 +185,9 @@ def swing(values: FloatArray, mass: float, length: float, gain: float, supply: f
                 count *= 2  # the teeth are stiff
             h = span / count
             for _ in range(count):
-                # a change of the goal within the step counts with its part of it
-                begin, end = t - delay, t + h - delay
+                # this kick acts from half a step ago to half a step ahead; a change of the goal
+                # within that time counts with its part of it
+                begin, end = t - 0.5 * h - delay, t + 0.5 * h - delay
                 while k_goal + 1 < n and time[k_goal + 1] <= begin:
                     k_goal += 1
                 wanted = goal[k_goal]

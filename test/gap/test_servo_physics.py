@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 from antenna_drive.gap.servo_catalogue import catalogue, vector
 from antenna_drive.gap.servo_model import ServoTest
@@ -185,9 +186,10 @@ def test_stiff_teeth_without_a_gap_are_no_teeth() -> None:
 def test_every_effect_acts_on_some_course_and_none_is_there_at_nought(effect: str) -> None:
     time = np.arange(0.0, 3.0, 5e-3)
     base = {'coulomb_torque': 0.08, 'viscous_friction': 0.01}
-    courses = {'driven': {'goal': 1.2 * np.sin(4.0 * time)},
-               'let go': {'on': False, 'start': 1.0},
-               'warm and halting': {'goal': 1.2 * np.clip(2.0 * np.sin(2.0 * time), -1.0, 1.0)}}
+    courses: dict[str, dict[str, Any]] = {
+        'driven': {'goal': 1.2 * np.sin(4.0 * time)},
+        'let go': {'on': False, 'start': 1.0},
+        'warm and halting': {'goal': 1.2 * np.clip(2.0 * np.sin(2.0 * time), -1.0, 1.0)}}
 
     def swung(values: dict[str, float]) -> FloatArray:
         outs = []
