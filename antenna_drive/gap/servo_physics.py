@@ -34,7 +34,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from antenna_drive.physics.compiling import compiled
+from antenna_drive.physics.compiling import compiled, inner
 import numpy as np
 from numpy.typing import NDArray
 
@@ -133,7 +133,7 @@ def swing(values: FloatArray, mass: float, length: float, gain: float, supply: f
     step
         of integration, at most [s]
     out
-        position [rad], rate [rad/s], duty and current [A] at each sample, but for the position
+        position [rad], rate [rad/s], duty and current [A] at each sample, rate and current
         as of the last step before it, shape (n, 4); written
 
     """
@@ -167,7 +167,7 @@ def swing(values: FloatArray, mass: float, length: float, gain: float, supply: f
     has_stribeck = (stribeck != 0.0 or motor_stribeck != 0.0 or external_stribeck != 0.0
                     or motor_square != 0.0 or external_square != 0.0
                     or square_stribeck != 0.0)
-    limit = 1.0 - duty_limit
+    law, limit = gain * (1.0 + gain_error), 1.0 - duty_limit
 
     n = time.size
     q, w = start, start_rate            # of the output shaft
@@ -209,16 +209,8 @@ def swing(values: FloatArray, mass: float, length: float, gain: float, supply: f
                 half = 0.5 * h if first else h
                 first = False
 
-                sensed = q
-                if eccentric_cosine != 0.0 or eccentric_sine != 0.0:
-                    sensed += (eccentric_cosine * (math.cos(q) - 1.0)
-                               + eccentric_sine * math.sin(q))
-                error = asked - sensed
-                if dead_band > 0.0:
-                    error = (max(error - dead_band, 0.0) if error > 0.0
-                             else min(error + dead_band, 0.0))
-                duty = gain * (1.0 + gain_error) * (error - derivative * w)
-                duty = min(max(duty, -limit), limit)
+                duty = _duty(asked, _sensed(q, eccentric_cosine, eccentric_sine), w, law,
+                             derivative, dead_band, limit)
                 warm = temperature[k - 1] - REFERENCE_TEMPERATURE
                 ohms = resistance * max(1.0 + winding * warm, 0.2)
                 if not elastic:
@@ -310,9 +302,31 @@ def swing(values: FloatArray, mass: float, length: float, gain: float, supply: f
                     q += h * w
                 t += h
             t = time[k]
-        out[k, 0] = q
-        if eccentric_cosine != 0.0 or eccentric_sine != 0.0:
-            out[k, 0] += eccentric_cosine * (math.cos(q) - 1.0) + eccentric_sine * math.sin(q)
+        # the goal of this sample is in force when the position is read
+        k_now = k_goal
+        while k_now + 1 < n and time[k_now + 1] <= time[k] - delay + 1e-9:
+            k_now += 1
+        now = asked if slowness > 0.0 else goal[k_now]
+        sensed = _sensed(q, eccentric_cosine, eccentric_sine)
+        out[k, 0] = sensed
         out[k, 1] = w
-        out[k, 2] = duty * enabled[k]
+        out[k, 2] = enabled[k] * _duty(now, sensed, w, law, derivative, dead_band, limit)
         out[k, 3] = current
+
+
+@inner
+def _sensed(q: float, cosine: float, sine: float) -> float:
+    """Return what an encoder beside the axis reads [rad]."""
+    if cosine == 0.0 and sine == 0.0:
+        return q
+    return q + cosine * (math.cos(q) - 1.0) + sine * math.sin(q)
+
+
+@inner
+def _duty(asked: float, sensed: float, rate: float, law: float, derivative: float,
+          dead_band: float, limit: float) -> float:
+    """Return the duty that the firmware sets."""
+    error = asked - sensed
+    if dead_band > 0.0:
+        error = max(error - dead_band, 0.0) if error > 0.0 else min(error + dead_band, 0.0)
+    return min(max(law * (error - derivative * rate), -limit), limit)
