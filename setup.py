@@ -79,6 +79,8 @@ setup(
         # read the old one's cache: a new series is let in once the suite has passed with it.
         'numba >= 0.58, < 0.69',
         'PyYAML >= 5.4',
+        # a diagnosis makes its fits side by side, each with a linear algebra of one thread
+        'threadpoolctl >= 3.0',
     ],
     extras_require={
         'ros': [f'{wheel} ; {WHEELS_EXIST}' for wheel in KILTED],

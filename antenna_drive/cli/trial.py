@@ -91,7 +91,10 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     with Progress('diagnoses', arguments.cases, quiet=arguments.quiet) as progress:
         failures = batch.diagnose_cases(
-            folder, manifest, arguments.jobs, shlex.split(arguments.diagnose_options),
+            folder, manifest, arguments.jobs,
+            # the cores that diagnoses side by side leave to each
+            ['--jobs', str(max(1, (os.cpu_count() or 1) // arguments.jobs)),
+             *shlex.split(arguments.diagnose_options)],
             arguments.time_limit, lambda done, total: progress.update(done))
     if failures:
         print(f'{folder}: {failures} diagnoses failed, see {batch.FAILURE} in their folders; '

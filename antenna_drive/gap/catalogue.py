@@ -370,13 +370,18 @@ GUST = 'axis.wind_gust'
 GUST_KNOT_S = 0.5
 
 
+def gust_knots(duration: float) -> int:
+    """Return how many knots a gust has in a test of so many seconds."""
+    return int(duration / GUST_KNOT_S) + 2
+
+
 def gust_form(durations: Sequence[float]) -> Form:
     """Return the form of a gust: in each test a torque over time that is what it is."""
     return Form('torque over time', tuple(
         DriveParameter(f'{GUST}.torque:{k}:{i}', 'N m', -1e6, 1e6, 2e3, 3e4, experiment=k,
                        how=SET, fields=(f'gust:{k}:{i}',))
         for k, duration in enumerate(durations)
-        for i in range(int(duration / GUST_KNOT_S) + 2)))
+        for i in range(gust_knots(duration))))
 
 
 def catalogue() -> dict[str, Effect]:

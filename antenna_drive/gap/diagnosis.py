@@ -27,6 +27,7 @@ Examples
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 import math
 import time
@@ -40,6 +41,10 @@ from antenna_drive.gap.search import Candidate, parameters_of, Search
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.recording import Recording
 import numpy as np
+try:
+    from threadpoolctl import threadpool_limits
+except ImportError:  # no ROS distribution names it: slower without, and not otherwise
+    threadpool_limits = None
 
 Progress = Callable[[float, str], None]
 # How many entries of `which` are given beside 'unknown' and 'none', and what is left out below.
@@ -126,23 +131,27 @@ def diagnose(recordings: Mapping[str, Recording], drive: Drive,
 
     """
     began = time.monotonic()
-    model = DriveModel(recordings, drive, threads)
-    return _diagnosed(model, progress, began, model.notes)
+    # whole fits are made side by side: matrices within a fit need no threads of their own
+    with threadpool_limits(1, 'blas') if threadpool_limits else nullcontext():
+        model = DriveModel(recordings, drive, threads)
+        return _diagnosed(model, progress, began, model.notes, threads)
 
 
 def _diagnosed(model: DriveModel, progress: Progress, began: float,
-               notes: Sequence[str]) -> Diagnosis:
+               notes: Sequence[str], threads: int) -> Diagnosis:
     problem = Problem(model)
-    search = Search(problem, lambda share, doing: progress(0.9 * share, doing))
+    search = Search(problem, lambda share, doing: progress(0.9 * share, doing), threads)
     candidates = search.run()
     none = candidates[0]
-    best = verdict.best(candidates)
+    # what is left is judged after a fit that has converged; the ranking compares like with like
+    best = search.polished(verdict.best(candidates))
     excess = _excess(problem, best.state)
     left = _left(problem, none, best)
-    unknown = verdict.unknown_probability(excess, left)
-    ranked = verdict.rank(candidates, unknown)
     progress(0.9, 'how far it goes')
     how_far = _how_far(problem, none, best)
+    unknown = verdict.unknown_probability(excess, left,
+                                          how_far['explained_fraction']['ci95'][1])
+    ranked = verdict.rank(candidates, unknown)
     entries: list[dict[str, Any]] = []
     for item in ranked[:_ENTRIES]:
         if item.probability >= _LEAST or item is ranked[0] or not item.candidate.effects:
@@ -165,7 +174,7 @@ def _diagnosed(model: DriveModel, progress: Progress, began: float,
         'which': entries,
         'confusable': verdict.confusable(candidates) if best.effects else [],
         'how_far': how_far,
-        'residual_tests': _tests(problem, best.state, excess, motions),
+        'residual_tests': _tests(problem, best.state, excess, left, motions),
         'seconds': time.monotonic() - began,
         'notes': list(notes),
     }
@@ -224,7 +233,7 @@ def _left(problem: Problem, none: Candidate, best: Candidate) -> float:
     return float(np.clip(energy[0] / max(energy[1], 0.05 * noise), 0.0, 1.0))
 
 
-def _tests(problem: Problem, state: State, excess: float,
+def _tests(problem: Problem, state: State, excess: float, left: float,
            motions: Sequence[residuals.Motion]) -> dict[str, Any]:
     signals: dict[str, Any] = {}
     zs = [_z(problem, state, k) for k in range(len(problem.experiments))]
@@ -236,7 +245,7 @@ def _tests(problem: Problem, state: State, excess: float,
                 'slow_excess': float(np.mean([residuals.structure(part[:, c]) for part in zs])),
                 'greatest_correlation': max(residuals.correlation(part[:, c]) for part in zs),
             }
-    return {'excess_over_noise': excess, 'signals': signals,
+    return {'excess_over_noise': excess, 'share_left': left, 'signals': signals,
             'depends_on': residuals.dependences(problem.experiments, motions, zs)}
 
 

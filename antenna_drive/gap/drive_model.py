@@ -21,6 +21,7 @@ from concurrent.futures import ThreadPoolExecutor
 import copy
 from dataclasses import dataclass, replace
 import math
+from threading import Lock
 
 from antenna_drive.emulator import batch
 from antenna_drive.gap import catalogue
@@ -87,6 +88,7 @@ class DriveModel:
         """Prepare the tests and find the sensors' noise from a first run."""
         self._executor = ThreadPoolExecutor(threads)
         self._cache: OrderedDict[_Job, FloatArray] = OrderedDict()
+        self._lock = Lock()
         self._longest_step = LONGEST_STEP
         self.notes: list[str] = []
         self.runs = 0
@@ -190,24 +192,30 @@ class DriveModel:
                  until: float = math.inf) -> list[list[FloatArray | None]]:
         """Return what the sensors would have shown; see `Model.simulate`."""
         jobs: list[tuple[int, _Job, Point]] = []
-        wanted: OrderedDict[_Job, None] = OrderedDict()
+        known: dict[_Job, FloatArray] = {}
+        wanted: dict[_Job, None] = {}
         for i, (point, one) in enumerate(zip(points, only or [None] * len(points), strict=True)):
             items = sorted(item for item in point.items() if not self._by_name[item[0]].reading)
             for k in range(len(self._tests)) if one is None else (one,):
                 job = _Job(k, tuple(item for item in items if self._by_name[
                     item[0]].experiment in (None, k)), until)
-                if job not in self._cache:
+                # several threads use the cache: what it has now it may not have a moment later
+                out = self._cache.get(job)
+                if out is None:
                     wanted[job] = None
+                else:
+                    known[job] = out
                 jobs.append((i, job, point))
         self.runs += len(wanted)
         fresh = dict(zip(wanted, self._executor.map(self._run, wanted), strict=True))
         results: list[list[FloatArray | None]] = [[None] * len(self._tests) for _ in points]
         for i, job, point in jobs:
-            out = fresh[job] if job in fresh else self._cache[job]
+            out = known[job] if job in known else fresh[job]
             results[i][job.experiment] = self._read(job.experiment, out, point)
-        self._cache.update(fresh)
-        while len(self._cache) > _CACHE:
-            self._cache.popitem(last=False)
+        with self._lock:
+            self._cache.update(fresh)
+            while len(self._cache) > _CACHE:
+                self._cache.popitem(last=False)
         return results
 
     def _run(self, job: _Job) -> FloatArray:
@@ -216,7 +224,7 @@ class DriveModel:
         numbers = record.view(np.float64)
         kind = record.dtype
         waves: dict[Wave, list[float]] = {}
-        gust: list[tuple[float, float]] = []
+        gust: FloatArray | None = None
         bias, delay = test.bias, 0.0
         for name, value in job.items:
             item = self._by_name[name]
@@ -226,7 +234,11 @@ class DriveModel:
             elif name == catalogue.DELAY:
                 delay = value
             elif name.startswith(catalogue.GUST):
-                gust.append((float(name.rpartition(':')[2]) * catalogue.GUST_KNOT_S, value))
+                if gust is None:
+                    gust = np.zeros(catalogue.gust_knots(float(test.time[-1])))
+                knot = int(name.rpartition(':')[2])
+                if knot < gust.size:
+                    gust[knot] = value
             elif name.startswith(SUPPLY):
                 bias = Bias(bias.before * (1.0 + value), bias.after * (1.0 + value), bias.at)
             else:
@@ -239,10 +251,10 @@ class DriveModel:
         if axis['mode_inertias'][0, _EXTRA] > 0.0:
             axis['mode_inertias_count'] = _EXTRA + 1
         torque = None
-        if gust:
-            knots = np.array(sorted(gust))
-            fine = np.arange(0.0, knots[-1, 0] + _GUST_S, _GUST_S)
-            torque = (fine, CubicSpline(knots[:, 0], knots[:, 1])(fine))
+        if gust is not None:
+            knots = catalogue.GUST_KNOT_S * np.arange(gust.size)
+            fine = np.arange(0.0, knots[-1] + _GUST_S, _GUST_S)
+            torque = (fine, CubicSpline(knots, gust)(fine))
         plan = self._plan(job.experiment, bias, delay, torque)
         samples = int(np.count_nonzero(test.time < job.until))
         if samples == test.time.size:

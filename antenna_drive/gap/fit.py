@@ -31,10 +31,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-# Residuals beyond so many standard deviations count linearly (Huber).
-HUBER = 3.0
+# Residuals beyond so many standard deviations count by their logarithm: after a contact that was
+# made too late everything differs for a while, and must not bend what else is known.
+OUTLIER = 3.0
 # The curvature is made anew when the weights have changed by so much on the mean.
 _STALE = 0.02
+# A step corrects the derivatives if its error is less than so much of what was predicted.
+_TEACHES = 0.5
 
 
 @dataclass(frozen=True)
@@ -50,8 +53,8 @@ class State:
         measured
     taken : derivative of the prediction [standard deviations per unit] as it was taken last,
         shape (n, m), in single precision: it is large, and a direction is all that it gives
-    weight : Huber weight of each residual, shape (n,)
-    cost : Huber's sum over the residuals, half a chi-square, and the pull of the offsets
+    weight : robust weight of each residual, shape (n,)
+    cost : sum of robust losses, half a chi-square if all are small, and the pull of the offsets
     errors, directions : outer products that the fit has corrected the derivative by, shapes (n,)
         and (m,) each
 
@@ -145,7 +148,7 @@ class Problem:
         z = np.abs(residual[self.valid]) * self.scale
         level = float(np.sqrt(np.mean(z ** 2)))
         for _ in range(10):
-            level = float(np.sqrt(np.mean(np.minimum(z, HUBER * level) ** 2)))
+            level = float(np.sqrt(np.mean(np.minimum(z, OUTLIER * level) ** 2)))
         return level
 
     def columns(self, point: dict[str, float], parameters: Sequence[Parameter],
@@ -203,13 +206,13 @@ class Problem:
         residual = self.residuals([at])[0]
         if jacobian is None:
             jacobian = self.columns(at, parameters, residual, central)
-        weight = huber_weight(residual, self.valid)
+        weight = robust_weight(residual, self.valid)
         return _state(tuple(parameters), x, residual, jacobian, weight)
 
     def refreshed(self, state: State, central: bool = True) -> State:
         """Return the state with fresh derivatives and weights."""
         jacobian = self.columns(state.point(), state.parameters, state.residual, central)
-        weight = huber_weight(state.residual, self.valid)
+        weight = robust_weight(state.residual, self.valid)
         return _state(state.parameters, state.x, state.residual, jacobian, weight)
 
     def widened(self, state: State, parameters: Sequence[Parameter], values: Sequence[float],
@@ -263,13 +266,17 @@ class Problem:
             after = self.residuals([point])[0]
             trial_cost = _cost(after, trial, pull)
             gained = cost - trial_cost
-            # Broyden's rule, in the metric in which all parameters are alike
+            # Broyden's rule, in the metric in which all parameters are alike; a step on which the
+            # derivatives were all wrong, past a contact that was or was not made, teaches nothing
             metric = step * diagonal
             length = float(step @ metric)
-            if length > 0.0:
-                wrong = (residual - after) - state.jacobian @ step.astype(np.float32)
-                for error, direction in zip(errors, directions, strict=True):
-                    wrong -= error * float(direction @ step)
+            change = residual - after
+            predicted = state.jacobian @ step.astype(np.float32)
+            for error, direction in zip(errors, directions, strict=True):
+                predicted = predicted + error * float(direction @ step)
+            wrong = change - predicted
+            if length > 0.0 and (float(wrong @ (weight * wrong))
+                                 < _TEACHES * float(predicted @ (weight * predicted))):
                 new = metric / length
                 weighted = weight * wrong
                 cross = across(state.jacobian, weighted)
@@ -281,7 +288,7 @@ class Problem:
                 directions.append(new)
             if gained > 0.0:
                 x, residual, cost = trial, after, trial_cost
-                now = huber_weight(residual, self.valid)
+                now = robust_weight(residual, self.valid)
                 if float(np.mean(np.abs(now - shaped))) > _STALE:
                     jacobian = _with(state.jacobian, errors, directions)
                     hessian = weighted_square(jacobian, now)
@@ -293,7 +300,7 @@ class Problem:
                 if idle > 1:
                     break
             else:
-                damping = min(max(damping, 1e-3) * 6.0, 1e4)
+                damping = min(max(damping, 1e-2) * 8.0, 1e4)
         return State(state.parameters, x, residual, state.jacobian, weight, cost,
                      tuple(errors), tuple(directions))
 
@@ -332,7 +339,7 @@ def scanned(problem: Problem, point: dict[str, float], names: Sequence[str], exp
             predicted = result[experiment]
             assert predicted is not None
             z = (here.measured[early] - predicted[early]) / (problem.scale * here.noise[early])
-            cost = huber_sum(z[np.isfinite(z)])
+            cost = robust_loss(z[np.isfinite(z)])
             if cost < best_cost:
                 best, best_cost = trial, cost
     return best
@@ -350,17 +357,18 @@ def weighted_square(jacobian: NDArray[np.float32], weight: FloatArray,
     return np.asarray(jacobian.T @ (weight.astype(np.float32)[:, np.newaxis] * other), np.float64)
 
 
-def huber_weight(residual: FloatArray, valid: NDArray[np.bool_]) -> FloatArray:
-    """Return Huber's weights, shape (n,); none where nothing was measured."""
-    size = np.maximum(np.abs(residual), 1e-9)
-    return np.asarray(np.where(valid, np.minimum(1.0, HUBER / size), 0.0))
+def robust_weight(residual: FloatArray, valid: NDArray[np.bool_]) -> FloatArray:
+    """Return the weight of each residual, shape (n,); none where nothing was measured."""
+    size = np.maximum(np.abs(residual), OUTLIER)
+    return np.asarray(np.where(valid, (OUTLIER / size) ** 2, 0.0))
 
 
-def huber_sum(residual: FloatArray) -> float:
-    """Return Huber's sum: half the square of small residuals, linear in large ones."""
+def robust_loss(residual: FloatArray) -> float:
+    """Return the sum of losses: half the square of small residuals, logarithmic in large ones."""
     size = np.abs(residual)
-    return float(np.sum(np.where(size < HUBER, 0.5 * size ** 2,
-                                 HUBER * size - 0.5 * HUBER ** 2)))
+    large = np.maximum(size, OUTLIER)
+    return float(np.sum(np.where(size < OUTLIER, 0.5 * size ** 2,
+                                 OUTLIER ** 2 * (0.5 + np.log(large / OUTLIER)))))
 
 
 def _with(jacobian: NDArray[np.float32], errors: Sequence[FloatArray],
@@ -377,7 +385,7 @@ def _pull(parameters: Sequence[Parameter]) -> FloatArray:
 
 
 def _cost(residual: FloatArray, x: FloatArray, pull: FloatArray) -> float:
-    return huber_sum(residual) + float(0.5 * x @ (pull * x))
+    return robust_loss(residual) + float(0.5 * x @ (pull * x))
 
 
 def _state(parameters: tuple[Parameter, ...], x: FloatArray, residual: FloatArray,

@@ -27,6 +27,7 @@ SUPPLY, CLOCK, ZERO = 'supply:', 'clock:', 'zero:'
 TOLERANT_MOTOR = (
     'rate_command.k_s', 'rate_command.k_1', 'rate_command.tau_1', 'amplifier.rate_gain',
     'amplifier.integral_time', 'amplifier.lag', 'amplifier.current_feedback_gain',
+    'amplifier.forward_gain_share', 'armature.voltage_limit',
     'amplifier.tach_gain', 'amplifier.bias_command_gain', 'armature.inductance',
     'motor.current_limit', 'motor.rotor_inertia', 'motor.coulomb_torque', 'motor.stiction_ratio',
     'gearbox.stiffness', 'gearbox.half_gap', 'gearbox.contact_damping',

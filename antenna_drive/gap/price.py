@@ -19,7 +19,7 @@ from collections.abc import Sequence
 
 from antenna_drive.gap.model import Form
 
-EFFECT = 20.0
+EFFECT = 30.0
 PARAMETER = 4.0
 # A number that is pulled to nought is one of many that make a course over time: such a form
 # imitates anything slow, and whatever little a fit has left over.

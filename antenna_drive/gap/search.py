@@ -27,11 +27,14 @@ Which effect: from the offsets alone over single effects to pairs.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 from antenna_drive.gap.fit import (
-    across, bounded_step, huber_sum, Problem, scanned, State, weighted_square,
+    across, bounded_step, robust_loss, Problem, scanned, State, weighted_square,
 )
 from antenna_drive.gap.model import FloatArray, Form, Model, Parameter
 from antenna_drive.gap.price import price
@@ -59,6 +62,10 @@ SHARPER = 0.7
 WANTING = 1.03
 # A pass that gains less than this ends the fits.
 SETTLED = 4.0
+# A fit that leaves less than this, in standard deviations, needs no polish; others get it so
+# many times.
+CLEAN = 0.97
+POLISHES = 5
 # Forms with more parameters than this are free at every moment: a gust.
 FREE = 10
 # From how many values far away a fit is begun, and where they are sought: shares of the bounds,
@@ -104,6 +111,14 @@ class Candidate:
 
 
 @dataclass(frozen=True)
+class _Derivatives:
+    """Derivatives by the offsets, and by the parameters of free forms, by their names."""
+
+    offsets: NDArray[np.float32]
+    free: Mapping[str, NDArray[np.float32]]
+
+
+@dataclass(frozen=True)
 class _Tangent:
     """A form of an effect and how the predictions change with its parameters."""
 
@@ -127,11 +142,15 @@ class Search:
         the model against its experiments
     progress
         called with the share that is done, 0 to 1, and what is being done
+    threads
+        how many candidates are fitted at once
 
     """
 
-    def __init__(self, problem: Problem, progress: Callable[[float, str], None]) -> None:
+    def __init__(self, problem: Problem, progress: Callable[[float, str], None],
+                 threads: int = 1) -> None:
         """Prepare to search."""
+        self._pool = ThreadPoolExecutor(threads)
         self.whole = problem
         self.problem = Problem(problem.model.brief())
         self.model: Model = self.problem.model
@@ -187,14 +206,25 @@ class Search:
             self.tangents = [replace(t, columns=t.columns * (self.problem.scale / problem.scale))
                              for t in self.tangents]
             self.problem = problem
-            offsets = self._offset_columns(problem, best.point())
-            found = sorted((self._refitted(problem, c, offsets, 8) for c in found[:FINALISTS]),
-                           key=lambda c: c.priced)
+            taken = self._derivatives(problem, best.point(), found[:FINALISTS])
+            found = self._sorted(lambda c: self._refitted(problem, c, taken, 8),
+                                 found[:FINALISTS])
         return found
 
-    def _offset_columns(self, problem: Problem, point: dict[str, float]) -> NDArray[np.float32]:
-        return problem.columns(point, self.model.nuisances, problem.residuals([point])[0],
-                               central=False)
+    def _sorted(self, fitted: Callable[[Any], Candidate], of: Iterable[Any]) -> list[Candidate]:
+        """Fit several candidates at once; return the cheapest first."""
+        return sorted(self._pool.map(fitted, of), key=lambda c: c.priced)
+
+    def _derivatives(self, problem: Problem, point: dict[str, float],
+                     candidates: Sequence[Candidate]) -> _Derivatives:
+        """Take the derivatives at a point that several candidates will share."""
+        residual = problem.residuals([point])[0]
+        # a form with so many parameters is next to linear in them
+        free = {form for c in candidates for form in c.forms if len(form.parameters) > FREE}
+        return _Derivatives(
+            problem.columns(point, self.model.nuisances, residual, central=False),
+            {form.name: problem.columns(point, form.parameters, residual, central=False)
+             for form in free})
 
     def placed(self, point: dict[str, float]) -> dict[str, float]:
         """Return the point with the starting places that fit the first seconds best."""
@@ -223,9 +253,10 @@ class Search:
 
     def _take_tangents(self, state: State) -> None:
         residuals = self._residuals(state)
-        self.tangents = [_Tangent(effect.id, form, self._columns(state, form))
-                         for effect in self.model.effects.values()
-                         for form in self.model.forms(effect, residuals)]
+        forms = [(effect.id, form) for effect in self.model.effects.values()
+                 for form in self.model.forms(effect, residuals)]
+        self.tangents = list(self._pool.map(
+            lambda item: _Tangent(item[0], item[1], self._columns(state, item[1])), forms))
 
     def _screen(self, state: State, besides: Sequence[str] = ()) -> list[tuple[float, _Tangent]]:
         """Return the gain that each form promises, the greatest first, the best forms only."""
@@ -282,16 +313,16 @@ class Search:
     def _singles(self, none: Candidate) -> list[Candidate]:
         screened = self._screen(none.state)
         self.screened = [(tangent.effect, gain) for gain, tangent in screened]
-        found = [self._fitted(none, tangent, False, 5) for _, tangent in screened[:SINGLES]]
+        found = self._sorted(lambda item: self._fitted(none, item[1], False, 5),
+                             screened[:SINGLES])
         if self.problem.scale > 1.0:
-            found += [self._from_afar(none, tangent, value)
-                      for tangent, value in self._scanned(none.state)]
+            found += self._sorted(lambda item: self._from_afar(none, *item),
+                                  self._scanned(none.state))
+            found.sort(key=lambda c: c.priced)
         self.progress(0.35, 'single effects')
         # those that are far behind after a few turns stay there
-        found.sort(key=lambda c: c.priced)
-        leading = sorted((self._shaped(c, 8) for c in found[:FINALISTS]),
-                         key=lambda c: c.priced)
-        leading[:2] = [self._settled(c) for c in leading[:2]]
+        leading = self._sorted(lambda c: self._shaped(c, 8), found[:FINALISTS])
+        leading[:2] = self._sorted(self._settled, leading[:2])
         return sorted(leading, key=lambda c: c.priced)
 
     def _scanned(self, state: State, besides: Sequence[str] = (),
@@ -304,7 +335,7 @@ class Search:
         looked at. Effects that are there already are left out (`besides`).
         """
         problem, here = self.problem, state.point()
-        worst = int(np.argmax([huber_sum(state.residual[problem.rows(k)])
+        worst = int(np.argmax([robust_loss(state.residual[problem.rows(k)])
                                for k in range(len(problem.experiments))]))
         found: list[tuple[float, _Tangent, float]] = []
         for tangent in self.tangents:
@@ -330,7 +361,7 @@ class Search:
                  experiment: int) -> tuple[float, float]:
         """Return the least cost of one test over the values of a parameter, and that value."""
         rows = self.problem.rows(experiment)
-        costs = [huber_sum(z[rows]) for z in self.problem.residuals(
+        costs = [robust_loss(z[rows]) for z in self.problem.residuals(
             [{**point, name: value} for value in values], experiment)]
         best = int(np.argmin(costs))
         return costs[best], values[best]
@@ -364,21 +395,28 @@ class Search:
         found: dict[tuple[str, ...], Candidate] = {}
         for i, base in enumerate(singles[:BASES]):
             self.progress(0.5 + 0.2 * i / BASES, 'pairs of effects')
-            if base.priced > 3.0 * best.priced + REACH:
+            free = any(len(form.parameters) > FREE for form in base.forms)
+            if base.priced > 3.0 * best.priced + REACH or (free and base is not best):
                 continue
-            given = [self._fitted(base, tangent, True, 5)
-                     for gain, tangent in self._screen(base.state, base.effects)[:PARTNERS]
-                     if gain > worth]
-            if self.problem.scale > 1.0 and i == 0:
-                given += [self._from_afar(base, tangent, value)
-                          for tangent, value in self._scanned(base.state, base.effects)]
+            given = self._sorted(partial(self._partnered, best, base), [
+                (tangent, None) for gain, tangent in
+                self._screen(base.state, base.effects)[:PARTNERS] if gain > worth])
+            if self.problem.scale > 1.0 and base is best:
+                given += self._sorted(partial(self._partnered, best, base),
+                                      self._scanned(base.state, base.effects))
             for pair in given:
                 key = tuple(sorted(pair.effects))
-                if pair.cost < best.cost:
-                    pair = self._shaped(pair, 6)
                 if key not in found or pair.priced < found[key].priced:
                     found[key] = _light(pair)
         return sorted(found.values(), key=lambda c: c.priced)
+
+    def _partnered(self, best: Candidate, base: Candidate,
+                   partner: tuple[_Tangent, float | None]) -> Candidate:
+        """Give a candidate a partner, from a value far away if one is given."""
+        tangent, value = partner
+        pair = (self._fitted(base, tangent, True, 5) if value is None else
+                self._from_afar(base, tangent, value))
+        return self._shaped(pair, 6) if pair.cost < best.cost else pair
 
     def _in_full(self, none: Candidate, singles: Sequence[Candidate],
                  pairs: Sequence[Candidate]) -> list[Candidate]:
@@ -401,13 +439,11 @@ class Search:
         before = np.inf
         for number in range(PASSES):
             self.progress(0.7 + 0.3 * number / PASSES, 'the likeliest in full')
-            offsets = self._offset_columns(whole, anchor.state.point())
-            chosen = sorted((self._refitted(whole, c, offsets, 6) for c in chosen),
-                            key=lambda c: c.priced)
+            taken = self._derivatives(whole, anchor.state.point(), chosen)
+            chosen = self._sorted(lambda c: self._refitted(whole, c, taken, 6), chosen)
             singles = [c for c in chosen if len(c.effects) == 1]
             bare = [none] if number else [none, self._dropped(singles[0], singles[0].effects[0])]
-            none = min((self._refitted(whole, c, offsets, 6) for c in bare),
-                       key=lambda c: c.cost)
+            none = self._sorted(lambda c: self._refitted(whole, c, taken, 6), bare)[0]
             # what is far behind stays there
             anchor = chosen[0] if chosen[0].priced < none.cost else none
             chosen = [singles[0], *(c for c in chosen if c is not singles[0]
@@ -418,6 +454,18 @@ class Search:
         # of an effect's forms the best counts
         unique = {frozenset(c.effects): c for c in sorted(chosen, key=lambda c: -c.priced)}
         return [none, *sorted(unique.values(), key=lambda c: c.priced)]
+
+    def polished(self, candidate: Candidate) -> Candidate:
+        """Go on with a fit, with derivatives from both sides, as long as that gains much."""
+        state = candidate.state
+        for _ in range(POLISHES):
+            if self.whole.level(state.residual) < CLEAN:
+                break
+            before = state.cost
+            state = self.whole.fit(self.whole.refreshed(state, central=True), 6)
+            if before - state.cost < max(SETTLED, 0.01 * before):
+                break
+        return replace(candidate, state=state)
 
     def _dropped(self, candidate: Candidate, effect: str) -> Candidate:
         """Return a candidate without one of its effects, not fitted yet."""
@@ -434,15 +482,17 @@ class Search:
             tuple(e for i, e in enumerate(candidate.effects) if i != gone),
             tuple(f for i, f in enumerate(candidate.forms) if i != gone), bare)
 
-    def _refitted(self, problem: Problem, candidate: Candidate, offsets: NDArray[np.float32],
+    def _refitted(self, problem: Problem, candidate: Candidate, taken: _Derivatives,
                   turns: int) -> Candidate:
-        """Fit a candidate to another problem, with these derivatives by the offsets."""
+        """Fit a candidate to another problem, with derivatives that were taken for several."""
         point = candidate.state.point()
+        residual = problem.residuals([point])[0]
+        columns = [taken.free[form.name] if form.name in taken.free else
+                   problem.columns(point, form.parameters, residual, central=True)
+                   for form in candidate.forms]
         own = [p for form in candidate.forms for p in form.parameters]
-        columns = problem.columns(point, own, problem.residuals([point])[0],
-                                  central=len(own) <= FREE)
         state = problem.start((*self.model.nuisances, *own), point,
-                              np.column_stack([offsets, columns]))
+                              np.column_stack([taken.offsets, *columns]))
         return replace(candidate, state=problem.fit(state, turns))
 
 

@@ -37,8 +37,10 @@ SECOND_PRICE = 60.0
 SECOND_SHARE = 0.05
 # The unknown: how far the slow residual is above noise, and the share of the gap that is left,
 # each as a logarithm against the value that tips the scales.
-EXCESS, LEFT = 0.6, 0.06
+EXCESS, LEFT = 1.0, 0.06
 EXCESS_WEIGHT, LEFT_WEIGHT = 1.6, 1.6
+# An effect that explains less than this where it was not fitted is none.
+EXPLAINED, EXPLAINED_WEIGHT = 0.4, 12.0
 # Candidates within so much of the best cannot be told from it.
 ALIKE = 14.0
 LARGEST_GROUP = 5
@@ -79,7 +81,7 @@ def gap_of(candidates: Sequence[Candidate]) -> float:
     return max(none - single, 0.0)
 
 
-def unknown_probability(excess: float, left: float) -> float:
+def unknown_probability(excess: float, left: float, explained: float | None = None) -> float:
     """
     Return how probable it is that something outside the catalogue is at work.
 
@@ -89,10 +91,20 @@ def unknown_probability(excess: float, left: float) -> float:
         slow residual of the best candidate, over white noise, 0 if it is noise
     left
         share of the gap that the best candidate leaves, 0 to 1
+    explained
+        upper end of the interval of what its effects explain of a test that they were not fitted
+        to; None without effects
 
     """
     logit = (EXCESS_WEIGHT * math.log(max(excess, 1e-3) / EXCESS)
              + LEFT_WEIGHT * math.log(max(left, 1e-3) / LEFT))
+    remains = _logistic(logit)
+    fails = 0.0 if explained is None else _logistic(
+        EXPLAINED_WEIGHT * (EXPLAINED - explained))
+    return 1.0 - (1.0 - remains) * (1.0 - fails)
+
+
+def _logistic(logit: float) -> float:
     return 1.0 / (1.0 + math.exp(-min(max(logit, -8.0), 8.0)))
 
 

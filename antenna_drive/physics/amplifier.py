@@ -177,5 +177,6 @@ def armature_voltage(
     """
     kappa = armature.physical_amperes_per_article_ampere
     gain = p.current_feedback_gain
-    volts = kappa * ((armature.resistance + gain) * lagged_demand - gain * current)
+    forward = (armature.resistance + gain) * p.forward_gain_share
+    volts = kappa * (forward * lagged_demand - gain * current)
     return min(max(volts, -armature.voltage_limit), armature.voltage_limit)

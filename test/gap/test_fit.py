@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from antenna_drive.gap.fit import bounded_step, huber_sum, Problem
+from antenna_drive.gap.fit import bounded_step, Problem, robust_loss, robust_weight
 from antenna_drive.gap.model import Effect, Experiment, Form, Parameter
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -118,6 +118,13 @@ def test_bounded_step_agrees_with_an_independent_solver(m: Any, seed: Any) -> No
     assert cost(step) <= cost(best.x) + 1e-6 * (1.0 + cost(best.x))
 
 
-def test_huber_sum_is_the_square_within_and_linear_beyond() -> None:
-    assert huber_sum(np.array([2.0])) == 2.0
-    assert huber_sum(np.array([10.0])) - huber_sum(np.array([9.0])) == pytest.approx(3.0)
+def test_robust_loss_is_the_square_within_and_logarithmic_beyond() -> None:
+    assert robust_loss(np.array([2.0])) == 2.0
+    assert robust_loss(np.array([20.0])) - robust_loss(np.array([10.0])) == pytest.approx(
+        9.0 * math.log(2.0))
+    # where one becomes the other neither the loss nor its slope jumps
+    around = [robust_loss(np.array([3.0 + d])) for d in (-1e-4, 0.0, 1e-4)]
+    assert around[2] - around[1] == pytest.approx(around[1] - around[0], rel=1e-3)
+    # the weight is the slope over the residual
+    weight = robust_weight(np.array([2.0, 10.0]), np.array([True, True]))
+    np.testing.assert_allclose(weight, [1.0, 9.0 / 100.0])
