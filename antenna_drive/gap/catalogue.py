@@ -186,9 +186,14 @@ def _motor_effects(into: _Catalogue, component: str, paths: tuple[str, ...]) -> 
     one('amplifier_offset', 'drift of the operational amplifier',
         'a constant rate error, and currents that wind up against each other',
         _parameter('offset', 'V', -0.5, 0.5, 5e-4, ADD, *at('amplifier.offset')))
-    one('amplifier_dead_zone', 'crossover distortion or a comparator in front of amplifier 1',
-        'no answer to small rate errors, hunting at low rates',
-        _parameter('half_width', 'V', 0.0, 0.5, 1e-3, ADD, *at('amplifier.dead_zone')))
+    key = f'{component}.amplifier_dead_zone'
+    into.add(component, 'amplifier_dead_zone',
+             'crossover distortion, or a comparator in front of amplifier 1',
+             'no answer to small rate errors or demands, hunting at low rates',
+             _form(key, _parameter('half_width', 'V', 0.0, 0.5, 1e-3, ADD,
+                                   *at('amplifier.dead_zone')), name='in front of amplifier 1'),
+             _form(key, _parameter('crossover', 'A', 0.0, 2.0, 5e-3, ADD,
+                                   *at('amplifier.crossover')), name='crossover of amplifier 2'))
     one('current_limit', 'limiter set lower or higher than assumed',
         'current clipped at another level while it saturates',
         _parameter('change', '1', -0.9, 0.5, 5e-3, SCALE, *at('motor.current_limit')))
@@ -307,11 +312,11 @@ def _axis_effects(into: _Catalogue) -> None:
              'an oscillation that the model has not',
              *(_form('axis.extra_mode', _parameter(
                  'inertia', 'kg m^2', 0.0, 8e6, 2e4, SET, f'{path}.mode_inertias.3'),
-                 _parameter('frequency', 'Hz', 0.8 * frequency, 1.25 * frequency,
+                 _parameter('frequency', 'Hz', 0.85 * frequency, 1.18 * frequency,
                             0.005 * frequency, SET, f'{path}.mode_frequencies.3',
                             start=frequency),
                  _parameter('damping', '1', 0.0, 0.2, 2e-3, SET,
-                            f'{path}.mode_damping_ratios.3', start=0.01),
+                            f'{path}.mode_damping_ratios.3', start=0.03),
                  name=f'{frequency:.2g} Hz')
                for frequency in EXTRA_MODES))
     one('bull_gear_backlash', 'worn bull gear: both pinions have more play',
@@ -321,7 +326,7 @@ def _axis_effects(into: _Catalogue) -> None:
 
 
 # The frequencies from which an additional mode is sought [Hz].
-EXTRA_MODES = tuple(0.6 * 1.3 ** k for k in range(12))
+EXTRA_MODES = tuple(0.6 * 1.14 ** k for k in range(23))
 
 
 def _sensor_effects(into: _Catalogue) -> None:

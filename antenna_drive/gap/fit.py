@@ -271,9 +271,9 @@ class Problem:
             metric = step * diagonal
             length = float(step @ metric)
             change = residual - after
-            predicted = state.jacobian @ step.astype(np.float32)
+            predicted = (state.jacobian @ step.astype(np.float32)).astype(np.float64)
             for error, direction in zip(errors, directions, strict=True):
-                predicted = predicted + error * float(direction @ step)
+                predicted += error * float(direction @ step)
             wrong = change - predicted
             if length > 0.0 and (float(wrong @ (weight * wrong))
                                  < _TEACHES * float(predicted @ (weight * predicted))):

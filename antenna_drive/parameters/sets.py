@@ -81,6 +81,8 @@ class Amplifier:
     bias_command_gain: float = _given(
         '1', 0.0, 10.0, 'share of the counter torque that reaches amplifier 1 [s_F]')
     offset: float = _effect(0.0, 'V', -1.0, 1.0, 'offset at the input of amplifier 1')
+    crossover: float = _effect(
+        0.0, 'A', 0.0, 10.0, 'demand that the crossover of amplifier 2 swallows')
     forward_gain_share: float = _effect(
         1.0, '1', 0.1, 10.0, 'gain of amplifier 2 as a share of R + G_a')
     dead_zone: float = _effect(

@@ -177,6 +177,8 @@ def armature_voltage(
     """
     kappa = armature.physical_amperes_per_article_ampere
     gain = p.current_feedback_gain
+    if p.crossover > 0.0:
+        lagged_demand *= abs(lagged_demand) / (abs(lagged_demand) + p.crossover)
     forward = (armature.resistance + gain) * p.forward_gain_share
     volts = kappa * (forward * lagged_demand - gain * current)
     return min(max(volts, -armature.voltage_limit), armature.voltage_limit)
