@@ -15,12 +15,14 @@
 
 from pathlib import Path
 import re
+from typing import Any
 
 from antenna_drive.parameters import load, ParameterError
 from antenna_drive.parameters.loading import find
-from antenna_drive.parameters.records import record_of
+from antenna_drive.parameters.records import place_of, record_of
 from antenna_drive.parameters.sets import values
 from hypothesis import given, HealthCheck, settings, strategies as st
+import numpy as np
 import pytest
 import yaml
 
@@ -153,3 +155,16 @@ def test_the_record_holds_what_the_set_holds() -> None:
         else:
             assert field == value
     assert record['axis']['mode_inertias_count'] == 3
+
+
+@pytest.mark.parametrize('path', [
+    'motor_1.amplifier.rate_gain', 'motor_2.gearbox.half_gap', 'plant.axis.inertia_hub',
+    'torque_share.filter_1.pole', 'plant.encoder.step', 'plant.axis.mode_frequencies.2'])
+def test_place_of_a_number_is_where_numpy_keeps_it(path: str) -> None:
+    record = record_of(load())
+    record.view(np.float64)[place_of(record.dtype, path)] = 123.456
+    part: Any = record
+    *names, last = path.split('.')
+    for name in names:
+        part = part[name]
+    assert (part[0, int(last)] if last.isdigit() else part[last][0]) == 123.456
