@@ -22,7 +22,7 @@ diagnosis starts from. One more takes a term in gap/servo_physics.py, a number a
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from types import MappingProxyType
 from typing import Final
@@ -189,8 +189,8 @@ def _form(name: str, *numbers: str) -> Form:
 
 
 def _waves(kind: str) -> tuple[Form, ...]:
-    return tuple(_form(f'{cycles} cycles', f'{kind}_cosine@{cycles}', f'{kind}_sine@{cycles}')
-                 for cycles in CYCLES)
+    return tuple(replace(_form(f'{cycles} cycles', f'{kind}_cosine@{cycles}',
+                               f'{kind}_sine@{cycles}'), sought=True) for cycles in CYCLES)
 
 
 def catalogue(without: Iterable[str] = ()) -> dict[str, Effect]:
