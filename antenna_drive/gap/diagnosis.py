@@ -28,7 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import math
 import time
 from typing import Any
@@ -306,6 +306,8 @@ def _how_far(problem: Problem, none: Candidate, best: Candidate) -> dict[str, An
     """Return the gap before and after, on data that the fits have not seen."""
     count = len(problem.experiments)
     channels = problem.experiments[0].channels
+    none, best = (replace(c, state=problem.start(c.state.parameters, c.state.point()))
+                  if c.state.jacobian.size == 0 else c for c in (none, best))
     before, after = [], []
     for k in range(count):
         unseen = [_unseen(problem, candidate, k) for candidate in (none, best)]
@@ -346,8 +348,6 @@ def _unseen(problem: Problem, candidate: Candidate, k: int) -> FloatArray:
         used[0] = experiments[0].time < half
     training = Problem(problem.model, used)
     state = candidate.state
-    if state.jacobian.size == 0:
-        state = problem.start(state.parameters, state.point())
     fitted = training.start(state.parameters, state.point(), state.jacobian)
     fitted = training.fit(fitted, 6)
     if len(experiments) > 1:

@@ -48,7 +48,7 @@ BRIEF_LONGEST_STEP = 3.4e-3
 _WAVES = 3
 # The mode that the record has room for and the configuration has not.
 _EXTRA = 3
-_CACHE = 400
+_CACHE = 120
 # A gust's torque is smooth; within so much time it may be a straight line [s].
 _GUST_S = 0.02
 

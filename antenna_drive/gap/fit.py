@@ -57,6 +57,7 @@ class State:
     cost : sum of robust losses, half a chi-square if all are small, and the pull of the offsets
     errors, directions : outer products that the fit has corrected the derivative by, shapes (n,)
         and (m,) each
+    kept : the hessian of a state that has let its derivatives go, None of any other
 
     """
 
@@ -68,6 +69,7 @@ class State:
     cost: float
     errors: tuple[FloatArray, ...] = ()
     directions: tuple[FloatArray, ...] = ()
+    kept: FloatArray | None = None
 
     @cached_property
     def jacobian(self) -> NDArray[np.float32]:
@@ -77,7 +79,12 @@ class State:
     @cached_property
     def hessian(self) -> FloatArray:
         """Return derivative, weight, derivative, shape (m, m)."""
-        return weighted_square(self.jacobian, self.weight)
+        return weighted_square(self.jacobian, self.weight) if self.kept is None else self.kept
+
+    def light(self) -> State:
+        """Return the state without its derivatives, which take most of the memory."""
+        return State(self.parameters, self.x, self.residual, np.empty((0, 0), np.float32),
+                     self.weight, self.cost, kept=self.hessian)
 
     def point(self) -> dict[str, float]:
         """Return the values by name."""

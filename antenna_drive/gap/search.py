@@ -34,7 +34,7 @@ from functools import partial
 from typing import Any
 
 from antenna_drive.gap.fit import (
-    across, bounded_step, robust_loss, Problem, scanned, State, weighted_square,
+    across, bounded_step, Problem, robust_loss, scanned, State, weighted_square,
 )
 from antenna_drive.gap.model import FloatArray, Form, Model, Parameter
 from antenna_drive.gap.price import price
@@ -62,8 +62,8 @@ SHARPER = 0.7
 WANTING = 1.03
 # A pass that gains less than this ends the fits.
 SETTLED = 4.0
-# A fit that leaves less than this, in standard deviations, needs no polish; others get it so
-# many times.
+# A fit that leaves less than this, in standard deviations, is polished once; others so many
+# times.
 CLEAN = 0.97
 POLISHES = 5
 # Forms with more parameters than this are free at every moment: a gust.
@@ -323,7 +323,8 @@ class Search:
         # those that are far behind after a few turns stay there
         leading = self._sorted(lambda c: self._shaped(c, 8), found[:FINALISTS])
         leading[:2] = self._sorted(self._settled, leading[:2])
-        return sorted(leading, key=lambda c: c.priced)
+        leading.sort(key=lambda c: c.priced)
+        return [*leading[:BASES], *(_light(c) for c in leading[BASES:])]
 
     def _scanned(self, state: State, besides: Sequence[str] = (),
                  ) -> list[tuple[_Tangent, float]]:
@@ -440,10 +441,10 @@ class Search:
         for number in range(PASSES):
             self.progress(0.7 + 0.3 * number / PASSES, 'the likeliest in full')
             taken = self._derivatives(whole, anchor.state.point(), chosen)
-            chosen = self._sorted(lambda c: self._refitted(whole, c, taken, 6), chosen)
+            chosen = self._sorted(lambda c: _light(self._refitted(whole, c, taken, 6)), chosen)
             singles = [c for c in chosen if len(c.effects) == 1]
             bare = [none] if number else [none, self._dropped(singles[0], singles[0].effects[0])]
-            none = self._sorted(lambda c: self._refitted(whole, c, taken, 6), bare)[0]
+            none = self._sorted(lambda c: _light(self._refitted(whole, c, taken, 6)), bare)[0]
             # what is far behind stays there
             anchor = chosen[0] if chosen[0].priced < none.cost else none
             chosen = [singles[0], *(c for c in chosen if c is not singles[0]
@@ -458,8 +459,8 @@ class Search:
     def polished(self, candidate: Candidate) -> Candidate:
         """Go on with a fit, with derivatives from both sides, as long as that gains much."""
         state = candidate.state
-        for _ in range(POLISHES):
-            if self.whole.level(state.residual) < CLEAN:
+        for number in range(POLISHES):
+            if number and self.whole.level(state.residual) < CLEAN:
                 break
             before = state.cost
             state = self.whole.fit(self.whole.refreshed(state, central=True), 6)
@@ -497,9 +498,7 @@ class Search:
 
 
 def _light(candidate: Candidate) -> Candidate:
-    """Return the candidate without its derivatives, which take most of the memory."""
-    return replace(candidate, state=replace(candidate.state, taken=np.empty((0, 0), np.float32),
-                                            errors=(), directions=()))
+    return replace(candidate, state=candidate.state.light())
 
 
 def parameters_of(candidate: Candidate) -> list[tuple[Parameter, float]]:
