@@ -18,7 +18,7 @@ from __future__ import annotations
 from antenna_drive.parameters.sets import Gearbox
 from antenna_drive.physics.backlash import contact_torque
 from antenna_drive.physics.compiling import inner
-from antenna_drive.physics.wave import wave, wave_slope
+from antenna_drive.physics.harmonics import wave, wave_slope
 
 
 @inner

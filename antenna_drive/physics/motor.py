@@ -18,7 +18,7 @@ from __future__ import annotations
 from antenna_drive.parameters.sets import Ammeter, Motor, Tachometer
 from antenna_drive.physics.compiling import inner
 from antenna_drive.physics.friction import slip_level
-from antenna_drive.physics.wave import wave
+from antenna_drive.physics.harmonics import wave
 
 
 @inner

@@ -30,8 +30,8 @@ from antenna_drive.parameters.sets import Axis, Encoder, Plant
 from antenna_drive.physics.arrays import FloatArray, IntArray
 from antenna_drive.physics.compiling import compiled, inner, shared
 from antenna_drive.physics.friction import next_slip, slip_level
+from antenna_drive.physics.harmonics import wave
 from antenna_drive.physics.integrator import located_runge_kutta
-from antenna_drive.physics.wave import wave
 import numpy as np
 
 ANGLE, RATE = range(2)

@@ -45,6 +45,9 @@ class Decay:
             'toy', time, ('y',), ('1',), (clean + noise * random.normal(size=400))[:, np.newaxis],
             np.full((400, 1), noise)),)
 
+    def brief(self) -> 'Decay':
+        return self
+
     def forms(self, effect: Any, residuals: Any) -> Any:
         """Return the one form."""
         return effect.forms

@@ -21,7 +21,7 @@ from antenna_drive.parameters.records import record_of
 from antenna_drive.physics.amplifier import armature_voltage
 from antenna_drive.physics.armature import current_rate
 from antenna_drive.physics.gearbox import gear_torque, presliding_rate
-from antenna_drive.physics.wave import wave, wave_slope
+from antenna_drive.physics.harmonics import wave, wave_slope
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
