@@ -271,8 +271,9 @@ class Search:
             if tangent.effect in besides or (besides and len(tangent.form.parameters) > FREE):
                 # what is free at every moment explains the remains of anything
                 continue
-            live = [j for j, p in enumerate(tangent.form.parameters)
-                    if not p.shape and p.name not in names]
+            if any(p.name in names for p in tangent.form.parameters):
+                continue  # another effect of the same numbers
+            live = [j for j, p in enumerate(tangent.form.parameters) if not p.shape]
             own = tangent.columns[:, live]
             cross = weighted_square(state.jacobian, state.weight, own)
             full = np.block([[curvature, cross],
@@ -341,7 +342,8 @@ class Search:
         found: list[tuple[float, _Tangent, float]] = []
         for tangent in self.tangents:
             live = [p for p in tangent.form.parameters if not p.shape]
-            if len(live) != 1 or tangent.effect in besides:
+            if len(live) != 1 or tangent.effect in besides or any(
+                    p.name in here for p in tangent.form.parameters):
                 continue
             begin = {**here, **starts(tangent.form)}
             values = [share * (live[0].high if share > 0.0 else -live[0].low)
