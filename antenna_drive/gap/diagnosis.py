@@ -55,6 +55,8 @@ _TURNS = ('each recording in turn, with the effect as the others have it; offset
           'tolerance were fitted to it, with the effect and without')
 _HALVES = 'the second half of the recording, predicted from the first'
 _RESAMPLES = 400
+# More numbers than these are not told one by one.
+_TOLD = 12
 
 
 @dataclass(frozen=True)
@@ -87,8 +89,7 @@ class Diagnosis:
             if entry['probability'] >= 0.01:
                 names = ' and '.join(entry['effects'])
                 lines.append(f'  {100.0 * entry["probability"]:5.1f} %  {names}')
-                lines += [f'           {name} = {value["value"]:.4g} {value["unit"]}'
-                          for name, value in entry['parameters'].items()]
+                lines += [f'           {line}' for line in told(entry['parameters'])]
         for group in result['confusable']:
             lines.append('  these data cannot tell apart: ' + ', '.join(group))
         fraction = result['how_far']['explained_fraction']
@@ -107,6 +108,17 @@ _HEADLINES = {
     'partly_explained': 'partly explained: a known effect closes some of the gap',
     'unknown_effect': 'unknown effect: nothing in the catalogue closes the gap',
 }
+
+
+def told(parameters: Mapping[str, Any]) -> list[str]:
+    """Return the values of an entry's parameters as people read them, a line each."""
+    if len(parameters) > _TOLD:
+        # a gust: a course over time, which no one reads number by number
+        return [f'{len(parameters)} numbers over time, see the JSON']
+    return [f'{name.split(".", 2)[-1]} = {item["value"]:.4g} '
+            + ('' if item['unit'] == '1' else f'{item["unit"]} ')
+            + f'({item["ci95"][0]:.4g} to {item["ci95"][1]:.4g})'
+            for name, item in parameters.items()]
 
 
 def diagnose(recordings: Mapping[str, Recording], drive: Drive,

@@ -21,7 +21,7 @@ import math
 from typing import Any
 
 from antenna_drive.gap.catalogue import catalogue
-from antenna_drive.gap.diagnosis import Diagnosis
+from antenna_drive.gap.diagnosis import Diagnosis, told
 from antenna_drive.gap.model import Experiment, FloatArray
 import numpy as np
 
@@ -121,11 +121,8 @@ def _which(result: dict[str, Any]) -> str:
             continue
         names = ' + '.join(escape(name) for name in entry['effects'])
         causes = '; '.join(known[name].cause for name in entry['effects'] if name in known)
-        values = ''.join(
-            f'<div class="small">{escape(name.split(".", 2)[-1])} = '
-            f'{_number(item["value"])} {escape(item["unit"])} '
-            f'({_number(item["ci95"][0])} to {_number(item["ci95"][1])})</div>'
-            for name, item in entry['parameters'].items())
+        values = ''.join(f'<div class="small">{escape(line)}</div>'
+                         for line in told(entry['parameters']))
         rows.append(f'<tr><td class="n">{100.0 * share:.1f} %</td>'
                     f'<td><span class="bar" style="width:{120.0 * share:.0f}px"></span></td>'
                     f'<td><b>{names}</b><div class="small">{escape(causes)}</div>'

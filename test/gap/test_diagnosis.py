@@ -27,7 +27,7 @@ from typing import Any
 from antenna_drive.cli import main
 from antenna_drive.errors import UserError
 from antenna_drive.gap.confusability import BUILT_IN, confusability, planned
-from antenna_drive.gap.diagnosis import diagnose
+from antenna_drive.gap.diagnosis import diagnose, told
 from antenna_drive.gap.drive_model import DriveModel
 from antenna_drive.gap.field_test import CHANNELS
 from antenna_drive.gap.report import page
@@ -164,3 +164,12 @@ def test_confusability_knows_what_one_elevation_cannot_tell() -> None:
     assert math.isfinite(found.detectable[at['axis.viscous_friction']])
     assert any({'axis.gravity_imbalance', 'axis.wind_steady'} <= set(group)
                for group in found.groups())
+
+
+def test_values_are_told_as_people_read_them() -> None:
+    item = {'value': 0.25, 'ci95': [0.2, 0.3], 'unit': 'N m'}
+    assert told({'motor_1.stribeck_friction.torque': item}) == ['torque = 0.25 N m (0.2 to 0.3)']
+    assert told({'axis.inertia.change': {**item, 'unit': '1'}}) == ['change = 0.25 (0.2 to 0.3)']
+    # a gust is a course of many numbers
+    (line,) = told({f'axis.wind_gust.torque:0:{i}': item for i in range(60)})
+    assert line.startswith('60 numbers')
