@@ -36,7 +36,7 @@ from typing import Any
 from antenna_drive.gap import residuals, verdict
 from antenna_drive.gap.drive_model import DriveModel
 from antenna_drive.gap.fit import Problem, State
-from antenna_drive.gap.model import FloatArray, Model
+from antenna_drive.gap.model import FloatArray, Model, Motion
 from antenna_drive.gap.search import Candidate, parameters_of, Search
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.recording import Recording
@@ -143,14 +143,37 @@ def diagnose(recordings: Mapping[str, Recording], drive: Drive,
 
     """
     began = time.monotonic()
+    model = DriveModel(recordings, drive, threads)
+    found = diagnosed(model, progress, threads, model.notes)
+    found.result['seconds'] = time.monotonic() - began
+    return found
+
+
+def diagnosed(model: Model, progress: Progress = lambda share, doing: None, threads: int = 2,
+              notes: Sequence[str] = ()) -> Diagnosis:
+    """
+    Diagnose any machine that is modelled, in the experiments that its model holds.
+
+    Parameters
+    ----------
+    model
+        see `Model`
+    progress
+        called with the share that is done, 0 to 1, and what is being done
+    threads
+        how many candidates are fitted at once
+    notes
+        what was inferred or is missing
+
+    """
     # whole fits are made side by side: matrices within a fit need no threads of their own
     with threadpool_limits(1, 'blas') if threadpool_limits else nullcontext():
-        model = DriveModel(recordings, drive, threads)
-        return _diagnosed(model, progress, began, model.notes, threads)
+        return _diagnosed(model, progress, threads, notes)
 
 
-def _diagnosed(model: DriveModel, progress: Progress, began: float,
-               notes: Sequence[str], threads: int) -> Diagnosis:
+def _diagnosed(model: Model, progress: Progress, threads: int,
+               notes: Sequence[str]) -> Diagnosis:
+    began = time.monotonic()
     problem = Problem(model)
     search = Search(problem, lambda share, doing: progress(0.9 * share, doing), threads)
     candidates = search.run()
@@ -221,8 +244,8 @@ def _excess(problem: Problem, state: State) -> float:
     for k, experiment in enumerate(problem.experiments):
         z = np.clip(_z(problem, state, k), -6.0, 6.0)
         # at rest the encoder's residual is a fraction of one step, and no noise at all
-        found += [residuals.structure(z[:, c]) for c in range(len(experiment.channels))
-                  if experiment.channels[c] != 'encoder' and np.isfinite(z[:, c]).sum() > 50]
+        found += [residuals.structure(z[:, c]) for c, channel in enumerate(experiment.channels)
+                  if channel not in experiment.coarse and np.isfinite(z[:, c]).sum() > 50]
     return float(np.mean(np.maximum(found, -0.5))) if found else 0.0
 
 
@@ -235,7 +258,7 @@ def _left(problem: Problem, none: Candidate, best: Candidate) -> float:
         z = _z(problem, best.state, k)
         first = raw[problem.rows(k)].reshape(experiment.measured.shape)
         for c in range(len(experiment.channels)):
-            if experiment.channels[c] == 'encoder' or not np.isfinite(z[:, c]).any():
+            if experiment.channels[c] in experiment.coarse or not np.isfinite(z[:, c]).any():
                 continue
             white = 0.5 * float(np.nanmean(np.diff(z[:, c]) ** 2))
             energy += [min(float(np.nanmean(z[:, c] ** 2)), 1e6) - white,
@@ -246,7 +269,7 @@ def _left(problem: Problem, none: Candidate, best: Candidate) -> float:
 
 
 def _tests(problem: Problem, state: State, excess: float, left: float,
-           motions: Sequence[residuals.Motion]) -> dict[str, Any]:
+           motions: Sequence[Motion]) -> dict[str, Any]:
     signals: dict[str, Any] = {}
     zs = [_z(problem, state, k) for k in range(len(problem.experiments))]
     for c, channel in enumerate(problem.experiments[0].channels):
@@ -282,7 +305,7 @@ def _parameters(candidate: Candidate) -> dict[str, Any]:
 
 # -- where ----------------------------------------------------------------------------------------
 
-def _where(problem: Problem, model: DriveModel, none: Candidate, best: Candidate,
+def _where(problem: Problem, model: Model, none: Candidate, best: Candidate,
            ranked: Sequence[verdict.Ranked]) -> list[dict[str, Any]]:
     """Return the parts, signals and regimes in which the gap lies, the largest first."""
     components: dict[str, float] = {}

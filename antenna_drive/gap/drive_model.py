@@ -30,9 +30,8 @@ from antenna_drive.gap.excitation import Bias, schedule
 from antenna_drive.gap.field_test import (
     BIAS, CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, prepared, TACH_1, TACH_2, UNITS,
 )
-from antenna_drive.gap.model import Effect, Experiment, FloatArray, Form, Point
+from antenna_drive.gap.model import Effect, Experiment, FloatArray, Form, Motion, Point
 from antenna_drive.gap.offsets import CLOCK, offsets, SUPPLY, ZERO
-from antenna_drive.gap.residuals import Motion
 from antenna_drive.gap.waves import likely_orders
 from antenna_drive.parameters.records import place_of
 from antenna_drive.parameters.sets import Drive
@@ -119,7 +118,7 @@ class DriveModel:
         out = batch.run(test.record, schedule(test.command, test.bias, test.time, LONGEST_STEP))
         noise = test.sensors.noise(out[:, :, 0], out[:, :, 1], test.jitter)
         return Experiment(test.name, test.time, tuple(CHANNELS.values()), UNITS, test.measured,
-                          noise)
+                          noise, coarse=('encoder',))
 
     def brief(self) -> DriveModel:
         """Return the model with as much of each test as a search needs; a chirp stays whole."""
@@ -135,17 +134,17 @@ class DriveModel:
             for n, e in zip(sizes, self.experiments, strict=True))
         return other
 
-    def motion(self, k: int) -> Motion:
+    def motion(self, experiment: int) -> Motion:
         """Return how the machine moved in an experiment: as measured, else as simulated."""
-        experiment = self.experiments[k]
-        predicted = self.simulate([{}], [k])[0][k]
+        measured_there = self.experiments[experiment].measured
+        predicted = self.simulate([{}], [experiment])[0][experiment]
         assert predicted is not None
 
         def signal(c: int) -> FloatArray:
-            measured = experiment.measured[:, c]
+            measured = measured_there[:, c]
             return np.where(np.isfinite(measured), measured, predicted[:, c])
 
-        test = self._tests[k]
+        test = self._tests[experiment]
         return Motion(rate=0.5 * (signal(TACH_1) + signal(TACH_2)),
                       load=signal(CURRENT_1) + signal(CURRENT_2), angle=signal(ENCODER),
                       limit=float(test.record['motor_1']['motor']['current_limit'][0]))

@@ -116,6 +116,7 @@ class Experiment:
     units : of the signals
     measured : shape (n, c); NaN where there is no sample
     noise : standard deviation expected of a perfect model's residuals, shape (n, c)
+    coarse : names of signals whose residual at rest is a fraction of one step, and no noise
 
     """
 
@@ -125,6 +126,17 @@ class Experiment:
     units: tuple[str, ...]
     measured: FloatArray
     noise: FloatArray
+    coarse: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How the machine moves in an experiment: arrays of shape (n,), from any source."""
+
+    rate: FloatArray
+    load: FloatArray
+    angle: FloatArray
+    limit: float
 
 
 class Model(Protocol):
@@ -157,6 +169,9 @@ class Model(Protocol):
             of each experiment: measured less predicted without the effect, shape (n, c)
 
         """
+
+    def motion(self, experiment: int) -> Motion:
+        """Return how the machine moved in an experiment: it says when a gap shows."""
 
     def absorbed(self, point: Point, gone: Point) -> dict[str, float]:
         """

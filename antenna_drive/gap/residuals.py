@@ -21,10 +21,9 @@ the direction, or repeats with an angle says what kind of effect is missing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
-from antenna_drive.gap.model import Experiment, FloatArray
+from antenna_drive.gap.model import Experiment, FloatArray, Motion
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,16 +32,6 @@ _AFTER_REVERSAL_S = 0.4
 _BINS = 12
 _LAGS = 20
 _BLOCK = 10
-
-
-@dataclass(frozen=True)
-class Motion:
-    """How the machine moves in an experiment: arrays of shape (n,), from any source."""
-
-    rate: FloatArray
-    load: FloatArray
-    angle: FloatArray
-    limit: float
 
 
 def regimes(experiment: Experiment, motion: Motion) -> NDArray[np.int64]:

@@ -22,8 +22,7 @@ import math
 
 from antenna_drive.errors import UserError
 from antenna_drive.gap import servo_catalogue
-from antenna_drive.gap.model import Effect, Experiment, FloatArray, Form, Parameter, Point
-from antenna_drive.gap.residuals import Motion
+from antenna_drive.gap.model import Effect, Experiment, FloatArray, Form, Motion, Parameter, Point
 from antenna_drive.gap.servo_physics import GRAVITY, swing
 from antenna_drive.recording.recording import Recording
 import numpy as np
@@ -278,13 +277,13 @@ class ServoModel:
         readings[self.experiments[k].time > until] = np.nan
         return readings
 
-    def motion(self, k: int) -> Motion:
+    def motion(self, experiment: int) -> Motion:
         """Return how the servo moved in a test, as it was measured, at the judged samples."""
-        test, stride = self.tests[k], self._strides[k]
+        test, stride = self.tests[experiment], self._strides[experiment]
         position = test.measured[::stride, POSITION]
         load = test.mass * GRAVITY * test.length
-        return Motion(np.gradient(position, self.experiments[k].time), load * np.sin(position),
-                      position, load)
+        time = self.experiments[experiment].time
+        return Motion(np.gradient(position, time), load * np.sin(position), position, load)
 
 
 def _left(forms: Sequence[Form], present: Mapping[str, float]) -> Iterable[Form]:

@@ -19,7 +19,7 @@ import math
 from typing import Any
 
 from antenna_drive.gap.fit import bounded_step, Problem, robust_loss, robust_weight
-from antenna_drive.gap.model import Effect, Experiment, Form, Parameter
+from antenna_drive.gap.model import Effect, Experiment, Form, Motion, Parameter
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -45,8 +45,12 @@ class Decay:
             'toy', time, ('y',), ('1',), (clean + noise * random.normal(size=400))[:, np.newaxis],
             np.full((400, 1), noise)),)
 
-    def brief(self) -> 'Decay':
+    def brief(self) -> Decay:
         return self
+
+    def motion(self, experiment: int) -> Motion:
+        time = self.experiments[experiment].time
+        return Motion(np.ones_like(time), np.ones_like(time), time, 1.0)
 
     def forms(self, effect: Any, residuals: Any) -> Any:
         """Return the one form."""
