@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""A diagnosis works on any machine that is modelled: here a heated body that cools, in closed form."""
+"""A diagnosis works on any machine that is modelled: here a body that cools, in closed form."""
 
 from __future__ import annotations
 
