@@ -32,7 +32,6 @@ from typing import Any
 from antenna_drive.bench.stamps import Stamps
 from antenna_drive.emulator.wiring import INPUTS, OUTPUTS, TEST_SIGNAL, UNITS
 from antenna_drive.lockstep.frame import FrameLayout
-import numpy as np
 
 _NEVER_NS = -1
 
@@ -61,7 +60,7 @@ def main() -> int:
     wait_set = implementation.WaitSet(1, 0, 0, 0, 0, 0, context)
     stamps = Stamps(path, int(last))
     frame = FrameLayout(OUTPUTS[unit])
-    message = frame.encode(1.0, 1, 1e-3, np.zeros((len(OUTPUTS[unit]), 2)))
+    message = frame.encode(1.0, 1, 1e-3, bytes(16 * len(OUTPUTS[unit])))
     period = float(step_s) / float(pace) if float(pace) > 0.0 and unit == TEST_SIGNAL else 0.0
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     stamps.note(0)

@@ -11,13 +11,18 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Many macro-steps of the whole drive in one compiled call, to the same bits as unit by unit."""
+"""
+The compiled steps that Python calls: of one unit, and of the whole drive, to the same bits.
+
+A unit's record goes in as an array of one: numba looks anew at a single record in every call,
+which takes several times as long as the step itself.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
-from antenna_drive.physics import motor_drive, structure, torque_share
+from antenna_drive.physics import motor_drive, structure, test_signal, torque_share
 from antenna_drive.physics.arrays import FloatArray, IntArray
 from antenna_drive.physics.compiling import compiled, inner
 
@@ -34,6 +39,34 @@ def _scatter(y: FloatArray, first: int, after: FloatArray) -> None:
     for j in range(y.shape[0]):
         after[first + j, 0] = y[j, 0]
         after[first + j, 1] = y[j, 1]
+
+
+@compiled
+def motor_step(x: FloatArray, mode: IntArray, u: FloatArray, p: Any, h: float, steps: int,
+               work: FloatArray, y: FloatArray) -> None:
+    """Advance a motor; arguments as those of `motor_drive.step`, its record in an array."""
+    motor_drive.step(x, mode, u, p[0], h, steps, work, y)
+
+
+@compiled
+def share_step(x: FloatArray, mode: IntArray, u: FloatArray, p: Any, h: float, steps: int,
+               work: FloatArray, y: FloatArray) -> None:
+    """Advance the torque share; arguments as those of `torque_share.step`."""
+    torque_share.step(x, mode, u, p[0], h, steps, work, y)
+
+
+@compiled
+def plant_step(x: FloatArray, mode: IntArray, u: FloatArray, p: Any, h: float, steps: int,
+               work: FloatArray, y: FloatArray) -> None:
+    """Advance the plant; arguments as those of `structure.step`."""
+    structure.step(x, mode, u, p[0], h, steps, work, y)
+
+
+@compiled
+def sample_signals(first: int, count: int, h: float, origins: FloatArray, p: Any,
+                   bits: FloatArray, y: FloatArray) -> None:
+    """Sample the test signals; arguments as those of `test_signal.sample`."""
+    test_signal.sample(first, count, h, origins, p[0], bits, y)
 
 
 @compiled

@@ -21,7 +21,7 @@ from functools import cache
 import math
 from typing import Any, ClassVar
 
-from antenna_drive.emulator import wiring
+from antenna_drive.emulator import steps, wiring
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.parameters.loading import check_waveform
 from antenna_drive.parameters.records import record_of
@@ -89,6 +89,7 @@ class _SteppedUnit(_DriveUnit):
     """A unit with states of its own, advanced by its compiled physics."""
 
     _physics: ClassVar[Any]
+    _advance: ClassVar[Any]
 
     def __init__(self, name: str, parameters: Any, states: int) -> None:
         super().__init__(name, parameters)
@@ -97,6 +98,7 @@ class _SteppedUnit(_DriveUnit):
         self._work = work_space(states)
         self._u = np.zeros((len(self.inputs), 2))
         self._y = np.zeros((len(self.outputs), 2))
+        self._inner_steps = 1
 
     def memory(self) -> tuple[Any, ...]:
         """Return record, states, mode, inputs, work space and outputs, for a compiled loop."""
@@ -105,13 +107,14 @@ class _SteppedUnit(_DriveUnit):
     def start(self, step_s: float) -> FloatArray:
         """Return to the state at rest and give the outputs at t = 0; see `Unit.start`."""
         self._step_s = step_s
+        self._inner_steps = inner_steps(step_s)
         self._physics.start(self._record[0], self._x, self._mode, self._y)
         return self._y.copy()
 
     def step(self, k: int, inputs: FloatArray) -> FloatArray:
         """Advance from t_k to t_k+1 and give the outputs there; see `Unit.step`."""
-        self._physics.step(self._x, self._mode, inputs, self._record[0], self._step_s,
-                           inner_steps(self._step_s), self._work, self._y)
+        self._advance(self._x, self._mode, inputs, self._record, self._step_s,
+                      self._inner_steps, self._work, self._y)
         return self._y.copy()
 
 
@@ -121,6 +124,7 @@ class MotorDriveUnit(_SteppedUnit):
     inputs: ClassVar[tuple[str, ...]] = wiring.MOTOR_INPUTS
     outputs: ClassVar[tuple[Signal, ...]] = wiring.MOTOR_OUTPUTS
     _physics: ClassVar[Any] = motor_drive
+    _advance: ClassVar[Any] = staticmethod(steps.motor_step)
 
     def __init__(self, name: str, drive: Drive) -> None:
         """Take motor_1's or motor_2's parameters, whichever `name` says."""
@@ -133,6 +137,7 @@ class TorqueShareUnit(_SteppedUnit):
     inputs: ClassVar[tuple[str, ...]] = wiring.INPUTS[wiring.TORQUE_SHARE]
     outputs: ClassVar[tuple[Signal, ...]] = wiring.TORQUE_SHARE_OUTPUTS
     _physics: ClassVar[Any] = torque_share
+    _advance: ClassVar[Any] = staticmethod(steps.share_step)
     _own = 'torque_share'
 
     def __init__(self, name: str, drive: Drive) -> None:
@@ -146,6 +151,7 @@ class PlantUnit(_SteppedUnit):
     inputs: ClassVar[tuple[str, ...]] = wiring.INPUTS[wiring.PLANT]
     outputs: ClassVar[tuple[Signal, ...]] = wiring.PLANT_OUTPUTS
     _physics: ClassVar[Any] = structure
+    _advance: ClassVar[Any] = staticmethod(steps.plant_step)
     _own = 'axis'
 
     def __init__(self, name: str, drive: Drive) -> None:
@@ -211,8 +217,8 @@ class TestSignalUnit(_DriveUnit):
 
     def _sample(self, first: int, count: int) -> FloatArray:
         y = np.zeros((count, len(self.outputs), 2))
-        test_signal.sample(first, count, self._step_s, self._origins, self._record[0],
-                           self._bits, y)
+        steps.sample_signals(first, count, self._step_s, self._origins, self._record,
+                             self._bits, y)
         return y
 
     def _changed(self, changes: Mapping[str, Value]) -> Any:

@@ -25,8 +25,7 @@ from collections.abc import Sequence
 import math
 import struct
 
-from antenna_drive.emulator.unit import FloatArray, Signal
-import numpy as np
+from antenna_drive.emulator.unit import Signal
 
 HEADER = ('run', 'step', 'step_s')
 
@@ -54,9 +53,10 @@ class FrameLayout:
         self._prefix = _cdr_prefix(self.label, self.length)
         self._data = struct.Struct(f'<{self.length}d')
         self._header = struct.Struct('<3d')
+        self._outputs = struct.Struct(f'<{2 * len(self.signals)}d')
         self._size = len(self._prefix) + self._data.size
 
-    def encode(self, run: float, step: int, step_s: float, outputs: FloatArray) -> bytes:
+    def encode(self, run: float, step: int, step_s: float, packed: bytes = b'') -> bytes:
         """
         Return the serialised message.
 
@@ -64,15 +64,19 @@ class FrameLayout:
         ----------
         run, step, step_s
             the run's id, the macro-step, its length [s]
-        outputs
-            array of shape (number of signals, 2): value and time derivative
+        packed
+            value and time derivative of each signal, as little-endian doubles
 
         """
-        return self._prefix + self._header.pack(run, step, step_s) + outputs.tobytes()
+        return self._prefix + self._header.pack(run, step, step_s) + packed
+
+    def unpack(self, packed: bytes) -> tuple[float, ...]:
+        """Return the values and derivatives that `encode` packs behind the header."""
+        return self._outputs.unpack(packed)
 
     def hello(self, birth: float) -> bytes:
         """Return the serialised hello of a node born at `birth` [us of wall time]."""
-        return self.encode(NO_RUN, int(birth), 0.0, np.zeros((len(self.signals), 2)))
+        return self.encode(NO_RUN, int(birth), 0.0, bytes(self._outputs.size))
 
     def decode(self, message: bytes) -> tuple[float, ...] | None:
         """Return the numbers of a message of exactly this layout, None for any other message."""

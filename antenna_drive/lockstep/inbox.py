@@ -21,7 +21,7 @@ run and step decide. Nothing here needs ROS, and nothing here reads a clock.
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from enum import Enum
 import math
 
@@ -62,22 +62,30 @@ class Inbox:
 
     """
 
-    def __init__(self, lengths: Mapping[str, int]) -> None:
-        """Take frames from the peers named in `lengths`, each with its number of doubles."""
+    def __init__(self, lengths: Mapping[str, int], in_bulk: Collection[str] = ()) -> None:
+        """
+        Take frames from the peers named in `lengths`, each with its number of doubles.
+
+        Those `in_bulk` are not waited for at every step, and have no frame of one.
+        """
         self.run = NO_RUN
         self.step = 0
         self.refused: Counter[tuple[str, Refusal]] = Counter()
         self.hellos: list[tuple[str, float]] = []
         self.slots: dict[str, list[Frame | None]] = {peer: [None] * DEPTH for peer in lengths}
         self._lengths = dict(lengths)
+        self._stepping = {peer: slots for peer, slots in self.slots.items()
+                          if peer not in in_bulk}
+        self._awaited: tuple[float, float] | None = None
         self._early: deque[tuple[str, Frame, int]] = deque()
         self._past_runs: deque[float] = deque(maxlen=8)
 
-    def begin(self, run: float) -> None:
+    def begin(self, run: float, step: int = 0) -> None:
         """Turn to a new run: forget the old one's frames and take in those that came early."""
         self.forget(self.run)
         self.run = run
-        self.step = 0
+        self.step = step
+        self._awaited = (run, float(step))
         for slots in self.slots.values():
             slots[:] = [None] * DEPTH
         early, self._early = self._early, deque()
@@ -108,6 +116,22 @@ class Inbox:
             return True
         return False
 
+    def accept(self, peer: str, frame: Frame) -> bool:
+        """
+        Take in a frame if it is the one that is wanted next, whole and finite.
+
+        Nearly every frame is, and for those this does all that `well_formed` and `offer` do at
+        a fraction of their cost. Any other is left to them.
+        """
+        if (frame[:2] == self._awaited and len(frame) == self._lengths[peer]
+                and math.isfinite(sum(frame)) and peer in self._stepping):
+            slots = self._stepping[peer]
+            slot = self.step % DEPTH
+            if slots[slot] is None:
+                slots[slot] = frame
+                return True
+        return False
+
     def offer(self, peer: str, frame: Frame) -> None:
         """Take in a well-formed frame, or refuse it and count why."""
         run = frame[0]
@@ -125,9 +149,10 @@ class Inbox:
     def advance(self) -> None:
         """Drop the frames of the current step and want the next."""
         slot = self.step % DEPTH
-        for slots in self.slots.values():
+        for slots in self._stepping.values():
             slots[slot] = None
         self.step += 1
+        self._awaited = (self.run, float(self.step))
         # Nobody can announce a run and let this one go on: what came early and is still
         # waiting so many steps later belongs to no run.
         while self._early and self.step - self._early[0][2] > DEPTH:
@@ -136,6 +161,15 @@ class Inbox:
     def holds(self, peer: str) -> bool:
         """Return whether the peer's frame of the current step is there."""
         return self.slots[peer][self.step % DEPTH] is not None
+
+    def missing(self) -> tuple[str, ...]:
+        """Return the peers whose frame of the current step is not there."""
+        slot = self.step % DEPTH
+        return tuple([peer for peer, slots in self._stepping.items() if slots[slot] is None])
+
+    def put_first(self, peer: str) -> None:
+        """Name a peer first among the missing from now on."""
+        self._stepping = {peer: self.slots[peer], **self._stepping}
 
     def has_room(self, peer: str) -> bool:
         """Return whether the next frame of a peer in good order would find a place."""

@@ -20,6 +20,7 @@ out of `go_on`. Who carries the frames, and how fast, is somebody else's affair.
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Collection, Mapping, Sequence
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
@@ -50,7 +51,8 @@ class Member:
 
     def __init__(self, unit: Unit, birth: float,
                  outputs: Mapping[str, Sequence[Signal]] = OUTPUTS,
-                 conductor: str = TEST_SIGNAL, others: Collection[str] = ()) -> None:
+                 conductor: str = TEST_SIGNAL, others: Collection[str] = (),
+                 in_bulk: Collection[str] = ()) -> None:
         """
         Prepare a unit for its first run.
 
@@ -65,7 +67,9 @@ class Member:
         conductor
             name of the unit that owns the run
         others
-            peers to wait for at every step although the unit reads nothing from them
+            peers to wait for although the unit reads nothing from them
+        in_bulk
+            those of them that do not make every step
 
         Raises
         ------
@@ -84,13 +88,19 @@ class Member:
         peers.pop(unit.name, None)
         self.peers = tuple(peers)
         self.layouts = {peer: FrameLayout(outputs.get(peer, ())) for peer in peers}
-        self.inbox = Inbox({peer: layout.length for peer, layout in self.layouts.items()})
+        self.inbox = Inbox({peer: layout.length for peer, layout in self.layouts.items()},
+                           in_bulk)
         self.step = 0
         self.step_s = 0.0
         self.resting = False
         self.fault = ''
         self._announced: Frame | None = None
-        self._inputs = np.zeros((len(columns), 2))
+        # one memory: a numpy array is slow to write single numbers to
+        self._numbers = array('d', bytes(2 * 8 * len(columns)))
+        self._inputs = np.asarray(self._numbers).reshape(-1, 2)
+        self._packed = b''
+        self._shape = (len(unit.outputs), 2)
+        self._reads_itself = any(peer == unit.name for peer, _ in columns)
         self._own_slots: list[Frame | None] = [None] * DEPTH
         self._sources = [(self._own_slots if peer == unit.name else self.inbox.slots[peer], column)
                          for peer, column in columns]
@@ -102,7 +112,7 @@ class Member:
 
     def receive(self, peer: str, frame: Frame) -> None:
         """Take in a frame or refuse it."""
-        if not self.inbox.well_formed(peer, frame):
+        if self.inbox.accept(peer, frame) or not self.inbox.well_formed(peer, frame):
             return
         if peer == self.conductor:
             self._receive_from_conductor(frame)
@@ -140,8 +150,7 @@ class Member:
         """Return the peers without whom the next step cannot be made."""
         if self.run == NO_RUN or self.fault:
             return (self.conductor,)
-        holds = self.inbox.holds
-        return tuple(peer for peer in self.peers if not holds(peer))
+        return self.inbox.missing()
 
     def go_on(self) -> FloatArray | None:
         """
@@ -160,28 +169,31 @@ class Member:
             return outputs
         if self.run == NO_RUN or self.fault:
             return None
-        slot = self.step % DEPTH
-        for slots in self.inbox.slots.values():
-            if slots[slot] is None:
-                return None
-        return self._advance(slot)
+        return None if self.inbox.missing() else self._advance()
 
-    def _begin(self, run: float, step_s: float) -> FloatArray | None:
-        self.inbox.begin(run)
-        self.step = 0
+    def message(self) -> bytes:
+        """Return the serialised message of the step last put out."""
+        return self.layout.encode(self.run, self.step, self.step_s, self._packed)
+
+    def _begin(self, run: float, step_s: float, step: int = 0) -> FloatArray | None:
+        self.inbox.begin(run, step)
+        self.step = step
         self.step_s = step_s
         self.resting = False
         self.fault = ''
         return self._checked(self.unit.start(step_s))
 
-    def _advance(self, slot: int) -> FloatArray | None:
-        inputs = self._inputs
-        for row, (slots, column) in enumerate(self._sources):
+    def _advance(self) -> FloatArray | None:
+        slot = self.step % DEPTH
+        numbers = self._numbers
+        place = 0
+        for slots, column in self._sources:
             frame = slots[slot]
             assert frame is not None
-            inputs[row, 0] = frame[column]
-            inputs[row, 1] = frame[column + 1]
-        outputs = self.unit.step(self.step, inputs)
+            numbers[place] = frame[column]
+            numbers[place + 1] = frame[column + 1]
+            place += 2
+        outputs = self.unit.step(self.step, self._inputs)
         self.inbox.advance()
         self.step += 1
         return self._checked(outputs)
@@ -189,14 +201,16 @@ class Member:
     def _checked(self, outputs: FloatArray) -> FloatArray | None:
         # A unit's own bad output is refused where it arises: nobody else ever sees it.
         outputs = np.asarray(outputs, dtype=np.float64)
-        shape = (len(self.unit.outputs), 2)
-        if outputs.shape != shape:
-            self.fault = f'outputs of shape {outputs.shape}, wanted {shape}'
+        if outputs.shape != self._shape:
+            self.fault = f'outputs of shape {outputs.shape}, wanted {self._shape}'
         else:
-            values = outputs.ravel().tolist()
+            packed = outputs.tobytes()
+            values = self.layout.unpack(packed)
             if all_finite(values):
-                self._own_slots[self.step % DEPTH] = (
-                    self.run, float(self.step), self.step_s, *values)
+                self._packed = packed
+                if self._reads_itself:
+                    self._own_slots[self.step % DEPTH] = (
+                        self.run, float(self.step), self.step_s, *values)
                 return outputs
             signal = self.unit.outputs[
                 int(np.argmin(np.isfinite(outputs).all(axis=1)))].name
@@ -250,8 +264,8 @@ class Guest(Member):
         """Join the run in progress or make the next step; see Member."""
         if self.run != NO_RUN or self.missing():
             return super().go_on()
-        outputs = self._begin(self._joining, self._first[self.conductor][2])
-        self.step = self.inbox.step = int(self._earliest())
+        outputs = self._begin(self._joining, self._first[self.conductor][2],
+                              int(self._earliest()))
         for peer, frame in self._first.items():
             self.inbox.offer(peer, frame)
         return outputs
@@ -286,19 +300,17 @@ class Conductor(Member):
 
         """
         members = [name for name in outputs if name != unit.name]
-        super().__init__(unit, birth, outputs, unit.name, (*members, *observers))
+        super().__init__(unit, birth, outputs, unit.name, (*members, *observers), observers)
         self.wanted_step_s = step_s
         self.last_step = last_step
         self.ended = False
-        self._units = tuple(members)
-        self._unit_slots = [self.inbox.slots[name] for name in members]
         self._used = dict.fromkeys(observers, 0.0)
         self._heard: dict[str, float] = {}
         self._begin_again = True
 
     def receive(self, peer: str, frame: Frame) -> None:
         """Take in a frame or refuse it; note who is there."""
-        if not self.inbox.well_formed(peer, frame):
+        if self.inbox.accept(peer, frame) or not self.inbox.well_formed(peer, frame):
             return
         if self.run == NO_RUN:
             self._heard[peer] = max(self._heard.get(peer, 0.0), frame[0], self._birth_in(frame))
@@ -333,8 +345,7 @@ class Conductor(Member):
         """Return the members without whom the next step cannot be made."""
         if self.run == NO_RUN:
             return self.unheard()
-        holds = self.inbox.holds
-        missing = tuple(name for name in self._units if not holds(name))
+        missing = self.inbox.missing()
         if self._used:
             missing += self._behind()
         return missing
@@ -373,18 +384,14 @@ class Conductor(Member):
         """Make the next step if every member has made the last, and the run has not ended."""
         if self.run == NO_RUN or self.fault or self.ended or self._begin_again:
             return None
-        slot = self.step % DEPTH
-        for slots in self._unit_slots:
-            if slots[slot] is None:
-                return None
-        if self._used and self._behind():
+        if self.missing():
             return None
         if self.last_step is not None and self.step >= self.last_step:
-            self._wait_for_the_last(slot)
+            self._wait_for_the_last()
             return None
-        return self._advance(slot)
+        return self._advance()
 
-    def _wait_for_the_last(self, slot: int) -> None:
+    def _wait_for_the_last(self) -> None:
         # Whoever holds the last step makes one more: by this we know that all have used it.
         if self.step == self.last_step:
             self.inbox.advance()

@@ -175,10 +175,10 @@ class DriveNode:
             self._hello()
             while not self._stop:
                 outputs = self._go_on()
-                if outputs is None:
-                    self._wait()
-                else:
+                if outputs is not None:
                     self._publish(outputs)
+                if self._quiet or not self._gather():
+                    self._wait_for_anything()
         finally:
             executor.shutdown(timeout_sec=0.5)
             services.join(0.5)
@@ -218,7 +218,7 @@ class DriveNode:
     def _publish(self, outputs: FloatArray) -> None:
         member = self._member
         step = member.step
-        self._link.publish(member.layout.encode(member.run, step, member.step_s, outputs))
+        self._link.publish(member.message())
         if step == 0:
             self._begun()
         if self._every and step % self._every == 0:
@@ -238,36 +238,49 @@ class DriveNode:
         self._node.get_logger().info(
             f'run {member.run:.0f} begins, macro-step {member.step_s:g} s')
 
-    def _wait(self) -> None:
+    def _gather(self) -> bool:
+        """
+        Take a frame of each peer that the next step waits for.
+
+        Returns
+        -------
+        False if a wait for something else is called for: one of them takes its time, or the
+        next step waits for nobody but the clock
+
+        """
         member = self._member
         link = self._link
-        # Most frames have come by now: taking them costs less than waiting for them.
-        taken = False
-        for peer in member.missing():
+        missing = member.missing()
+        # One peer at a time: a wait costs something for each that it looks at, and to be woken
+        # by each in turn costs most.
+        for peer in missing:
             frame = link.take(peer)
-            if frame is not None:
-                member.receive(peer, frame)
-                taken = True
-        if taken:
-            self._quiet = False
-            return
+            if frame is None:
+                link.wait_for(peer, _BRIEF_WAIT_S)
+                frame = link.take(peer)
+                if frame is None:
+                    return False
+                if peer is not missing[0]:
+                    # While the slowest is waited for, the frames of the others come.
+                    member.inbox.put_first(peer)
+            member.receive(peer, frame)
+        return bool(missing) or self._pace is None
+
+    def _wait_for_anything(self) -> None:
+        member = self._member
+        missing = member.missing()
         now = time.monotonic()
         timeout = _LONGEST_WAIT_S
-        if self._pace is not None and member.run and not member.missing():
+        if self._pace is not None and member.run and not missing:
             timeout = min(timeout, self._pace.remaining(member.step + 1, member.step_s, now))
         else:
             self._report.waiting(now)
         if isinstance(member, Conductor) and member.ended and not self._said_end:
             self._said_end = True
             self._hello()
-        if self._quiet:
-            ready = link.wait(member.wanted(), timeout)
-        else:
-            # One peer at a time: a wait costs something for each that it looks at, and to be
-            # woken by each in turn costs most. What else has come is taken without a wait.
-            ready = link.wait(member.missing()[-1:], min(timeout, _BRIEF_WAIT_S))
+        ready = self._link.wait(member.wanted(), timeout)
         for peer in ready:
-            frame = link.take(peer)
+            frame = self._link.take(peer)
             if frame is not None:
                 member.receive(peer, frame)
         self._quiet = not ready

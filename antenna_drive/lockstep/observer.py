@@ -195,8 +195,7 @@ class Observer:
         member = self._member
         if member.run and member.step != self._told and not isinstance(member, Guest):
             self._told = member.step
-            self._link.publish(member.layout.encode(
-                member.run, member.step, member.step_s, np.zeros((0, 2))))
+            self._link.publish(member.message())
 
     def close(self) -> None:
         """Leave the drive."""

@@ -69,6 +69,8 @@ class FrameLink:
                 callback_group=self._group, raw=True)
             for peer in self._layouts}
         self._handles = {peer: item.handle for peer, item in self._subscriptions.items()}
+        self._ways = {peer: (handle.take_message, self._layouts[peer].decode)
+                      for peer, handle in self._handles.items()}
         self._guard = node.create_guard_condition(_nothing, callback_group=self._group)
         self._guard_handle = self._guard.handle
         context = node.context.handle
@@ -85,12 +87,20 @@ class FrameLink:
         its numbers, none at all if the message cannot be read; None if there is no message
 
         """
-        taken = self._handles[peer].take_message(Float64MultiArray, True)
+        take_message, decode = self._ways[peer]
+        taken = take_message(Float64MultiArray, True)
         if taken is None:
             return None
         message: bytes = taken[0]  # type: ignore[assignment]
-        frame = self._layouts[peer].decode(message)
+        frame = decode(message)
         return _read(message) if frame is None else frame
+
+    def wait_for(self, peer: str, timeout_s: float) -> None:
+        """Sleep until a frame of this peer is there or time is up."""
+        wait_set = self._wait_set
+        wait_set.clear_entities()
+        wait_set.add_subscription(self._handles[peer])
+        wait_set.wait(int(timeout_s * 1e9))
 
     def wait(self, peers: Sequence[str], timeout_s: float) -> list[str]:
         """Sleep until a frame comes, `wake` is called or time is up; return whose have come."""

@@ -36,7 +36,6 @@ from antenna_drive.recording.following import Follower, Step
 from antenna_drive.recording.recorder import RunRecorder
 from antenna_drive.recording.recording import RecordingError
 from antenna_drive.recording.sheet import load_sheet
-import numpy as np
 import rclpy
 from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -168,7 +167,7 @@ class _RecorderNode:
         self._publish(step, step.number + 1)
 
     def _publish(self, step: Step, number: int) -> None:
-        self._link.publish(self._own.encode(step.run, number, step.step_s, np.zeros((0, 2))))
+        self._link.publish(self._own.encode(step.run, number, step.step_s))
 
     def _guarded(self, write: Any, *arguments: Any) -> bool:
         if self._failed:

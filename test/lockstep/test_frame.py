@@ -36,7 +36,7 @@ def test_what_is_encoded_is_decoded_to_the_same_bits(
     count = len(layout.signals)
     numbers = data.draw(st.lists(finite, min_size=2 * count, max_size=2 * count))
     outputs = np.array(numbers, dtype=float).reshape(count, 2)
-    frame = layout.decode(layout.encode(float(run), step, 1e-3, outputs))
+    frame = layout.decode(layout.encode(float(run), step, 1e-3, outputs.tobytes()))
     assert frame is not None
     assert frame[:3] == (run, step, 1e-3)
     assert np.array(frame[3:]).tobytes() == outputs.tobytes()
@@ -58,7 +58,7 @@ def test_rclpy_reads_our_bytes(layout: FrameLayout, run: int) -> None:
     messages = pytest.importorskip('std_msgs.msg', reason='std_msgs is not installed')
     outputs = np.arange(2.0 * len(layout.signals)).reshape(-1, 2)
     message = serialization.deserialize_message(
-        layout.encode(float(run), 7, 1e-3, outputs), messages.Float64MultiArray)
+        layout.encode(float(run), 7, 1e-3, outputs.tobytes()), messages.Float64MultiArray)
     assert list(message.data) == [run, 7.0, 1e-3, *outputs.ravel()]
     [dimension] = message.layout.dim
     assert dimension.size == dimension.stride == layout.length
