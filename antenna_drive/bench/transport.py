@@ -108,8 +108,8 @@ def own(steps: int, step_s: float = STEP_S, pace: float = 0.0, publish_rate: flo
 
 def bare(steps: int, step_s: float = STEP_S, pace: float = 0.0) -> Exchange:
     """Run the bare exchange for so many steps."""
-    return _run('antenna_drive.bench.bare_node', steps, step_s, pace, {},
-                (repr(step_s), repr(pace)))
+    return _run('antenna_drive.bench.bare_node', steps, step_s, pace,
+                {TEST_SIGNAL: {'run.pace': pace}}, (repr(step_s), repr(pace)))
 
 
 def _run(module: str, steps: int, step_s: float, pace: float,

@@ -29,6 +29,7 @@ from typing import IO
 from antenna_drive.emulator.wiring import MOTORS, PLANT, TEST_SIGNAL, TORQUE_SHARE, UNITS
 from antenna_drive.errors import UserError
 from antenna_drive.lockstep.entry import choose_transport, PARENT
+from antenna_drive.lockstep.placement import hasten
 
 MODULES = {
     TEST_SIGNAL: 'antenna_drive.nodes.test_signal',
@@ -46,6 +47,9 @@ Parameter = float | int | bool | str | Sequence[float] | Sequence[str]
 class DriveProcesses:
     """
     The five processes of a drive, as a context manager that leaves none behind.
+
+    Those of a drive that is to run as fast as possible (run.pace 0) are placed for speed, see
+    `placement`.
 
     Should this process die without a word, the kernel ends the nodes (on Linux).
     """
@@ -108,6 +112,8 @@ class DriveProcesses:
             self._processes[unit] = subprocess.Popen(
                 self.command(unit), env=self._environment, stdin=subprocess.DEVNULL,
                 stdout=log, stderr=log, start_new_session=True)
+        if self._parameters.get(TEST_SIGNAL, {}).get('run.pace') == 0.0:
+            hasten({unit: self._processes[unit].pid for unit in units or self.order})
 
     def process(self, unit: str) -> subprocess.Popen[bytes]:
         """Return the process of a unit."""

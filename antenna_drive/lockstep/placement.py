@@ -1,0 +1,59 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Where a drive's processes run, and who may interrupt whom, when they run as fast as they can.
+
+A node that publishes a frame wakes its readers. Left to itself the kernel lets each of them
+interrupt the publisher, or moves it to another core, several times in every step; that costs
+more than the step. Both are matters of speed alone: no bit of a run depends on them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import os
+
+from antenna_drive.emulator.wiring import TEST_SIGNAL, UNITS
+
+# Dealt to the cores in turn: with two, each has one of the motors.
+_PLACES = tuple(unit for unit in UNITS if unit != TEST_SIGNAL)
+
+# With more cores than this every process finds one for itself.
+_FEW_CORES = 4
+
+
+def hasten(pids: Mapping[str, int]) -> None:
+    """
+    Let processes finish what they do before others go on, each on one of a few cores.
+
+    A real-time run is better off without: on a busy machine such a process waits for its turn.
+    Where the system does not offer this (it is Linux's), or does not allow it, nothing changes.
+
+    Parameters
+    ----------
+    pids
+        processes that have just been started, by unit; test_signal, who waits for all the
+        others, may run on any core
+
+    """
+    if not hasattr(os, 'SCHED_BATCH'):
+        return
+    cores = sorted(os.sched_getaffinity(0))
+    for unit, pid in pids.items():
+        try:
+            os.sched_setscheduler(pid, os.SCHED_BATCH, os.sched_param(0))
+            if unit in _PLACES and 1 < len(cores) <= _FEW_CORES:
+                os.sched_setaffinity(pid, {cores[_PLACES.index(unit) % len(cores)]})
+        except OSError:  # it has ended already, or may not be touched
+            continue
