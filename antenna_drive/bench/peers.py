@@ -30,6 +30,7 @@ from typing import Any
 from antenna_drive.article.experiments import Experiment
 from antenna_drive.bench import equations
 from antenna_drive.bench.equations import BODIES, FloatArray, IntArray, STATES
+from antenna_drive.parameters.records import record_of
 import numpy as np
 
 # 200 Hz, as drives are recorded: what every run puts out, its own steps may be shorter or longer.
@@ -73,6 +74,7 @@ class Problem:
         self.experiment = experiment
         self.drive = drive = experiment.drive()
         self.p = equations.constants(drive)
+        self.record = record_of(drive)
         self.start = equations.initial_state(drive)
         self.pieces = equations.pieces(experiment)
         self.grid: FloatArray = GRID_S * np.arange(
