@@ -16,13 +16,17 @@ Where a drive's processes run, and who may interrupt whom, when they run as fast
 
 A node that publishes a frame wakes its readers. Left to itself the kernel lets each of them
 interrupt the publisher, or moves it to another core, several times in every step; that costs
-more than the step. Both are matters of speed alone: no bit of a run depends on them.
+more than the step. Both are matters of speed alone: no bit of a run depends on them. On a
+machine that does other work it is the other way round: who interrupts nobody waits for that
+work several times in every step.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 import os
+from pathlib import Path
+import time
 
 from antenna_drive.emulator.wiring import TEST_SIGNAL, UNITS
 
@@ -33,11 +37,47 @@ _PLACES = tuple(unit for unit in UNITS if unit != TEST_SIGNAL)
 _FEW_CORES = 4
 
 
+# The machine is ours if so much of its time is idle, over so long a look at it [s].
+_IDLE = 0.75
+_LOOK_S = 0.1
+
+_IDLE_COLUMN, _COLUMNS = 3, 8  # proc_stat(5): user nice system idle iowait irq softirq steal
+
+
+def machine_is_idle() -> bool:
+    """Look whether the machine has nothing to do; False where the system does not tell."""
+    try:
+        before = _times()
+        time.sleep(_LOOK_S)
+        return idle_share(before, _times()) >= _IDLE
+    except (OSError, ValueError):
+        return False
+
+
+def _times() -> str:
+    return Path('/proc/stat').read_text().partition('\n')[0]
+
+
+def idle_share(before: str, after: str) -> float:
+    """
+    Return the share of its time that the machine was idle, from two first lines of /proc/stat.
+
+    Raises
+    ------
+    ValueError : the lines are no such lines, or no time has passed between them
+
+    """
+    first, last = (list(map(int, line.split()[1:1 + _COLUMNS])) for line in (before, after))
+    passed = sum(last) - sum(first)
+    if len(first) != _COLUMNS or len(last) != _COLUMNS or passed <= 0:
+        raise ValueError(f'{after!r} after {before!r}')
+    return (last[_IDLE_COLUMN] - first[_IDLE_COLUMN]) / passed
+
+
 def hasten(pids: Mapping[str, int]) -> None:
     """
     Let processes finish what they do before others go on, each on one of a few cores.
 
-    A real-time run is better off without: on a busy machine such a process waits for its turn.
     Where the system does not offer this (it is Linux's), or does not allow it, nothing changes.
 
     Parameters
