@@ -168,8 +168,9 @@ class Inbox:
         return tuple([peer for peer, slots in self._stepping.items() if slots[slot] is None])
 
     def put_first(self, peer: str) -> None:
-        """Name a peer first among the missing from now on."""
-        self._stepping = {peer: self.slots[peer], **self._stepping}
+        """Name a peer first among the missing from now on, if it is waited for at every step."""
+        if peer in self._stepping:
+            self._stepping = {peer: self._stepping[peer], **self._stepping}
 
     def has_room(self, peer: str) -> bool:
         """Return whether the next frame of a peer in good order would find a place."""
