@@ -20,6 +20,7 @@ as events: nothing of it is the model's.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 import json
 import math
 from pathlib import Path
@@ -146,12 +147,25 @@ def test_an_effect_is_that_of_the_other_integrator(name: str, effect: dict[str, 
     assert servo_refit.error(tests, TRUTH) > 5.0 * there
 
 
+def stall_torque(of: Mapping[str, float]) -> float:
+    """Return the torque for a volt at rest [N m/V]."""
+    return of['torque_constant'] / of['resistance']
+
+
+def drag(of: Mapping[str, float]) -> float:
+    """Return the torque lost for each rad/s [N m s/rad]."""
+    return of['torque_constant'] ** 2 / of['resistance'] + of['viscous_friction']
+
+
 @pytest.mark.slow
 def test_a_refit_finds_the_numbers_of_the_servo(plain_tests: list[ServoTest]) -> None:
     fit = servo_refit.refit(plain_tests, BASE, (), 2500)
     assert fit.error < 0.7e-3
-    # of a motor, stall and rate tell k_t / R and k_t^2 / R
-    for name in BASE:
+    # motion tells the torque at stall and the drag, which back-EMF and friction share: of k_t, R
+    # and the viscous friction only these two are to be found
+    for told in (stall_torque, drag):
+        assert told(fit.values) == pytest.approx(told(TRUTH), rel=0.1)
+    for name in ('coulomb_torque', 'armature_inertia'):
         assert fit.values[name] == pytest.approx(TRUTH[name], rel=0.1), name
 
 
