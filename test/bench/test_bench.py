@@ -46,7 +46,7 @@ def test_ratio_pairs_values_of_one_turn() -> None:
     assert found['values'] == [2.0, 3.0, 1.0]
 
 
-@pytest.mark.slow
+@pytest.mark.trial
 def test_simulation_is_complete(monkeypatch: pytest.MonkeyPatch, tmp_path: Path,
                                 capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(simulation, 'EXPERIMENTS', ('T4a',))
