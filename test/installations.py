@@ -85,8 +85,9 @@ def install_with_pip(folder: Path) -> Installation:
     copy_source(folder / 'source')
     prefix = folder / 'prefix'
     environment = outside_environment()
-    build([sys.executable, '-m', 'pip', 'install', '--quiet', '--no-deps', '--prefix', prefix,
-           './source'], folder, environment)
+    # without --ignore-installed pip would remove the tree's own installation
+    build([sys.executable, '-m', 'pip', 'install', '--quiet', '--no-deps', '--ignore-installed',
+           '--prefix', prefix, './source'], folder, environment)
     packages = sysconfig.get_path('purelib', 'posix_prefix', {'base': str(prefix)})
     for variable, entry in (('PYTHONPATH', packages), ('AMENT_PREFIX_PATH', str(prefix))):
         environment[variable] = os.pathsep.join(
