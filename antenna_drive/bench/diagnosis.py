@@ -25,7 +25,6 @@ import time
 from typing import Any
 
 from antenna_drive.bench import measuring
-from antenna_drive.cli import available
 from antenna_drive.errors import UserError
 
 _SEED = 20261
@@ -41,11 +40,9 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
 
     Raises
     ------
-    UserError : the command is not there, or it fails
+    UserError : the command fails
 
     """
-    if 'diagnose' not in available():
-        raise UserError('there is no antenna-drive diagnose in this version')
     took = []
     with tempfile.TemporaryDirectory() as folder:
         progress('recordings')

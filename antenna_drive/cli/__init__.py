@@ -32,6 +32,7 @@ from typing import NamedTuple
 
 from antenna_drive import __version__
 from antenna_drive.errors import UserError
+from antenna_drive.remedies import remedy
 
 OK, NEGATIVE, BAD_INPUT, NOT_INSTALLED = 0, 1, 2, 3
 INTERRUPTED, BROKEN_PIPE = 130, 141  # 128 + the signal's number, as shells do
@@ -77,20 +78,6 @@ COMMANDS = {
     'bench': Command('bench', 'measure speed'),
 }
 
-ROS_REMEDY = ("source a ROS 2 installation, or on x86-64 Linux: pip install 'ros-rclpy[fastrtps]' "
-              'ros-std-msgs ros-rosgraph-msgs ros-diagnostic-msgs')
-# Modules that a plain installation may lack, and how to get them.
-REMEDIES = {
-    'rclpy': ROS_REMEDY,
-    'rcl_interfaces': ROS_REMEDY,
-    'std_msgs': ROS_REMEDY,
-    'rosgraph_msgs': ROS_REMEDY,
-    'diagnostic_msgs': ROS_REMEDY,
-    'matplotlib': 'pip install matplotlib',
-    'mcap': 'pip install mcap',
-    'cma': 'pip install cma',
-}
-
 
 def main(argv: Sequence[str] | None = None) -> int:
     """
@@ -123,10 +110,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     except UserError as error:
         return _say(name, str(error), BAD_INPUT)
     except ModuleNotFoundError as error:
-        missing = (error.name or '').partition('.')[0]
-        if missing not in REMEDIES:
+        needed = remedy(error)
+        if needed is None:
             raise
-        return _say(name, f'needs {missing}: {REMEDIES[missing]}', NOT_INSTALLED)
+        return _say(name, needed, NOT_INSTALLED)
     except OSError as error:
         if error.strerror is None:
             raise

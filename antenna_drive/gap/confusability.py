@@ -28,7 +28,7 @@ from typing import Any
 from antenna_drive.gap.drive_model import DriveModel
 from antenna_drive.gap.excitation import SheetCommand
 from antenna_drive.gap.field_test import CHANNELS
-from antenna_drive.gap.fit import Problem
+from antenna_drive.gap.fit import Problem, pull_of
 from antenna_drive.gap.model import FloatArray
 from antenna_drive.gap.search import starts
 from antenna_drive.parameters.sets import Drive
@@ -137,7 +137,7 @@ def confusability(tests: Mapping[str, Recording], drive: Drive,
         for e, p in zip(model.experiments, predicted, strict=True))
     problem = Problem(model)
     state = problem.start(model.nuisances, {})
-    pull = np.array([1.0 / p.spread ** 2 if p.spread else 0.0 for p in state.parameters])
+    pull = pull_of(state.parameters)
     factor = linalg.cho_factor(state.hessian + np.diag(pull))
     ids, units, sizes, traces = [], [], [], []
     count = len(model.effects)

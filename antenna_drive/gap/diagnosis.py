@@ -35,7 +35,7 @@ from typing import Any
 
 from antenna_drive.gap import residuals, verdict
 from antenna_drive.gap.drive_model import DriveModel
-from antenna_drive.gap.fit import Problem, State
+from antenna_drive.gap.fit import Problem, pull_of, State
 from antenna_drive.gap.model import FloatArray, Model, Motion
 from antenna_drive.gap.search import Candidate, parameters_of, Search
 from antenna_drive.parameters.sets import Drive
@@ -181,7 +181,7 @@ def _diagnosed(model: Model, progress: Progress, threads: int,
     # what is left is judged after a fit that has converged; the ranking compares like with like
     best = search.polished(verdict.best(candidates))
     excess = _excess(problem, best.state)
-    left = _left(problem, none, best)
+    left = _left(problem, best)
     progress(0.9, 'how far it goes')
     how_far = _how_far(problem, none, best)
     unknown = verdict.unknown_probability(excess, left,
@@ -249,7 +249,7 @@ def _excess(problem: Problem, state: State) -> float:
     return float(np.mean(np.maximum(found, -0.5))) if found else 0.0
 
 
-def _left(problem: Problem, none: Candidate, best: Candidate) -> float:
+def _left(problem: Problem, best: Candidate) -> float:
     """Return the share of the raw gap above the noise that the best candidate leaves."""
     raw = problem.residuals([{}])[0]
     noise = 0.0
@@ -264,7 +264,6 @@ def _left(problem: Problem, none: Candidate, best: Candidate) -> float:
             energy += [min(float(np.nanmean(z[:, c] ** 2)), 1e6) - white,
                        min(float(np.mean(first[:, c] ** 2)), 1e6) - white]
             noise += white
-    del none
     return float(np.clip(energy[0] / max(energy[1], 0.05 * noise), 0.0, 1.0))
 
 
@@ -287,7 +286,7 @@ def _tests(problem: Problem, state: State, excess: float, left: float,
 def _parameters(candidate: Candidate) -> dict[str, Any]:
     """Return the values of a candidate's effects with intervals of 95 percent."""
     state = candidate.state
-    pull = np.array([1.0 / p.spread ** 2 if p.spread else 0.0 for p in state.parameters])
+    pull = pull_of(state.parameters)
     curvature = state.hessian + np.diag(pull)
     scale = np.sqrt(np.maximum(np.diag(curvature), 1e-30))
     covariance = np.linalg.pinv(curvature / np.outer(scale, scale)) / np.outer(scale, scale)

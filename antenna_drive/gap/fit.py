@@ -57,7 +57,7 @@ class State:
     cost : sum of robust losses, half a chi-square if all are small, and the pull of the offsets
     errors, directions : outer products that the fit has corrected the derivative by, shapes (n,)
         and (m,) each
-    kept : the hessian of a state that has let its derivatives go, None of any other
+    kept : the hessian of a state that has let its derivatives go and may be asked for it
 
     """
 
@@ -81,10 +81,10 @@ class State:
         """Return derivative, weight, derivative, shape (m, m)."""
         return weighted_square(self.jacobian, self.weight) if self.kept is None else self.kept
 
-    def light(self) -> State:
+    def light(self, hessian: bool = False) -> State:
         """Return the state without its derivatives, which take most of the memory."""
         return State(self.parameters, self.x, self.residual, np.empty((0, 0), np.float32),
-                     self.weight, self.cost, kept=self.hessian)
+                     self.weight, self.cost, kept=self.hessian if hessian else None)
 
     def point(self) -> dict[str, float]:
         """Return the values by name."""
@@ -247,7 +247,7 @@ class Problem:
         """
         low = np.array([p.low for p in state.parameters])
         high = np.array([p.high for p in state.parameters])
-        pull = _pull(state.parameters)
+        pull = pull_of(state.parameters)
         weight, hessian = state.weight, state.hessian.copy()
         shaped = weight
         x, residual, cost = state.x, state.residual, state.cost
@@ -387,7 +387,8 @@ def _with(jacobian: NDArray[np.float32], errors: Sequence[FloatArray],
                       @ np.array(directions, np.float32))
 
 
-def _pull(parameters: Sequence[Parameter]) -> FloatArray:
+def pull_of(parameters: Sequence[Parameter]) -> FloatArray:
+    """Return how strongly each parameter is pulled to nought, 1 / spread^2, shape (m,)."""
     return np.array([1.0 / p.spread ** 2 if p.spread > 0.0 else 0.0 for p in parameters])
 
 
@@ -398,7 +399,7 @@ def _cost(residual: FloatArray, x: FloatArray, pull: FloatArray) -> float:
 def _state(parameters: tuple[Parameter, ...], x: FloatArray, residual: FloatArray,
            jacobian: NDArray[np.float32], weight: FloatArray) -> State:
     return State(parameters, x, residual, jacobian, weight,
-                 _cost(residual, x, _pull(parameters)))
+                 _cost(residual, x, pull_of(parameters)))
 
 
 def bounded_step(curvature: FloatArray, gradient: FloatArray, low: FloatArray,

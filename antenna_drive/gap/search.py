@@ -34,7 +34,7 @@ from functools import partial
 from typing import Any
 
 from antenna_drive.gap.fit import (
-    across, bounded_step, Problem, robust_loss, scanned, State, weighted_square,
+    across, bounded_step, Problem, pull_of, robust_loss, scanned, State, weighted_square,
 )
 from antenna_drive.gap.model import FloatArray, Form, Model, Parameter
 from antenna_drive.gap.price import price
@@ -95,11 +95,6 @@ class Candidate:
     state: State
 
     @property
-    def parameters(self) -> int:
-        """Return how many numbers the effects bring."""
-        return sum(len(form.parameters) for form in self.forms)
-
-    @property
     def cost(self) -> float:
         """Return half a chi-square, robust, with the pull of the offsets."""
         return self.state.cost
@@ -156,7 +151,6 @@ class Search:
         self.model: Model = self.problem.model
         self.progress = progress
         self.tangents: list[_Tangent] = []
-        self.screened: list[tuple[str, float]] = []
 
     def run(self) -> list[Candidate]:
         """Return every candidate that was fitted in earnest, the offsets alone first."""
@@ -263,7 +257,7 @@ class Search:
         names = [p.name for p in state.parameters]
         low = np.array([p.low for p in state.parameters]) - state.x
         high = np.array([p.high for p in state.parameters]) - state.x
-        pull = np.array([1.0 / p.spread ** 2 if p.spread else 0.0 for p in state.parameters])
+        pull = pull_of(state.parameters)
         curvature = state.hessian + np.diag(pull)
         gradient = across(state.jacobian, state.weight * state.residual) - pull * state.x
         found: dict[str, list[tuple[float, _Tangent]]] = {}
@@ -313,7 +307,6 @@ class Search:
 
     def _singles(self, none: Candidate) -> list[Candidate]:
         screened = self._screen(none.state)
-        self.screened = [(tangent.effect, gain) for gain, tangent in screened]
         found = self._sorted(lambda item: self._fitted(none, item[1], False, 5),
                              screened[:SINGLES])
         if self.problem.scale > 1.0:
@@ -443,10 +436,12 @@ class Search:
         for number in range(PASSES):
             self.progress(0.7 + 0.3 * number / PASSES, 'the likeliest in full')
             taken = self._derivatives(whole, anchor.state.point(), chosen)
-            chosen = self._sorted(lambda c: _light(self._refitted(whole, c, taken, 6)), chosen)
+            # the first pass is never the last: no one asks what it gives for its hessian
+            refitted = partial(self._refitted_lightly, taken, hessian=number > 0)
+            chosen = self._sorted(refitted, chosen)
             singles = [c for c in chosen if len(c.effects) == 1]
             bare = [none] if number else [none, self._dropped(singles[0], singles[0].effects[0])]
-            none = self._sorted(lambda c: _light(self._refitted(whole, c, taken, 6)), bare)[0]
+            none = self._sorted(refitted, bare)[0]
             # what is far behind stays there
             anchor = chosen[0] if chosen[0].priced < none.cost else none
             chosen = [singles[0], *(c for c in chosen if c is not singles[0]
@@ -485,6 +480,11 @@ class Search:
             tuple(e for i, e in enumerate(candidate.effects) if i != gone),
             tuple(f for i, f in enumerate(candidate.forms) if i != gone), bare)
 
+    def _refitted_lightly(self, taken: _Derivatives, candidate: Candidate,
+                          hessian: bool) -> Candidate:
+        """Fit a candidate to the whole tests and let its derivatives go."""
+        return _light(self._refitted(self.whole, candidate, taken, 6), hessian)
+
     def _refitted(self, problem: Problem, candidate: Candidate, taken: _Derivatives,
                   turns: int) -> Candidate:
         """Fit a candidate to another problem, with derivatives that were taken for several."""
@@ -499,8 +499,8 @@ class Search:
         return replace(candidate, state=problem.fit(state, turns))
 
 
-def _light(candidate: Candidate) -> Candidate:
-    return replace(candidate, state=candidate.state.light())
+def _light(candidate: Candidate, hessian: bool = False) -> Candidate:
+    return replace(candidate, state=candidate.state.light(hessian))
 
 
 def parameters_of(candidate: Candidate) -> list[tuple[Parameter, float]]:

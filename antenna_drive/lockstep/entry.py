@@ -28,6 +28,7 @@ from types import FrameType
 from typing import Any, TYPE_CHECKING
 
 from antenna_drive.errors import UserError
+from antenna_drive.remedies import remedy
 
 if TYPE_CHECKING:
     from antenna_drive.emulator.unit import Unit
@@ -131,11 +132,10 @@ def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None,
     except UserError as error:
         return _say(program, str(error), BAD_INPUT)
     except ModuleNotFoundError as error:
-        from antenna_drive.cli import REMEDIES
-        missing = (error.name or '').partition('.')[0]
-        if missing not in REMEDIES:
+        needed = remedy(error)
+        if needed is None:
             raise
-        return _say(program, f'needs {missing}: {REMEDIES[missing]}', NOT_INSTALLED)
+        return _say(program, needed, NOT_INSTALLED)
     # The node has left the graph. What the interpreter and the compiler would still tidy up
     # takes seconds on a busy machine, and a node must be gone within two.
     sys.stdout.flush()

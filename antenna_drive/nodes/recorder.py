@@ -33,6 +33,7 @@ from collections.abc import Sequence
 import sys
 
 from antenna_drive.errors import UserError
+from antenna_drive.remedies import remedy
 
 OK, FAILED, BAD_INPUT, NOT_INSTALLED = 0, 1, 2, 3
 
@@ -49,11 +50,10 @@ def main(args: Sequence[str] | None = None) -> int:
     except UserError as error:
         return _say(str(error), BAD_INPUT)
     except ModuleNotFoundError as error:
-        from antenna_drive.cli import REMEDIES
-        missing = (error.name or '').partition('.')[0]
-        if missing not in REMEDIES:
+        needed = remedy(error)
+        if needed is None:
             raise
-        return _say(f'needs {missing}: {REMEDIES[missing]}', NOT_INSTALLED)
+        return _say(needed, NOT_INSTALLED)
 
 
 def _say(message: str, status: int) -> int:

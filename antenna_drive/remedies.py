@@ -1,0 +1,35 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a plain installation may lack, and how to get it."""
+
+from __future__ import annotations
+
+ROS_REMEDY = ("source a ROS 2 installation, or on x86-64 Linux: pip install 'ros-rclpy[fastrtps]' "
+              'ros-std-msgs ros-rosgraph-msgs ros-diagnostic-msgs')
+REMEDIES = {
+    'rclpy': ROS_REMEDY,
+    'rcl_interfaces': ROS_REMEDY,
+    'std_msgs': ROS_REMEDY,
+    'rosgraph_msgs': ROS_REMEDY,
+    'diagnostic_msgs': ROS_REMEDY,
+    'matplotlib': 'pip install matplotlib',
+    'mcap': 'pip install mcap',
+    'cma': 'pip install cma',
+}
+
+
+def remedy(error: ModuleNotFoundError) -> str | None:
+    """Return in one line what is missing and how to get it, None if that is a fault of ours."""
+    missing = (error.name or '').partition('.')[0]
+    return f'needs {missing}: {REMEDIES[missing]}' if missing in REMEDIES else None
