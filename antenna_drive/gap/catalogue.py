@@ -353,8 +353,8 @@ def _sensor_effects(into: _Catalogue) -> None:
             _parameter('offset', 'A', -1.0, 1.0, 1e-3, ADD, f'{motor}.ammeter.offset',
                        reading=True))
     into.add('encoder', 'quantisation', 'bits of the encoder are lost', 'steps in the angle',
-             _form('encoder.quantisation', _parameter(
-                 'step', 'rad', 0.0, 1e-2, 1e-5, SET, 'plant.encoder.step', reading=True)))
+             _form(QUANTISATION, _parameter('step', 'rad', 0.0, 1e-2, 1e-5, SET, DIGIT,
+                                            reading=True)))
     into.add('encoder', 'cyclic_error', 'eccentric scale or uneven interpolation',
              'the angle varies with itself',
              _wave('encoder.cyclic_error', 'rad', 1e-3, 1e-6, ('plant.encoder',), 'axis',
@@ -369,10 +369,26 @@ def _sensor_effects(into: _Catalogue) -> None:
                  'torque_share.torque_share.voltmeter_gain', reading=True)))
 
 
+QUANTISATION = 'encoder.quantisation'
 DELAY = 'loop.delay.time'
 GUST = 'axis.wind_gust'
+# Digit of the encoder [rad], and the share of one by which its reading is off its middle.
+DIGIT, TURN = 'plant.encoder.step', 'plant.encoder.turn'
 # The gust's torque is free at times so far apart [s], and smooth between.
 GUST_KNOT_S = 0.5
+
+
+def quantisation_form(digit: float) -> Form:
+    """
+    Return the form of a quantisation whose digit the readings themselves tell.
+
+    Either there is such a digit or there is none: the derivative reaches from the one to the
+    other.
+    """
+    return _form(QUANTISATION, _parameter(
+        'step', 'rad', 0.0, digit, digit, SET, DIGIT, reading=True), DriveParameter(
+        'turn', '1', -0.5, 0.5, 0.02, how=SET, fields=(TURN,), reading=True, shape=True),
+        name='digits seen')
 
 
 def gust_knots(duration: float) -> int:

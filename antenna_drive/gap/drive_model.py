@@ -26,12 +26,13 @@ from threading import Lock
 from antenna_drive.emulator import batch
 from antenna_drive.gap import catalogue
 from antenna_drive.gap.catalogue import ADD, DriveParameter, SCALE, Wave
-from antenna_drive.gap.excitation import Bias, schedule
+from antenna_drive.gap.excitation import Bias, Longest, schedule
 from antenna_drive.gap.field_test import (
     BIAS, CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, prepared, TACH_1, TACH_2, UNITS,
 )
 from antenna_drive.gap.model import Effect, Experiment, FloatArray, Form, Motion, Point
 from antenna_drive.gap.offsets import CLOCK, offsets, SUPPLY, ZERO
+from antenna_drive.gap.sensors import digit_of
 from antenna_drive.gap.waves import likely_orders
 from antenna_drive.parameters.records import place_of
 from antenna_drive.parameters.sets import Drive
@@ -43,6 +44,11 @@ LONGEST_STEP = 2.5e-3
 # A search looks at so much of a test [s], with longer steps.
 BRIEF_S = 15.0
 BRIEF_LONGEST_STEP = 3.4e-3
+# A wave of the motors' angle turns by no more than this in a step [rad], however short [s].
+WAVE_STEP = 0.7
+SHORTEST_STEP = 5e-4
+# An encoder's digit is another than the sheet's if it is so many times as large.
+COARSER = 1.3
 # How many cycles per revolution are tried of each wave.
 _WAVES = 3
 # The mode that the record has room for and the configuration has not.
@@ -93,7 +99,7 @@ class DriveModel:
         self.runs = 0
         self._tests = [prepared(name, recording, drive, self.notes.append)
                        for name, recording in recordings.items()]
-        self._plans: list[batch.Schedule | None] = [None] * len(self._tests)
+        self._plans: dict[tuple[int, float], batch.Schedule] = {}
         for test in self._tests:
             test.record['plant']['axis']['mode_frequencies'][0, _EXTRA] = 1.0
         given = [recording.sheet.parameter_tolerance for recording in recordings.values()
@@ -105,6 +111,11 @@ class DriveModel:
         gust = self.effects[catalogue.GUST]
         self.effects[gust.id] = replace(gust, forms=(catalogue.gust_form(
             [float(test.time[-1]) for test in self._tests]),))
+        self._digit = _coarser_digit(self._tests)
+        if self._digit:
+            coarse = self.effects[catalogue.QUANTISATION]
+            self.effects[coarse.id] = replace(
+                coarse, forms=(catalogue.quantisation_form(self._digit),))
         self.nuisances = offsets(self._tests, self.tolerance)
         self._by_name: dict[str, DriveParameter] = {}
         self._waves: dict[str, tuple[Wave, int]] = {}
@@ -115,7 +126,8 @@ class DriveModel:
         self.experiments = tuple(self._experiment(test) for test in self._tests)
 
     def _experiment(self, test: FieldTest) -> Experiment:
-        out = batch.run(test.record, schedule(test.command, test.bias, test.time, LONGEST_STEP))
+        out = batch.run(test.record, schedule(test.command, test.bias, test.time,
+                                              Longest(LONGEST_STEP)))
         noise = test.sensors.noise(out[:, :, 0], out[:, :, 1], test.jitter)
         return Experiment(test.name, test.time, tuple(CHANNELS.values()), UNITS, test.measured,
                           noise, coarse=('encoder',))
@@ -124,7 +136,7 @@ class DriveModel:
         """Return the model with as much of each test as a search needs; a chirp stays whole."""
         other = copy.copy(self)
         other._cache = OrderedDict()
-        other._plans = [None] * len(self._tests)
+        other._plans = {}
         other._longest_step = BRIEF_LONGEST_STEP
         other._tests = [test.until(BRIEF_S if test.repeats else math.inf)
                         for test in self._tests]
@@ -243,9 +255,12 @@ class DriveModel:
             else:
                 for path in item.fields:
                     _change(numbers, place_of(kind, path), item.how, value)
+        turns = 0.0
         for form, values in waves.items():
             for path, how, value in form.settings(*values):
                 _change(numbers, place_of(kind, path), how, value)
+            if form.angle != 'axis' and any(values):
+                turns = max(turns, form.order * float(record[form.angle]['gear_ratio'][0]))
         axis = record['plant']['axis']
         if axis['mode_inertias'][0, _EXTRA] > 0.0:
             axis['mode_inertias_count'] = _EXTRA + 1
@@ -254,7 +269,7 @@ class DriveModel:
             knots = catalogue.GUST_KNOT_S * np.arange(gust.size)
             fine = np.arange(0.0, knots[-1] + _GUST_S, _GUST_S)
             torque = (fine, CubicSpline(knots, gust)(fine))
-        plan = self._plan(job.experiment, bias, delay, torque)
+        plan = self._plan(job.experiment, bias, delay, torque, turns)
         samples = int(np.count_nonzero(test.time < job.until))
         if samples == test.time.size:
             return batch.run(record, plan)
@@ -265,14 +280,16 @@ class DriveModel:
         return out
 
     def _plan(self, k: int, bias: Bias, delay: float,
-              torque: tuple[FloatArray, FloatArray] | None) -> batch.Schedule:
+              torque: tuple[FloatArray, FloatArray] | None, turns: float) -> batch.Schedule:
+        """Return the steps of a run; a wave turns by `turns` per turn of the axis."""
         test = self._tests[k]
+        longest = Longest(self._longest_step, SHORTEST_STEP, WAVE_STEP, turns)
         if delay:
-            return schedule(test.command, bias, test.time, self._longest_step, delay, torque)
-        plan = self._plans[k]
+            return schedule(test.command, bias, test.time, longest, delay, torque)
+        plan = self._plans.get((k, turns))
         if plan is None:
-            plan = schedule(test.command, test.bias, test.time, self._longest_step)
-            self._plans[k] = plan
+            plan = schedule(test.command, test.bias, test.time, longest)
+            self._plans[k, turns] = plan
         if torque is None and bias == test.bias:
             return plan
         steps = plan.steps.copy()
@@ -291,7 +308,7 @@ class DriveModel:
         values = out[:, :, 0].copy()
         shift = np.zeros(len(CHANNELS))
         gain = np.ones(len(CHANNELS))
-        step = 0.0
+        step = turn = 0.0
         wave: list[float] = [0.0] * 5
         form: Wave | None = None
         for name, value in point.items():
@@ -305,8 +322,10 @@ class DriveModel:
             elif name in self._waves:
                 form, part = self._waves[name]
                 wave[part] = value
-            elif item.fields[0] == 'plant.encoder.step':
+            elif item.fields[0] == catalogue.DIGIT:
                 step = value
+            elif item.fields[0] == catalogue.TURN:
+                turn = value
             else:
                 effect, _, what = item.fields[0].rpartition('.')
                 (gain if 'gain' in what else shift)[_METERS[effect]] += value
@@ -317,9 +336,23 @@ class DriveModel:
                 wave[0] * np.sin(angle) + wave[1] * np.cos(angle)
                 + wave[3] * np.sin(2.0 * angle) + wave[4] * np.cos(2.0 * angle))
         values += shift
-        if step > 0.0:
+        if step > 0.0 and self._digit:
+            # whatever lies within the digit that was read would have been read
+            read = self.experiments[k].measured[:, ENCODER] + turn * step
+            off = np.nan_to_num(values[:, ENCODER] - read)
+            values[:, ENCODER] -= np.clip(off, -0.5 * step, 0.5 * step) + turn * step
+        elif step > 0.0:
             values[:, ENCODER] = step * np.floor(values[:, ENCODER] / step + 0.5)
         return values
+
+
+def _coarser_digit(tests: Sequence[FieldTest]) -> float:
+    """Return the encoder's digit if it is coarser than its sheet says, else 0 [rad]."""
+    digits = [digit_of(test.measured[:, ENCODER]) for test in tests]
+    known = max(test.sensors.encoder_step for test in tests)
+    seen = [digit for digit in digits if digit > 0.0]
+    digit = min(seen, default=0.0)
+    return digit if len(seen) == len(tests) and digit > COARSER * known else 0.0
 
 
 _CHANNEL = {name: c for c, name in enumerate(CHANNELS.values())}

@@ -21,6 +21,7 @@ of samples; between two that differ by more than their neighbours do, a jump is 
 from __future__ import annotations
 
 from dataclasses import dataclass
+import math
 from typing import Protocol
 
 from antenna_drive.emulator import batch
@@ -128,7 +129,32 @@ class Bias:
     at: float = 0.0
 
 
-def schedule(command: Command, bias: Bias, samples: FloatArray, longest: float,
+@dataclass(frozen=True)
+class Longest:
+    """
+    How long a step of the integration may be.
+
+    Attributes
+    ----------
+    usual : at most so long [s]
+    shortest : even where a wave asks for less [s]
+    wave : angle by which a wave may turn in a step [rad]
+    turns : of the fastest wave, per turn of the axis, 0 for none
+
+    """
+
+    usual: float
+    shortest: float = 0.0
+    wave: float = math.inf
+    turns: float = 0.0
+
+    def at(self, rate: FloatArray) -> FloatArray:
+        """Return the longest step where the axis turns at these rates [rad/s], as an array."""
+        asked = self.wave / np.maximum(self.turns * np.abs(rate), 1e-9)
+        return np.asarray(np.minimum(self.usual, np.maximum(self.shortest, asked)))
+
+
+def schedule(command: Command, bias: Bias, samples: FloatArray, longest: Longest,
              delay: float = 0.0, torque: tuple[FloatArray, FloatArray] | None = None,
              ) -> batch.Schedule:
     """
@@ -141,7 +167,7 @@ def schedule(command: Command, bias: Bias, samples: FloatArray, longest: float,
     samples
         when the sensors are read, increasing, none before zero, shape (n,) [s]
     longest
-        longest step [s]
+        step, where the axis turns as commanded
     delay
         by which the command comes late [s]
     torque
@@ -159,7 +185,8 @@ def schedule(command: Command, bias: Bias, samples: FloatArray, longest: float,
     # a step much shorter than its neighbours buys nothing: jumps that fall on a sample merge
     keep = np.r_[True, np.diff(knots) > 1e-9]
     knots = knots[keep]
-    pieces = np.maximum(np.ceil(np.diff(knots) / longest - 1e-6).astype(int), 1)
+    rate = command(0.5 * (knots[:-1] + knots[1:]) - delay)
+    pieces = np.maximum(np.ceil(np.diff(knots) / longest.at(rate) - 1e-6).astype(int), 1)
     first = np.repeat(knots[:-1], pieces)
     length = np.repeat(np.diff(knots) / pieces, pieces)
     number = np.arange(first.size) - np.repeat(np.r_[0, np.cumsum(pieces)[:-1]], pieces)

@@ -41,7 +41,7 @@ from antenna_drive.gap.price import price
 import numpy as np
 from numpy.typing import NDArray
 
-SINGLES = 16
+SINGLES = 12
 FINALISTS = 5
 BASES = 3
 PARTNERS = 5
@@ -241,8 +241,9 @@ class Search:
         point = {**state.point(), **starts(form)}
         columns = np.zeros((state.residual.size, len(form.parameters)), np.float32)
         live = [j for j, p in enumerate(form.parameters) if not p.shape]
+        # a wave may ask for shorter steps than the state was simulated with
         columns[:, live] = self.problem.columns(
-            point, [form.parameters[j] for j in live], state.residual, central=False)
+            point, [form.parameters[j] for j in live], state.residual, central=form.sought)
         return columns
 
     def _take_tangents(self, state: State) -> None:

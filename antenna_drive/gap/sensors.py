@@ -23,6 +23,11 @@ from antenna_drive.gap.model import FloatArray
 from antenna_drive.recording import sheet as sheets
 import numpy as np
 
+# From so few changes of a reading its digit is not told, and a multiple of it may be off by so
+# much.
+_CHANGES = 12
+_WHOLE = 0.05
+
 
 @dataclass(frozen=True)
 class Sensors:
@@ -78,3 +83,26 @@ def jitter_of(command: Command, time: FloatArray, values: FloatArray) -> float:
         return usual
     late = error[good] / slope[good]
     return max(float(1.4826 * np.median(np.abs(late - np.median(late)))), 0.1 * usual)
+
+
+def digit_of(values: FloatArray) -> float:
+    """
+    Return the digit of which all readings are whole multiples, but for a constant; 0 if none is.
+
+    Parameters
+    ----------
+    values
+        readings in the order in which they were taken, NaN where there is none, shape (n,)
+
+    """
+    change = np.abs(np.diff(values[np.isfinite(values)]))
+    change = change[change > 0.0]
+    if change.size < _CHANGES:
+        return 0.0
+    digit = float(change.min())
+    for _ in range(3):
+        # the smallest change is rounded as any other: all of them together say it better
+        count = np.round(change / digit)
+        digit = float(change @ count / (count @ count))
+    off = np.abs(change / digit - np.round(change / digit))
+    return digit if float(off.max()) < _WHOLE else 0.0

@@ -22,7 +22,7 @@ from antenna_drive.emulator.run import simulate
 from antenna_drive.gap.catalogue import catalogue, DriveParameter, Wave
 from antenna_drive.gap.confusability import BUILT_IN, planned
 from antenna_drive.gap.drive_model import DriveModel
-from antenna_drive.gap.excitation import Bias, schedule, SheetCommand
+from antenna_drive.gap.excitation import Bias, Longest, schedule, SheetCommand
 from antenna_drive.gap.search import starts
 from antenna_drive.parameters import load
 from antenna_drive.parameters.records import record_of
@@ -115,7 +115,7 @@ def test_batch_agrees_with_the_converged_emulator() -> None:
         'torque_share.torque_share.start': 'steady'})
     fine = simulate(drive, 3.0, 2.5e-5, every=400)
     command = SheetCommand(Square(np.degrees(7.4e-4), 3.0, 0.0))
-    out = batch.run(record_of(drive), schedule(command, Bias(), fine.time, 2.5e-3))
+    out = batch.run(record_of(drive), schedule(command, Bias(), fine.time, Longest(2.5e-3)))
     for c, name in enumerate(batch.CHANNELS):
         scale = np.sqrt(np.mean(fine[name] ** 2))
         assert np.sqrt(np.mean((out[:, c, 0] - fine[name]) ** 2)) < 2e-4 * scale
