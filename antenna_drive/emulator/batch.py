@@ -49,8 +49,8 @@ _MODE_PLANT = _MODE_SHARE + torque_share.MODES
 _MODES = _MODE_PLANT + structure.MODES
 
 # Columns of the table of steps.
-LENGTH, COMMAND, SLOPE, CURVE, TORQUE, TORQUE_SLOPE, FIXED_BIAS = range(7)
-COLUMNS = 7
+LENGTH, COMMAND, SLOPE, CURVE, TORQUE, TORQUE_SLOPE, FIXED_BIAS, CHANGE = range(8)
+COLUMNS = 8
 
 
 @inner
@@ -112,9 +112,11 @@ _advance = located_runge_kutta(_rates, _switch)
 
 @compiled
 def _run(  # type: ignore[no-untyped-def]
-        p, steps, keep, x, dx, mode, motor, share, plant, work, y_motor, y_share, y_plant, out):
+        p, numbers, changing, steps, keep, x, dx, mode, motor, share, plant, work, y_motor,
+        y_share, y_plant, out):
     """Run one variant over a table of steps; write what the sensors say into out."""
     drive = p[0]
+    given = numbers[changing]
     u = (steps[0], motor, share, plant)
     motor_drive.start(drive.motor_1, x[:_M2], mode[:_MODE_2], y_motor)
     motor_drive.start(drive.motor_2, x[_M2:_SHARE], mode[_MODE_2:_MODE_SHARE], y_motor)
@@ -125,6 +127,7 @@ def _run(  # type: ignore[no-untyped-def]
         if k >= 0:
             u = (steps[k], motor, share, plant)
             drive.torque_share.torque_share.fixed_voltage = steps[k, FIXED_BIAS]
+            numbers[changing] = given + steps[k, CHANGE]
             _advance(x, mode, u, drive, steps[k, LENGTH], 1, work)
         row = keep[k + 1]
         if row < 0:
@@ -159,13 +162,16 @@ class Schedule:
     ----------
     steps : shape (n, COLUMNS): length [s]; rate command as value, slope and half the curvature
         from the step's start on [rad/s, rad/s^2, rad/s^3]; torque on the axis, value and slope
-        [N m, N m/s]; voltage of a fixed bias source [V]
+        [N m, N m/s]; voltage of a fixed bias source [V]; change of the number at `changing`, in
+        its own unit
     keep : shape (n + 1,): the row of the result at the start and after each step, -1 for none
+    changing : which number of the drive's record changes over time, see `records.place_of`
 
     """
 
     steps: FloatArray
     keep: NDArray[np.int64]
+    changing: int = 0
 
     @property
     def rows(self) -> int:
@@ -194,9 +200,9 @@ def run(record: np.ndarray[Any, np.dtype[Any]], schedule: Schedule) -> FloatArra
     out = np.empty((schedule.rows, len(CHANNELS), 2))
     record = record.copy()
     record['torque_share']['torque_share']['fixed_voltage'] = schedule.steps[0, FIXED_BIAS]
-    _run(record, schedule.steps, schedule.keep, np.zeros(states), np.zeros(states),
-         np.zeros(_MODES, np.int64), np.zeros((motor_drive.INPUTS, 2)),
-         np.zeros((torque_share.INPUTS, 2)), np.zeros((structure.INPUTS, 2)), work_space(states),
+    _run(record, record.view(np.float64), schedule.changing, schedule.steps, schedule.keep,
+         np.zeros(states), np.zeros(states), np.zeros(_MODES, np.int64),
+         np.zeros((motor_drive.INPUTS, 2)), np.zeros((torque_share.INPUTS, 2)), np.zeros((structure.INPUTS, 2)), work_space(states),
          np.zeros((motor_drive.OUTPUTS, 2)), np.zeros((torque_share.OUTPUTS, 2)),
          np.zeros((structure.OUTPUTS, 2)), out)
     return out

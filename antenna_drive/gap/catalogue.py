@@ -25,7 +25,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math
 
-from antenna_drive.gap.model import Effect, Form, Parameter
+from antenna_drive.gap.model import Effect, Form, Parameter, Point
+import numpy as np
 
 SCALE, ADD, SET = 'scale', 'add', 'set'
 
@@ -100,7 +101,8 @@ class _Catalogue:
 
     def add(self, component: str, name: str, cause: str, look: str, *forms: Form) -> None:
         key = f'{component}.{name}'
-        self.effects[key] = Effect(key, component, cause, look, forms)
+        parts = tuple(f'{motor}.{name}' for motor in MOTORS['motors']) * (component == 'motors')
+        self.effects[key] = Effect(key, component, cause, look, forms, parts)
 
 
 def _form(key: str, *parts: DriveParameter, name: str = '') -> Form:
@@ -376,6 +378,9 @@ GUST = 'axis.wind_gust'
 DIGIT, TURN = 'plant.encoder.step', 'plant.encoder.turn'
 # The gust's torque is free at times so far apart [s], and smooth between.
 GUST_KNOT_S = 0.5
+# Wind has no jumps: from one knot to the next it changes by no more than so many times its usual
+# change.
+_JUMP = 7.0
 
 
 def quantisation_form(digit: float) -> Form:
@@ -396,9 +401,26 @@ def gust_knots(duration: float) -> int:
     return int(duration / GUST_KNOT_S) + 2
 
 
+@dataclass(frozen=True)
+class Course(Form):
+    """A course over time in each test, free at its knots: so free that it may be no wind."""
+
+    def strangeness(self, point: Point) -> float:
+        """Return the greatest change between two knots by that which wind might make."""
+        courses: dict[int | None, list[float]] = {}
+        for knot in self.parameters:
+            courses.setdefault(knot.experiment, []).append(point[knot.name])
+        found = 0.0
+        for course in courses.values():
+            change = np.abs(np.diff(course))
+            if change.size and np.any(change):
+                found = max(found, float(change.max() / (1.4826 * np.median(change) + 1e-30)))
+        return found / _JUMP
+
+
 def gust_form(durations: Sequence[float]) -> Form:
     """Return the form of a gust: in each test a torque over time that is what it is."""
-    return Form('torque over time', tuple(
+    return Course('torque over time', tuple(
         DriveParameter(f'{GUST}.torque:{k}:{i}', 'N m', -1e6, 1e6, 2e3, 3e4, experiment=k,
                        how=SET, fields=(f'gust:{k}:{i}',))
         for k, duration in enumerate(durations)

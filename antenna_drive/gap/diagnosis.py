@@ -184,8 +184,12 @@ def _diagnosed(model: Model, progress: Progress, threads: int,
     left = _left(problem, best)
     progress(0.9, 'how far it goes')
     how_far = _how_far(problem, none, best)
-    unknown = verdict.unknown_probability(excess, left,
-                                          how_far['explained_fraction']['ci95'][1])
+    fast, fast_left = _fast(problem, best)
+    point = best.state.point()
+    unknown = verdict.unknown_probability(verdict.Remains(
+        excess, left, fast, fast_left,
+        max((form.strangeness(point) for form in best.forms), default=0.0),
+        how_far['explained_fraction']['ci95'][1]))
     ranked = verdict.rank(candidates, unknown)
     entries: list[dict[str, Any]] = []
     for item in ranked[:_ENTRIES]:
@@ -265,6 +269,30 @@ def _left(problem: Problem, best: Candidate) -> float:
                        min(float(np.mean(first[:, c] ** 2)), 1e6) - white]
             noise += white
     return float(np.clip(energy[0] / max(energy[1], 0.05 * noise), 0.0, 1.0))
+
+
+def _fast(problem: Problem, best: Candidate) -> tuple[float, float]:
+    """
+    Return how loud the fast part of the loudest signal is, and what share of it was there before.
+
+    In the variance of its sensor's noise, the mean over the tests.
+    """
+    raw = problem.residuals([{}])[0]
+    loudest, share = 0.0, 1.0
+    for c, channel in enumerate(problem.experiments[0].channels):
+        pairs = []
+        for k, experiment in enumerate(problem.experiments):
+            z = _z(problem, best.state, k)[:, c]
+            if channel in experiment.coarse or np.isfinite(z).sum() < 50:
+                continue
+            first = raw[problem.rows(k)].reshape(experiment.measured.shape)[:, c]
+            pairs.append([residuals.fast(z), residuals.fast(first)])
+        if pairs:
+            now, before = np.mean(pairs, axis=0)
+            if now > loudest:
+                loudest = float(now)
+                share = float(np.clip((now - 1.0) / max(before - 1.0, 1e-3), 0.0, 1.0))
+    return loudest, share
 
 
 def _tests(problem: Problem, state: State, excess: float, left: float,

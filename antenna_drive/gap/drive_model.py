@@ -45,8 +45,8 @@ LONGEST_STEP = 2.5e-3
 BRIEF_S = 15.0
 BRIEF_LONGEST_STEP = 3.4e-3
 # A wave of the motors' angle turns by no more than this in a step [rad], however short [s].
-WAVE_STEP = 0.7
-SHORTEST_STEP = 5e-4
+WAVE_STEP = 0.9
+SHORTEST_STEP = 7e-4
 # An encoder's digit is another than the sheet's if it is so many times as large.
 COARSER = 1.3
 # How many cycles per revolution are tried of each wave.
@@ -174,6 +174,16 @@ class DriveModel:
                 wave = form.at(order)
                 self.register(wave)
                 found.append(wave)
+        return found
+
+    def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
+        """Return the form of an effect's part that is like a form of the effect."""
+        if not isinstance(form, Wave):
+            return part.forms[effect.forms.index(form)]
+        found = part.forms[0]
+        assert isinstance(found, Wave)
+        found = found.at(form.order)
+        self.register(found)
         return found
 
     def register(self, wave: Wave) -> None:

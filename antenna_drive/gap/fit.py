@@ -23,7 +23,7 @@ fitted together with whatever else is sought, with hard bounds and a mild pull t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from antenna_drive.gap.model import FloatArray, Model, Parameter
@@ -38,6 +38,8 @@ OUTLIER = 3.0
 _STALE = 0.02
 # A step corrects the derivatives if its error is less than so much of what was predicted.
 _TEACHES = 0.5
+# So many variants are simulated at once.
+_CHUNK = 16
 
 
 @dataclass(frozen=True)
@@ -133,7 +135,8 @@ class Problem:
         end = int(self.ends[experiment])
         return slice(end - self.sizes[experiment], end)
 
-    def _scaled(self, k: int, predicted: FloatArray | None) -> FloatArray:
+    def scaled(self, k: int, predicted: FloatArray | None) -> FloatArray:
+        """Return an experiment's residuals, 0 without a measurement or a prediction at all."""
         experiment = self.experiments[k]
         if predicted is None:
             return np.zeros(self.sizes[k])
@@ -147,8 +150,14 @@ class Problem:
         """Return the residuals of several variants, shape (n,) each; those of one test alone."""
         alone = self._alone if alone is None else alone
         only = [alone] * len(points) if alone is not None else None
-        return [np.concatenate([self._scaled(k, values) for k, values in enumerate(result)])
+        return [np.concatenate([self.scaled(k, values) for k, values in enumerate(result)])
                 for result in self.model.simulate(points, only)]
+
+    def seen(self, state: State, scale: float) -> State:
+        """Return a state of another scale as this problem sees it, without derivatives."""
+        residual = state.residual * (scale / self.scale)
+        return replace(state.light(), residual=residual,
+                       cost=_cost(residual, state.x, pull_of(state.parameters)))
 
     def level(self, residual: FloatArray) -> float:
         """Return the size of residuals in standard deviations; few large ones count less."""
@@ -188,16 +197,15 @@ class Problem:
                 only.append(item.experiment)
                 plan.append((j, side, len(sides)))
         jacobian = np.zeros((residual.size, len(parameters)), np.float32)
-        chunk = 16
-        for first in range(0, len(variants), chunk):
-            part = slice(first, first + chunk)
+        for first in range(0, len(variants), _CHUNK):
+            part = slice(first, first + _CHUNK)
             results = self.model.simulate(variants[part], only[part])
             for (j, side, count), result in zip(plan[part], results, strict=True):
                 for k, values in enumerate(result):
                     if values is None:
                         continue
                     rows = self.rows(k)
-                    change = residual[rows] - self._scaled(k, values)
+                    change = residual[rows] - self.scaled(k, values)
                     jacobian[rows, j] += side * change / (parameters[j].step * count)
         # less than a thousandth of the noise in all is rounding, no derivative
         for j, item in enumerate(parameters):
@@ -312,44 +320,38 @@ class Problem:
                      tuple(errors), tuple(directions))
 
 
-def scanned(problem: Problem, point: dict[str, float], names: Sequence[str], experiment: int,
-            grid: Sequence[Sequence[float]], until: float) -> dict[str, float]:
+def best_of(problem: Problem, trials: Sequence[dict[str, float]], experiment: int,
+            until: float) -> tuple[float, dict[str, float]]:
     """
-    Return the point with those values of a grid that fit the start of one experiment best.
+    Return the least cost that a trial has in the first part of one experiment, and that trial.
 
-    Where a body starts inside a gap is no matter of going downhill: it is tried out.
+    Where a body starts inside a gap, or where a strong effect is, is no matter of going downhill:
+    it is tried out.
 
     Parameters
     ----------
     problem
         what is fitted
-    point
-        the values of everything else
-    names
-        the parameters that are tried
+    trials
+        points, the first of them counts if several are as good
     experiment
-        the one that they act on
-    grid
-        values of all of `names`, one row for each trial
+        the one that is looked at
     until
-        how much of the experiment is looked at [s]
+        how much of it [s]
 
     """
-    trials = [point, *({**point, **dict(zip(names, values, strict=True))} for values in grid)]
     here = problem.experiments[experiment]
-    early = here.time < until
-    best, best_cost = point, np.inf
-    for first in range(0, len(trials), 32):
-        part = trials[first:first + 32]
+    early = (here.time < until)[:, np.newaxis]
+    best, least = trials[0], np.inf
+    for first in range(0, len(trials), _CHUNK):
+        part = trials[first:first + _CHUNK]
         results = problem.model.simulate(part, [experiment] * len(part), until)
         for trial, result in zip(part, results, strict=True):
-            predicted = result[experiment]
-            assert predicted is not None
-            z = (here.measured[early] - predicted[early]) / (problem.scale * here.noise[early])
-            cost = robust_loss(z[np.isfinite(z)])
-            if cost < best_cost:
-                best, best_cost = trial, cost
-    return best
+            z = problem.scaled(experiment, result[experiment]).reshape(here.measured.shape)
+            cost = robust_loss(np.where(early, z, 0.0).ravel())
+            if cost < least:
+                best, least = trial, cost
+    return least, best
 
 
 def across(jacobian: NDArray[np.float32], vector: FloatArray) -> FloatArray:
@@ -443,7 +445,7 @@ def bounded_step(curvature: FloatArray, gradient: FloatArray, low: FloatArray,
         wrong &= np.abs(slope) * scale > 1e-6
         if not wrong.any():
             break
-        if turn < _AT_ONCE:
+        if turn < _CHUNK:
             free |= wrong
         else:
             # one at a time, the steepest: letting all go at once may cycle

@@ -80,6 +80,10 @@ class Form:
     parameters: tuple[Parameter, ...]
     sought: bool = field(default=False, kw_only=True)
 
+    def strangeness(self, point: Point) -> float:
+        """Return how far these values are from what the form stands for; above 1 is strange."""
+        return 0.0
+
 
 @dataclass(frozen=True)
 class Effect:
@@ -93,6 +97,7 @@ class Effect:
     cause : its physical cause, one sentence
     look : what it looks like in the signals, one sentence
     forms : alternatives, of which the best counts
+    parts : ids of the effects that do the same together, each in its own place and of its own size
 
     """
 
@@ -101,6 +106,7 @@ class Effect:
     cause: str
     look: str
     forms: tuple[Form, ...]
+    parts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -169,6 +175,9 @@ class Model(Protocol):
             of each experiment: measured less predicted without the effect, shape (n, c)
 
         """
+
+    def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
+        """Return the form of an effect's part that is like a form of the effect."""
 
     def motion(self, experiment: int) -> Motion:
         """Return how the machine moved in an experiment: it says when a gap shows."""

@@ -56,6 +56,12 @@ def regimes(experiment: Experiment, motion: Motion) -> NDArray[np.int64]:
     return result
 
 
+def fast(z: FloatArray) -> float:
+    """Return the variance of the fast part of a residual at even times, shape (n,)."""
+    z = z[np.isfinite(z)]
+    return 0.5 * float(np.mean(np.diff(z) ** 2)) if z.size > 1 else 0.0
+
+
 def structure(z: FloatArray) -> float:
     """
     Return how much louder the slow part of a residual is than white noise would be, less one.
@@ -71,8 +77,7 @@ def structure(z: FloatArray) -> float:
     if count < 4 or not np.any(z):
         return 0.0
     blocks = z[:count * _BLOCK].reshape(count, _BLOCK).mean(axis=1)
-    fast = float(np.mean(np.diff(z) ** 2)) / 2.0
-    return float(_BLOCK * np.mean(blocks ** 2) / max(fast, 1e-12) - 1.0)
+    return float(_BLOCK * np.mean(blocks ** 2) / max(fast(z), 1e-12) - 1.0)
 
 
 def correlation(z: FloatArray) -> float:

@@ -34,7 +34,7 @@ from functools import partial
 from typing import Any
 
 from antenna_drive.gap.fit import (
-    across, bounded_step, Problem, pull_of, robust_loss, scanned, State, weighted_square,
+    across, best_of, bounded_step, Problem, pull_of, robust_loss, State, weighted_square,
 )
 from antenna_drive.gap.model import FloatArray, Form, Model, Parameter
 from antenna_drive.gap.price import price
@@ -69,11 +69,12 @@ POLISHES = 5
 # Forms with more parameters than this are free at every moment: a gust.
 FREE = 10
 # From how many values far away a fit is begun, and where they are sought: shares of the bounds,
-# and of the best of these.
+# and of the best of these; how much of a test is looked at [s].
 SCANNED = 5
 _NEARBY = (0.7, 0.8, 0.87, 0.94, 1.06, 1.13, 1.2, 1.3)
 _SPAN = (-0.9, -0.6, -0.4, -0.25, -0.15, -0.08, 0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 0.9)
 _EARLY_S = 1.5
+_LOOK_S = 8.0
 _GRID = np.linspace(-0.95, 0.95, 13)
 
 
@@ -163,7 +164,10 @@ class Search:
         self.progress(0.5, 'pairs of effects')
         pairs = self._pairs(singles)
         if pairs:
+            scale = self.problem.scale
             pairs = self._sharpened(pairs)
+            # costs compare at one and the same noise
+            singles = [replace(c, state=self.problem.seen(c.state, scale)) for c in singles]
         self.progress(0.7, 'the likeliest in full')
         return self._in_full(none, singles, pairs)
 
@@ -227,7 +231,9 @@ class Search:
                      if p.experiment == k and p.name.startswith('start:')]
             if len(names) == 2:
                 grid = [(float(a), float(b)) for a in _GRID for b in _GRID]
-                point = scanned(self.problem, point, names, k, grid, _EARLY_S)
+                _, point = best_of(self.problem, [
+                    point, *({**point, **dict(zip(names, values, strict=True))}
+                             for values in grid)], k, _EARLY_S)
         return point
 
     def _residuals(self, state: State) -> list[FloatArray]:
@@ -263,7 +269,8 @@ class Search:
         gradient = across(state.jacobian, state.weight * state.residual) - pull * state.x
         found: dict[str, list[tuple[float, _Tangent]]] = {}
         for tangent in self.tangents:
-            if tangent.effect in besides or (besides and len(tangent.form.parameters) > FREE):
+            if self._same(tangent.effect, besides) or (
+                    besides and len(tangent.form.parameters) > FREE):
                 # what is free at every moment explains the remains of anything
                 continue
             if any(p.name in names for p in tangent.form.parameters):
@@ -286,6 +293,33 @@ class Search:
             first, *others = sorted(forms, key=lambda pair: -pair[0])
             best += [first, *(pair for pair in others[:1] if pair[0] > 0.7 * first[0])]
         return sorted(best, key=lambda pair: -pair[0])
+
+    def _same(self, effect: str, others: Sequence[str]) -> bool:
+        """Tell whether an effect is one of the others, or the same in another place of theirs."""
+        effects = self.model.effects
+        return any(effect == other or effect in effects[other].parts
+                   or other in effects[effect].parts for other in others)
+
+    def _split(self, base: Candidate) -> list[Candidate]:
+        """Return the parts of an effect, each of its own size, if it is one in several places."""
+        effect = self.model.effects[base.effects[0]]
+        if not effect.parts:
+            return []
+        forms = tuple(self.model.counterpart(base.forms[0], effect, self.model.effects[part])
+                      for part in effect.parts)
+        state, point = base.state, base.state.point()
+        whole = base.forms[0].parameters
+        for p in whole:
+            value = point.pop(p.name)
+            point.update({form.parameters[whole.index(p)].name: value for form in forms})
+        kept = [j for j, p in enumerate(state.parameters) if p not in whole]
+        own_parts = [p for form in forms for p in form.parameters]
+        residual = self.problem.residuals([point])[0]
+        columns = self.problem.columns(point, own_parts, residual, central=True)
+        start = self.problem.start(
+            (*(state.parameters[j] for j in kept), *own_parts), point,
+            np.column_stack([state.jacobian[:, kept], columns]))
+        return [Candidate(effect.parts, forms, self.problem.fit(start, 8))]
 
     def _fitted(self, base: Candidate, tangent: _Tangent, fresh: bool, turns: int) -> Candidate:
         """Fit an effect on top of a candidate, for so many turns."""
@@ -336,32 +370,24 @@ class Search:
         found: list[tuple[float, _Tangent, float]] = []
         for tangent in self.tangents:
             live = [p for p in tangent.form.parameters if not p.shape]
-            if len(live) != 1 or tangent.effect in besides or any(
+            if len(live) != 1 or self._same(tangent.effect, besides) or any(
                     p.name in here for p in tangent.form.parameters):
                 continue
             begin = {**here, **starts(tangent.form)}
             values = [share * (live[0].high if share > 0.0 else -live[0].low)
                       for share in _SPAN if share > 0.0 or live[0].low < 0.0]
-            cost, value = self._best_of(begin, live[0].name, values, worst)
-            found.append((cost, tangent, value))
+            cost, best = best_of(problem, [{**begin, live[0].name: value} for value in values],
+                                 worst, _LOOK_S)
+            found.append((cost, tangent, best[live[0].name]))
         found.sort(key=lambda item: item[0])
         finer = []
         for cost, tangent, value in found[:2 * SCANNED]:
             name = next(p.name for p in tangent.form.parameters if not p.shape)
-            finer.append((*min((cost, value), self._best_of(
-                {**here, **starts(tangent.form)}, name,
-                [value * share for share in _NEARBY], worst)), tangent))
+            nearby = best_of(problem, [{**here, **starts(tangent.form), name: value * share}
+                                       for share in _NEARBY], worst, _LOOK_S)
+            finer.append((*min((cost, value), (nearby[0], nearby[1][name])), tangent))
         finer.sort(key=lambda item: item[0])
         return [(tangent, value) for _, value, tangent in finer[:SCANNED]]
-
-    def _best_of(self, point: dict[str, float], name: str, values: Sequence[float],
-                 experiment: int) -> tuple[float, float]:
-        """Return the least cost of one test over the values of a parameter, and that value."""
-        rows = self.problem.rows(experiment)
-        costs = [robust_loss(z[rows]) for z in self.problem.residuals(
-            [{**point, name: value} for value in values], experiment)]
-        best = int(np.argmin(costs))
-        return costs[best], values[best]
 
     def _settled(self, candidate: Candidate) -> Candidate:
         """Fit with fresh derivatives of everything."""
@@ -401,6 +427,7 @@ class Search:
             if self.problem.scale > 1.0 and base is best:
                 given += self._sorted(partial(self._partnered, best, base),
                                       self._scanned(base.state, base.effects))
+            given += self._split(base)
             for pair in given:
                 key = tuple(sorted(pair.effects))
                 if key not in found or pair.priced < found[key].priced:

@@ -251,6 +251,10 @@ class ServoModel:
         """Return all forms: a servo's runs are short."""
         return effect.forms
 
+    def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
+        """Return the form itself: no effect of a servo sits in several places."""
+        return form
+
     def absorbed(self, point: Point, gone: Point) -> dict[str, float]:
         """Return the offsets unchanged: none of them is known to stand for an effect."""
         return dict(point)

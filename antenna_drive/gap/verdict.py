@@ -35,12 +35,23 @@ TEMPERATURE = 8.0
 # and pays so much, and such a share of what the first explains.
 SECOND_PRICE = 60.0
 SECOND_SHARE = 0.05
+# The same effect in two places has one form: the second place mends no form, only the size.
+TWIN_SHARE = 0.005
 # The unknown: how far the slow residual is above noise, and the share of the gap that is left,
 # each as a logarithm against the value that tips the scales.
 EXCESS, LEFT = 1.0, 0.06
 EXCESS_WEIGHT, LEFT_WEIGHT = 1.6, 1.6
+# A sensor may be noisier than its sheet says, but not so many times in variance; what is louder
+# and was as loud before any effect was added is no noise. Each again as a logarithm.
+NOISIER, NOISIER_WEIGHT = 5.0, 4.0
+REMAINS, REMAINS_WEIGHT = 0.3, 1.6
+# An effect of values that are strange for it is another one that only looks like it.
+STRANGE_WEIGHT = 6.0
 # An effect that explains less than this where it was not fitted is none.
 EXPLAINED, EXPLAINED_WEIGHT = 0.4, 12.0
+# But what leaves nothing but noise in every test has not failed: without one of the tests its
+# values may not be determined.
+NOISE, NOISE_WEIGHT = 0.3, 4.0
 # Candidates within so much of the best cannot be told from it.
 ALIKE = 14.0
 LARGEST_GROUP = 5
@@ -70,7 +81,8 @@ def score(candidate: Candidate, gap: float) -> float:
     count = len(candidate.effects)
     total = candidate.priced
     if count > 1:
-        total += (count - 1) * (SECOND_PRICE + SECOND_SHARE * gap)
+        twins = len({effect.partition('.')[2] for effect in candidate.effects}) < count
+        total += (count - 1) * (SECOND_PRICE + (TWIN_SHARE if twins else SECOND_SHARE) * gap)
     return total
 
 
@@ -81,27 +93,46 @@ def gap_of(candidates: Sequence[Candidate]) -> float:
     return max(none - single, 0.0)
 
 
-def unknown_probability(excess: float, left: float, explained: float | None = None) -> float:
+@dataclass(frozen=True)
+class Remains:
     """
-    Return how probable it is that something outside the catalogue is at work.
+    What the best candidate leaves.
 
-    Parameters
+    Attributes
     ----------
-    excess
-        slow residual of the best candidate, over white noise, 0 if it is noise
-    left
-        share of the gap that the best candidate leaves, 0 to 1
-    explained
-        upper end of the interval of what its effects explain of a test that they were not fitted
-        to; None without effects
+    excess : slow residual, over white noise, 0 if it is noise
+    left : share of the gap, 0 to 1
+    fast : variance of the fast part of the loudest signal, in that of its sensor's noise
+    fast_left : share of that signal's fast part that was there before any effect was added
+    strangeness : of the effects' values, see `Form.strangeness`
+    explained : upper end of the interval of what its effects explain of a test that they were not
+        fitted to; None without effects
 
     """
-    logit = (EXCESS_WEIGHT * math.log(max(excess, 1e-3) / EXCESS)
-             + LEFT_WEIGHT * math.log(max(left, 1e-3) / LEFT))
-    remains = _logistic(logit)
-    fails = 0.0 if explained is None else _logistic(
-        EXPLAINED_WEIGHT * (EXPLAINED - explained))
-    return 1.0 - (1.0 - remains) * (1.0 - fails)
+
+    excess: float
+    left: float
+    fast: float = 1.0
+    fast_left: float = 1.0
+    strangeness: float = 0.0
+    explained: float | None = None
+
+
+def unknown_probability(remains: Remains) -> float:
+    """Return how probable it is that something outside the catalogue is at work."""
+    slow = _logistic(EXCESS_WEIGHT * _log(remains.excess / EXCESS)
+                     + LEFT_WEIGHT * _log(remains.left / LEFT))
+    fast = _logistic(NOISIER_WEIGHT * _log(remains.fast / NOISIER)
+                     + REMAINS_WEIGHT * _log(remains.fast_left / REMAINS))
+    strange = _logistic(STRANGE_WEIGHT * _log(remains.strangeness))
+    fails = 0.0 if remains.explained is None else _logistic(
+        EXPLAINED_WEIGHT * (EXPLAINED - remains.explained)) * _logistic(
+        NOISE_WEIGHT * _log(remains.excess / NOISE))
+    return 1.0 - (1.0 - slow) * (1.0 - fast) * (1.0 - strange) * (1.0 - fails)
+
+
+def _log(ratio: float) -> float:
+    return math.log(max(ratio, 1e-3))
 
 
 def _logistic(logit: float) -> float:

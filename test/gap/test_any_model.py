@@ -80,6 +80,10 @@ class Body:
         body = self.reading(experiment, {})[:, 1]
         return Motion(np.gradient(body, TIME), body, TIME, math.inf)
 
+    def counterpart(self, form: Any, effect: Any, part: Any) -> Any:
+        """Return the form itself: there is one mass."""
+        return form
+
     def absorbed(self, point: Mapping[str, float], gone: Any) -> dict[str, float]:
         """Return the offsets as they are."""
         return dict(point)
