@@ -202,7 +202,8 @@ def run(record: np.ndarray[Any, np.dtype[Any]], schedule: Schedule) -> FloatArra
     record['torque_share']['torque_share']['fixed_voltage'] = schedule.steps[0, FIXED_BIAS]
     _run(record, record.view(np.float64), schedule.changing, schedule.steps, schedule.keep,
          np.zeros(states), np.zeros(states), np.zeros(_MODES, np.int64),
-         np.zeros((motor_drive.INPUTS, 2)), np.zeros((torque_share.INPUTS, 2)), np.zeros((structure.INPUTS, 2)), work_space(states),
+         np.zeros((motor_drive.INPUTS, 2)), np.zeros((torque_share.INPUTS, 2)),
+         np.zeros((structure.INPUTS, 2)), work_space(states),
          np.zeros((motor_drive.OUTPUTS, 2)), np.zeros((torque_share.OUTPUTS, 2)),
          np.zeros((structure.OUTPUTS, 2)), out)
     return out

@@ -21,11 +21,11 @@ takes their place. Two parameters that are sine and cosine parts act as one ampl
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math
 
-from antenna_drive.gap.model import Effect, Form, Parameter, Point
+from antenna_drive.gap.model import Effect, Entry, Form, Parameter, Point
 import numpy as np
 
 SCALE, ADD, SET = 'scale', 'add', 'set'
@@ -372,6 +372,35 @@ def _sensor_effects(into: _Catalogue) -> None:
 
 
 QUANTISATION = 'encoder.quantisation'
+
+
+@dataclass(frozen=True)
+class DriveEntry(Entry):
+    """A place of the drive: the field that changes over time, by how much, and what it needs."""
+
+    path: str = ''
+    size: float = 0.0
+    settings: tuple[Setting, ...] = ()
+
+
+def _entries() -> Iterator[DriveEntry]:
+    yield DriveEntry('torque on the axis', 'axis', 'plant.axis.steady_wind_torque', 3e4)
+    yield DriveEntry('voltage in the torque share', 'torque_share',
+                     'torque_share.torque_share.fade_out_voltage', 0.2)
+    for m in (1, 2):
+        motor, tooth = f'motor_{m}', f'motor_{m}.gearbox.transmission_error'
+        yield DriveEntry(f'friction of motor {m}', motor, f'{motor}.motor.coulomb_torque', 0.2)
+        yield DriveEntry(f'voltage in amplifier {m}', motor, f'{motor}.amplifier.offset', 0.01)
+        yield DriveEntry(f'reading of tachometer {m}', f'tach_{m}', f'{motor}.tachometer.offset',
+                         0.2)
+        # a tooth that is displaced alike at any angle, as far as the input says
+        yield DriveEntry(f'displacement in gearbox {m}', f'gearbox_{m}', tooth, 2e-3, (
+            (tooth, ADD, 1e-12), (f'{tooth}_cycles', SET, 0.0),
+            (f'{tooth}_phase', SET, 0.5 * math.pi)))
+
+
+# Where something that no effect names may enter the drive.
+ENTRIES = tuple(_entries())
 DELAY = 'loop.delay.time'
 GUST = 'axis.wind_gust'
 # Digit of the encoder [rad], and the share of one by which its reading is off its middle.

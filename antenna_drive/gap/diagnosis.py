@@ -33,7 +33,7 @@ import math
 import time
 from typing import Any
 
-from antenna_drive.gap import residuals, verdict
+from antenna_drive.gap import residuals, unknown_input, verdict, where
 from antenna_drive.gap.drive_model import DriveModel
 from antenna_drive.gap.fit import Problem, pull_of, State
 from antenna_drive.gap.model import FloatArray, Model, Motion
@@ -51,6 +51,8 @@ Progress = Callable[[float, str], None]
 _ENTRIES = 12
 _LEAST = 1e-4
 _BLOCK_S = 1.0
+# A gap that is less than this share of the energy is none.
+_NO_GAP = 1e-3
 _TURNS = ('each recording in turn, with the effect as the others have it; offsets within the '
           'tolerance were fitted to it, with the effect and without')
 _HALVES = 'the second half of the recording, predicted from the first'
@@ -92,6 +94,10 @@ class Diagnosis:
                 lines += [f'           {line}' for line in told(entry['parameters'])]
         for group in result['confusable']:
             lines.append('  these data cannot tell apart: ' + ', '.join(group))
+        if result['may_enter_at']:
+            place = result['may_enter_at'][0]
+            lines.append(f'  what is not named most likely enters as {place["name"]}, which could '
+                         f'explain {100.0 * place["explained"]:.0f} % of the gap')
         fraction = result['how_far']['explained_fraction']
         if fraction['value'] is not None:
             low, high = fraction['ci95']
@@ -184,7 +190,7 @@ def _diagnosed(model: Model, progress: Progress, threads: int,
     left = _left(problem, best)
     progress(0.9, 'how far it goes')
     how_far = _how_far(problem, none, best)
-    fast, fast_left = _fast(problem, best)
+    loudest, fast, fast_left = _fast(problem, best)
     point = best.state.point()
     unknown = verdict.unknown_probability(verdict.Remains(
         excess, left, fast, fast_left,
@@ -207,13 +213,20 @@ def _diagnosed(model: Model, progress: Progress, threads: int,
     entries.sort(key=lambda entry: -entry['probability'])
     word = _word(entries[0]['effects'], unknown)
     motions = [model.motion(k) for k in range(len(model.experiments))]
+    places: Sequence[unknown_input.Place] = ()
+    if word in ('unknown_effect', 'partly_explained'):
+        progress(0.95, 'where something unknown may have entered')
+        lies, places = where.of_the_unknown(problem, model, none.state, loudest, fast)
+    if word != 'unknown_effect':
+        lies = where.of_effects(problem, model, ranked, none.state, best.state)
     result = {
         'verdict': word,
-        'where': _where(problem, model, none, best, ranked),
+        'where': lies,
         'which': entries,
         'confusable': verdict.confusable(candidates) if best.effects else [],
         'how_far': how_far,
         'residual_tests': _tests(problem, best.state, excess, left, motions),
+        'may_enter_at': [vars(place) for place in places if place.evidence > 0.0],
         'seconds': time.monotonic() - began,
         'notes': list(notes),
     }
@@ -229,14 +242,6 @@ def _word(top: list[str], unknown: float) -> str:
     return 'explained' if unknown < 0.3 else 'partly_explained'
 
 
-def _z(problem: Problem, state: State, k: int) -> FloatArray:
-    """Return an experiment's residuals, NaN where nothing was measured, shape (n, c)."""
-    experiment = problem.experiments[k]
-    rows = problem.rows(k)
-    z = np.where(problem.valid[rows], state.residual[rows], np.nan)
-    return np.asarray(z.reshape(experiment.measured.shape))
-
-
 def _excess(problem: Problem, state: State) -> float:
     """
     Return how much of the residual is no noise: the mean over tests and signals.
@@ -246,7 +251,7 @@ def _excess(problem: Problem, state: State) -> float:
     """
     found = []
     for k, experiment in enumerate(problem.experiments):
-        z = np.clip(_z(problem, state, k), -6.0, 6.0)
+        z = np.clip(problem.shaped(state, k), -6.0, 6.0)
         # at rest the encoder's residual is a fraction of one step, and no noise at all
         found += [residuals.structure(z[:, c]) for c, channel in enumerate(experiment.channels)
                   if channel not in experiment.coarse and np.isfinite(z[:, c]).sum() > 50]
@@ -259,7 +264,7 @@ def _left(problem: Problem, best: Candidate) -> float:
     noise = 0.0
     energy = np.zeros(2)
     for k, experiment in enumerate(problem.experiments):
-        z = _z(problem, best.state, k)
+        z = problem.shaped(best.state, k)
         first = raw[problem.rows(k)].reshape(experiment.measured.shape)
         for c in range(len(experiment.channels)):
             if experiment.channels[c] in experiment.coarse or not np.isfinite(z[:, c]).any():
@@ -271,34 +276,36 @@ def _left(problem: Problem, best: Candidate) -> float:
     return float(np.clip(energy[0] / max(energy[1], 0.05 * noise), 0.0, 1.0))
 
 
-def _fast(problem: Problem, best: Candidate) -> tuple[float, float]:
+def _fast(problem: Problem, best: Candidate) -> tuple[str, float, float]:
     """
-    Return how loud the fast part of the loudest signal is, and what share of it was there before.
+    Return the signal whose fast part is the loudest, how loud, and what share was there before.
 
     In the variance of its sensor's noise, the mean over the tests.
     """
     raw = problem.residuals([{}])[0]
-    loudest, share = 0.0, 1.0
+    signal, loudest, share = '', 0.0, 1.0
     for c, channel in enumerate(problem.experiments[0].channels):
         pairs = []
         for k, experiment in enumerate(problem.experiments):
-            z = _z(problem, best.state, k)[:, c]
-            if channel in experiment.coarse or np.isfinite(z).sum() < 50:
+            z = problem.shaped(best.state, k)[:, c]
+            if np.isfinite(z).sum() < 50:
                 continue
             first = raw[problem.rows(k)].reshape(experiment.measured.shape)[:, c]
-            pairs.append([residuals.fast(z), residuals.fast(first)])
+            # a coarse reading at rest is a fraction of a step off, slow or fast, and never more
+            loud = residuals.power if channel in experiment.coarse else residuals.fast
+            pairs.append([loud(z), loud(first)])
         if pairs:
             now, before = np.mean(pairs, axis=0)
             if now > loudest:
-                loudest = float(now)
+                signal, loudest = channel, float(now)
                 share = float(np.clip((now - 1.0) / max(before - 1.0, 1e-3), 0.0, 1.0))
-    return loudest, share
+    return signal, loudest, share
 
 
 def _tests(problem: Problem, state: State, excess: float, left: float,
            motions: Sequence[Motion]) -> dict[str, Any]:
     signals: dict[str, Any] = {}
-    zs = [_z(problem, state, k) for k in range(len(problem.experiments))]
+    zs = [problem.shaped(state, k) for k in range(len(problem.experiments))]
     for c, channel in enumerate(problem.experiments[0].channels):
         z = np.concatenate([part[:, c] for part in zs])
         if np.isfinite(z).any():
@@ -328,38 +335,6 @@ def _parameters(candidate: Candidate) -> dict[str, Any]:
                                      min(value + wide, parameter.high)],
             'unit': parameter.unit}
     return found
-
-
-# -- where ----------------------------------------------------------------------------------------
-
-def _where(problem: Problem, model: Model, none: Candidate, best: Candidate,
-           ranked: Sequence[verdict.Ranked]) -> list[dict[str, Any]]:
-    """Return the parts, signals and regimes in which the gap lies, the largest first."""
-    components: dict[str, float] = {}
-    for item in ranked:
-        for effect in item.candidate.effects:
-            component = model.effects[effect].component
-            components[component] = components.get(component, 0.0) + item.probability / len(
-                item.candidate.effects)
-    total = sum(components.values())
-    if not total or not best.effects:
-        return []
-    shares: dict[tuple[str, str], float] = {}
-    for k, experiment in enumerate(problem.experiments):
-        regime = residuals.regimes(experiment, model.motion(k))
-        gained = np.nan_to_num(_z(problem, none.state, k) ** 2 - _z(problem, best.state, k) ** 2)
-        for c, channel in enumerate(experiment.channels):
-            for r, name in enumerate(residuals.REGIMES):
-                key = (channel, name)
-                shares[key] = shares.get(key, 0.0) + float(gained[regime == r, c].sum())
-    positive = {key: max(value, 0.0) for key, value in shares.items()}
-    whole = sum(positive.values()) or 1.0
-    found = [{'component': component, 'signal': signal, 'regime': regime,
-              'share': weight / total * share / whole}
-             for component, weight in components.items()
-             for (signal, regime), share in positive.items()]
-    found.sort(key=lambda item: -float(item['share']))  # type: ignore[arg-type]
-    return [item for item in found[:12] if float(item['share']) > 0.01]  # type: ignore[arg-type]
 
 
 # -- how far --------------------------------------------------------------------------------------
@@ -425,8 +400,8 @@ def _unseen(problem: Problem, candidate: Candidate, k: int) -> FloatArray:
         parts = [fitted.parameters[j] for j in own]
         here = testing.start(parts, values, state.jacobian[:, own])
         fitted = testing.fit(here, 6)
-        return _z(testing, fitted, k)
-    whole = _z(problem, problem.start(state.parameters, fitted.point(), state.jacobian), k)
+        return testing.shaped(fitted, k)
+    whole = problem.shaped(problem.start(state.parameters, fitted.point(), state.jacobian), k)
     whole[used[0]] = np.nan
     return whole
 
@@ -453,8 +428,8 @@ def _blocks(time_s: FloatArray, before: FloatArray, after: FloatArray) -> FloatA
 
 
 def _fraction(sums: FloatArray) -> float:
-    """Return the explained share of the energy above the noise, at most 1."""
+    """Return the explained share of the energy above the noise, at most 1; 0 of nothing."""
     before, after, floor = sums
     # a floor above what is left would explain more than all
-    floor = min(floor, after)
-    return float((before - after) / max(before - floor, 1e-30))
+    gap = before - min(floor, after)
+    return float((before - after) / gap) if gap > _NO_GAP * before else 0.0

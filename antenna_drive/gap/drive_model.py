@@ -22,15 +22,18 @@ import copy
 from dataclasses import dataclass, replace
 import math
 from threading import Lock
+from typing import Any
 
 from antenna_drive.emulator import batch
 from antenna_drive.gap import catalogue
-from antenna_drive.gap.catalogue import ADD, DriveParameter, SCALE, Wave
+from antenna_drive.gap.catalogue import ADD, DriveEntry, DriveParameter, SCALE, Wave
 from antenna_drive.gap.excitation import Bias, Longest, schedule
 from antenna_drive.gap.field_test import (
     BIAS, CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, prepared, TACH_1, TACH_2, UNITS,
 )
-from antenna_drive.gap.model import Effect, Experiment, FloatArray, Form, Motion, Point
+from antenna_drive.gap.model import (
+    Effect, Entry, Experiment, FloatArray, Form, Input, Motion, Point,
+)
 from antenna_drive.gap.offsets import CLOCK, offsets, SUPPLY, ZERO
 from antenna_drive.gap.sensors import digit_of
 from antenna_drive.gap.waves import likely_orders
@@ -239,7 +242,24 @@ class DriveModel:
                 self._cache.popitem(last=False)
         return results
 
-    def _run(self, job: _Job) -> FloatArray:
+    @property
+    def entries(self) -> Sequence[Entry]:
+        """Return where something unknown may enter."""
+        return catalogue.ENTRIES
+
+    def pushed(self, point: Point, entry: Entry, course: Input) -> list[FloatArray]:
+        """Return what the sensors would have shown; see `Model.pushed`."""
+        assert isinstance(entry, DriveEntry)
+        items = sorted(item for item in point.items() if not self._by_name[item[0]].reading)
+
+        def run(k: int) -> FloatArray:
+            return self._run(_Job(k, tuple(item for item in items if self._by_name[
+                item[0]].experiment in (None, k)), math.inf), (entry, course))
+
+        return [self._read(k, out, point) for k, out in
+                enumerate(self._executor.map(run, range(len(self._tests))))]
+
+    def _run(self, job: _Job, push: tuple[DriveEntry, Input] | None = None) -> FloatArray:
         test = self._tests[job.experiment]
         record = test.record.copy()
         numbers = record.view(np.float64)
@@ -280,6 +300,8 @@ class DriveModel:
             fine = np.arange(0.0, knots[-1] + _GUST_S, _GUST_S)
             torque = (fine, CubicSpline(knots, gust)(fine))
         plan = self._plan(job.experiment, bias, delay, torque, turns)
+        if push is not None:
+            plan = _with(plan, record, *push)
         samples = int(np.count_nonzero(test.time < job.until))
         if samples == test.time.size:
             return batch.run(record, plan)
@@ -369,6 +391,18 @@ _CHANNEL = {name: c for c, name in enumerate(CHANNELS.values())}
 # Which channel a meter's errors act on, by where they are in the record.
 _METERS = {'motor_1.ammeter': CURRENT_1, 'motor_2.ammeter': CURRENT_2, 'plant.encoder': ENCODER,
            'torque_share.torque_share': BIAS}
+
+
+def _with(plan: batch.Schedule, record: np.ndarray[Any, np.dtype[Any]], entry: DriveEntry,
+          course: Input) -> batch.Schedule:
+    """Return a plan that lets an input into the drive, whose record is set up for it."""
+    numbers, kind = record.view(np.float64), record.dtype
+    for path, how, value in entry.settings:
+        _change(numbers, place_of(kind, path), how, value)
+    steps = plan.steps.copy()
+    length = steps[:, batch.LENGTH]
+    steps[:, batch.CHANGE] = entry.size * course(np.cumsum(length) - 0.5 * length)
+    return batch.Schedule(steps, plan.keep, place_of(kind, entry.path))
 
 
 def _change(numbers: FloatArray, place: int, how: str, value: float) -> None:

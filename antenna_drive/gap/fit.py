@@ -135,6 +135,12 @@ class Problem:
         end = int(self.ends[experiment])
         return slice(end - self.sizes[experiment], end)
 
+    def shaped(self, state: State, experiment: int) -> FloatArray:
+        """Return an experiment's residuals, NaN where nothing was measured, shape (n, c)."""
+        rows = self.rows(experiment)
+        z = np.where(self.valid[rows], state.residual[rows], np.nan)
+        return np.asarray(z.reshape(self.experiments[experiment].measured.shape))
+
     def scaled(self, k: int, predicted: FloatArray | None) -> FloatArray:
         """Return an experiment's residuals, 0 without a measurement or a prediction at all."""
         experiment = self.experiments[k]

@@ -20,7 +20,7 @@ machine would have shown, had its parameters been other ones.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 import math
 from typing import Protocol
@@ -30,6 +30,8 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 Point = Mapping[str, float]
+# An input over time: from times [s] to values, shape (n,) each.
+Input = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -110,6 +112,22 @@ class Effect:
 
 
 @dataclass(frozen=True)
+class Entry:
+    """
+    A place where something unknown may enter the machine.
+
+    Attributes
+    ----------
+    name : unique in its model, for people
+    component : the part of the machine that it enters by
+
+    """
+
+    name: str
+    component: str
+
+
+@dataclass(frozen=True)
 class Experiment:
     """
     What was measured in one test.
@@ -173,6 +191,29 @@ class Model(Protocol):
             of the catalogue
         residuals
             of each experiment: measured less predicted without the effect, shape (n, c)
+
+        """
+
+    @property
+    def entries(self) -> Sequence[Entry]:
+        """Return where something unknown may enter, apart from the readings themselves."""
+
+    def pushed(self, point: Point, entry: Entry, course: Input) -> list[FloatArray]:
+        """
+        Return what the sensors would have shown, had an input of any course entered.
+
+        Parameters
+        ----------
+        point
+            parameter values by name
+        entry
+            where it enters
+        course
+            the input over time, in a unit that moves the machine a little
+
+        Returns
+        -------
+        for each experiment an array of shape (n, c)
 
         """
 

@@ -161,7 +161,19 @@ def _where(result: dict[str, Any]) -> str:
         f'<td>{escape(item["regime"])}</td><td class="n">{100.0 * item["share"]:.0f} %</td></tr>'
         for item in result['where'][:8])
     return ('<h2>Where the gap lies</h2><table><tr><th>part</th><th>signal</th><th>regime</th>'
-            f'<th class="n">share</th></tr>{rows}</table>')
+            f'<th class="n">share</th></tr>{rows}</table>{_places(result)}')
+
+
+def _places(result: dict[str, Any]) -> str:
+    """Return where something unknown may have entered, if that was asked."""
+    rows = ''.join(
+        f'<tr><td>{escape(place["name"])}</td><td>{escape(place["component"])}</td>'
+        f'<td class="n">{100.0 * place["explained"]:.0f} %</td></tr>'
+        for place in result['may_enter_at'][:4])
+    return rows and (
+        '<p>Something that no effect of the catalogue names would have to enter here: an input of '
+        'any course over time, let into each place in turn.</p><table><tr><th>place</th>'
+        f'<th>part</th><th class="n">explains</th></tr>{rows}</table>')
 
 
 def _curves(diagnosis: Diagnosis) -> str:

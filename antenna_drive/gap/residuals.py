@@ -32,6 +32,8 @@ _AFTER_REVERSAL_S = 0.4
 _BINS = 12
 _LAGS = 20
 _BLOCK = 10
+# A sample that is read beside the edge it should be on is off by any amount.
+_OUTLIER = 10.0
 
 
 def regimes(experiment: Experiment, motion: Motion) -> NDArray[np.int64]:
@@ -57,9 +59,15 @@ def regimes(experiment: Experiment, motion: Motion) -> NDArray[np.int64]:
 
 
 def fast(z: FloatArray) -> float:
-    """Return the variance of the fast part of a residual at even times, shape (n,)."""
-    z = z[np.isfinite(z)]
+    """Return the variance of the fast part of a residual at even times, shape (n,), clipped."""
+    z = np.clip(z[np.isfinite(z)], -_OUTLIER, _OUTLIER)
     return 0.5 * float(np.mean(np.diff(z) ** 2)) if z.size > 1 else 0.0
+
+
+def power(z: FloatArray) -> float:
+    """Return the mean square of a residual, shape (n,), clipped."""
+    z = np.clip(z[np.isfinite(z)], -_OUTLIER, _OUTLIER)
+    return float(np.mean(z ** 2)) if z.size else 0.0
 
 
 def structure(z: FloatArray) -> float:
@@ -72,7 +80,7 @@ def structure(z: FloatArray) -> float:
         residual at even times, shape (n,)
 
     """
-    z = z[np.isfinite(z)]
+    z = np.clip(z[np.isfinite(z)], -_OUTLIER, _OUTLIER)
     count = z.size // _BLOCK
     if count < 4 or not np.any(z):
         return 0.0

@@ -22,7 +22,9 @@ import math
 
 from antenna_drive.errors import UserError
 from antenna_drive.gap import servo_catalogue
-from antenna_drive.gap.model import Effect, Experiment, FloatArray, Form, Motion, Parameter, Point
+from antenna_drive.gap.model import (
+    Effect, Entry, Experiment, FloatArray, Form, Input, Motion, Parameter, Point,
+)
 from antenna_drive.gap.servo_physics import GRAVITY, swing
 from antenna_drive.recording.recording import Recording
 import numpy as np
@@ -250,6 +252,15 @@ class ServoModel:
     def forms(self, effect: Effect, residuals: Sequence[FloatArray]) -> Sequence[Form]:
         """Return all forms: a servo's runs are short."""
         return effect.forms
+
+    @property
+    def entries(self) -> Sequence[Entry]:
+        """Return none: a servo of one body has one place."""
+        return ()
+
+    def pushed(self, point: Point, entry: Entry, course: Input) -> list[FloatArray]:
+        """Return nothing: there are no entries."""
+        return []
 
     def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
         """Return the form itself: no effect of a servo sits in several places."""

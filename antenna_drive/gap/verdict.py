@@ -44,7 +44,7 @@ EXCESS_WEIGHT, LEFT_WEIGHT = 1.6, 1.6
 # A sensor may be noisier than its sheet says, but not so many times in variance; what is louder
 # and was as loud before any effect was added is no noise. Each again as a logarithm.
 NOISIER, NOISIER_WEIGHT = 5.0, 4.0
-REMAINS, REMAINS_WEIGHT = 0.3, 1.6
+REMAINS, REMAINS_WEIGHT = 0.3, 3.0
 # An effect of values that are strange for it is another one that only looks like it.
 STRANGE_WEIGHT = 6.0
 # An effect that explains less than this where it was not fitted is none.

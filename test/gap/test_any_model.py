@@ -80,6 +80,12 @@ class Body:
         body = self.reading(experiment, {})[:, 1]
         return Motion(np.gradient(body, TIME), body, TIME, math.inf)
 
+    entries = ()
+
+    def pushed(self, point: Any, entry: Any, course: Any) -> Any:
+        """Return nothing: there are no entries."""
+        return []
+
     def counterpart(self, form: Any, effect: Any, part: Any) -> Any:
         """Return the form itself: there is one mass."""
         return form

@@ -126,6 +126,10 @@ def test_what_no_effect_can_do_is_unknown() -> None:
     diagnosis = diagnose(odd, load())
     check_schema(diagnosis.result)
     assert diagnosis.result['verdict'] == 'unknown_effect'
+    # but where it lies is told
+    assert {item['component'] for item in diagnosis.result['where'][:2]} == {'tach_1'}
+    assert diagnosis.result['may_enter_at'][0]['name'] == 'reading of tach_1'
+    assert 'reading of tach_1' in diagnosis.summary() and 'reading of tach_1' in page(diagnosis)
 
 
 @pytest.mark.trial
