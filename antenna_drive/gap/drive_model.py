@@ -32,7 +32,7 @@ from antenna_drive.gap.field_test import (
     BIAS, CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, prepared, TACH_1, TACH_2, UNITS,
 )
 from antenna_drive.gap.model import (
-    Effect, Entry, Experiment, FloatArray, Form, Input, Motion, Point,
+    Effect, Entry, Experiment, FloatArray, Form, Input, Motion, Parameter, Point,
 )
 from antenna_drive.gap.offsets import CLOCK, offsets, SUPPLY, ZERO
 from antenna_drive.gap.sensors import digit_of
@@ -120,6 +120,8 @@ class DriveModel:
             self.effects[coarse.id] = replace(
                 coarse, forms=(catalogue.quantisation_form(self._digit),))
         self.nuisances = offsets(self._tests, self.tolerance)
+        self.effects = {key: _tolerated(effect, {p.name for p in self.nuisances}, self.tolerance)
+                        for key, effect in self.effects.items()}
         self._by_name: dict[str, DriveParameter] = {}
         self._waves: dict[str, tuple[Wave, int]] = {}
         for item in (*self.nuisances, *(p for effect in self.effects.values()
@@ -376,6 +378,19 @@ class DriveModel:
         elif step > 0.0:
             values[:, ENCODER] = step * np.floor(values[:, ENCODER] / step + 0.5)
         return values
+
+
+def _tolerated(effect: Effect, offsets_known: set[str], tolerance: float) -> Effect:
+    """Return an effect whose parameters know that their numbers have a tolerance, if so."""
+    def told(item: Parameter) -> Parameter:
+        assert isinstance(item, DriveParameter)
+        known = item.how == SCALE and all(f'offset:{path}' in offsets_known
+                                          for path in item.fields)
+        return replace(item, tolerance=tolerance) if known else item
+
+    return replace(effect, forms=tuple(
+        replace(form, parameters=tuple(told(p) for p in form.parameters))
+        for form in effect.forms))
 
 
 def _coarser_digit(tests: Sequence[FieldTest]) -> float:

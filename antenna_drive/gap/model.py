@@ -50,6 +50,7 @@ class Parameter:
     reading : True if it acts on readings alone, so that nothing need be simulated anew
     start : where a fit begins
     shape : True for a number that means nothing while its effect is absent
+    tolerance : by how much the configuration may be off in this very number without being wrong
 
     """
 
@@ -63,6 +64,7 @@ class Parameter:
     reading: bool = False
     start: float = 0.0
     shape: bool = False
+    tolerance: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from antenna_drive.gap.model import Form
+from antenna_drive.gap.model import Form, Point
 
 EFFECT = 30.0
 PARAMETER = 4.0
@@ -26,10 +26,18 @@ PARAMETER = 4.0
 PULLED = 8.0
 # The cycles of a wave were searched for among many.
 SOUGHT = 10.0
+# An effect that is as small as a tolerance is one: the machine is a little further off than its
+# sheet says. The price falls to nought as the effect outgrows the tolerance.
+TOLERATED = 24.0
 
 
-def price(forms: Sequence[Form]) -> float:
-    """Return the price of effects in these forms."""
-    return sum(EFFECT + SOUGHT * form.sought
-               + sum(PULLED if p.spread else PARAMETER for p in form.parameters)
-               for form in forms)
+def price(forms: Sequence[Form], point: Point) -> float:
+    """Return the price of effects in these forms, with these values."""
+    total = 0.0
+    for form in forms:
+        total += EFFECT + SOUGHT * form.sought
+        for p in form.parameters:
+            total += PULLED if p.spread else PARAMETER
+            if p.tolerance:
+                total += TOLERATED * max(0.0, 1.0 - abs(point[p.name]) / p.tolerance)
+    return total

@@ -103,7 +103,7 @@ class Candidate:
     @property
     def priced(self) -> float:
         """Return the cost with the price of the effects."""
-        return self.state.cost + price(self.forms)
+        return self.state.cost + price(self.forms, self.state.point())
 
 
 @dataclass(frozen=True)

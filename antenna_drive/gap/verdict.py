@@ -122,8 +122,8 @@ def unknown_probability(remains: Remains) -> float:
     """Return how probable it is that something outside the catalogue is at work."""
     slow = _logistic(EXCESS_WEIGHT * _log(remains.excess / EXCESS)
                      + LEFT_WEIGHT * _log(remains.left / LEFT))
-    fast = _logistic(NOISIER_WEIGHT * _log(remains.fast / NOISIER)
-                     + REMAINS_WEIGHT * _log(remains.fast_left / REMAINS))
+    fast = (_logistic(NOISIER_WEIGHT * _log(remains.fast / NOISIER))
+            * _logistic(REMAINS_WEIGHT * _log(remains.fast_left / REMAINS)))
     strange = _logistic(STRANGE_WEIGHT * _log(remains.strangeness))
     fails = 0.0 if remains.explained is None else _logistic(
         EXPLAINED_WEIGHT * (EXPLAINED - remains.explained)) * _logistic(
