@@ -34,6 +34,7 @@ class Decay:
     """A toy: y = exp(-rate t) + offset."""
 
     nuisances = (OFFSET,)
+    entries = ()
     effects = {'toy.rate': Effect('toy.rate', 'toy', '', '', (Form('', (RATE,)),))}
 
     def __init__(self, rate: float, noise: float) -> None:
@@ -55,6 +56,14 @@ class Decay:
     def forms(self, effect: Any, residuals: Any) -> Any:
         """Return the one form."""
         return effect.forms
+
+    def pushed(self, point: Any, entry: Any, course: Any) -> Any:
+        """Return nothing: there are no entries."""
+        return []
+
+    def counterpart(self, form: Any, effect: Any, part: Any) -> Any:
+        """Return the form itself: there is one place."""
+        return form
 
     def absorbed(self, point: Any, gone: Any) -> Any:
         """Return the offsets as they are."""
