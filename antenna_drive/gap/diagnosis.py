@@ -187,10 +187,11 @@ def _diagnosed(model: Model, progress: Progress, threads: int,
     # what is left is judged after a fit that has converged; the ranking compares like with like
     best = search.polished(verdict.best(candidates))
     excess = _excess(problem, best.state)
-    left = _left(problem, best)
+    raw = problem.residuals([{}])[0]
+    left = _left(problem, raw, best)
     progress(0.9, 'how far it goes')
     how_far = _how_far(problem, none, best)
-    loudest, fast, fast_left = _fast(problem, best)
+    loudest, fast, fast_left = _fast(problem, raw, best)
     point = best.state.point()
     unknown = verdict.unknown_probability(verdict.Remains(
         excess, left, fast, fast_left,
@@ -258,9 +259,8 @@ def _excess(problem: Problem, state: State) -> float:
     return float(np.mean(np.maximum(found, -0.5))) if found else 0.0
 
 
-def _left(problem: Problem, best: Candidate) -> float:
+def _left(problem: Problem, raw: FloatArray, best: Candidate) -> float:
     """Return the share of the raw gap above the noise that the best candidate leaves."""
-    raw = problem.residuals([{}])[0]
     noise = 0.0
     energy = np.zeros(2)
     for k, experiment in enumerate(problem.experiments):
@@ -276,13 +276,12 @@ def _left(problem: Problem, best: Candidate) -> float:
     return float(np.clip(energy[0] / max(energy[1], 0.05 * noise), 0.0, 1.0))
 
 
-def _fast(problem: Problem, best: Candidate) -> tuple[str, float, float]:
+def _fast(problem: Problem, raw: FloatArray, best: Candidate) -> tuple[str, float, float]:
     """
     Return the signal whose fast part is the loudest, how loud, and what share was there before.
 
     In the variance of its sensor's noise, the mean over the tests.
     """
-    raw = problem.residuals([{}])[0]
     signal, loudest, share = '', 0.0, 1.0
     for c, channel in enumerate(problem.experiments[0].channels):
         pairs = []

@@ -221,10 +221,8 @@ class DriveModel:
         known: dict[_Job, FloatArray] = {}
         wanted: dict[_Job, None] = {}
         for i, (point, one) in enumerate(zip(points, only or [None] * len(points), strict=True)):
-            items = sorted(item for item in point.items() if not self._by_name[item[0]].reading)
             for k in range(len(self._tests)) if one is None else (one,):
-                job = _Job(k, tuple(item for item in items if self._by_name[
-                    item[0]].experiment in (None, k)), until)
+                job = self._job(k, point, until)
                 # several threads use the cache: what it has now it may not have a moment later
                 out = self._cache.get(job)
                 if out is None:
@@ -252,14 +250,18 @@ class DriveModel:
     def pushed(self, point: Point, entry: Entry, course: Input) -> list[FloatArray]:
         """Return what the sensors would have shown; see `Model.pushed`."""
         assert isinstance(entry, DriveEntry)
-        items = sorted(item for item in point.items() if not self._by_name[item[0]].reading)
 
         def run(k: int) -> FloatArray:
-            return self._run(_Job(k, tuple(item for item in items if self._by_name[
-                item[0]].experiment in (None, k)), math.inf), (entry, course))
+            out = self._run(self._job(k, point, math.inf), (entry, course))
+            return self._read(k, out, point)
 
-        return [self._read(k, out, point) for k, out in
-                enumerate(self._executor.map(run, range(len(self._tests))))]
+        return list(self._executor.map(run, range(len(self._tests))))
+
+    def _job(self, k: int, point: Point, until: float) -> _Job:
+        """Return the run of one test at a point: what acts on readings alone is no part of it."""
+        items = sorted(point.items())
+        return _Job(k, tuple(item for item in items if not self._by_name[item[0]].reading
+                             and self._by_name[item[0]].experiment in (None, k)), until)
 
     def _run(self, job: _Job, push: tuple[DriveEntry, Input] | None = None) -> FloatArray:
         test = self._tests[job.experiment]

@@ -451,7 +451,7 @@ def bounded_step(curvature: FloatArray, gradient: FloatArray, low: FloatArray,
         wrong &= np.abs(slope) * scale > 1e-6
         if not wrong.any():
             break
-        if turn < _CHUNK:
+        if turn < _AT_ONCE:
             free |= wrong
         else:
             # one at a time, the steepest: letting all go at once may cycle

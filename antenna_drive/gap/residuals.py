@@ -58,15 +58,19 @@ def regimes(experiment: Experiment, motion: Motion) -> NDArray[np.int64]:
     return result
 
 
+def _clipped(z: FloatArray) -> FloatArray:
+    return np.asarray(np.clip(z[np.isfinite(z)], -_OUTLIER, _OUTLIER))
+
+
 def fast(z: FloatArray) -> float:
     """Return the variance of the fast part of a residual at even times, shape (n,), clipped."""
-    z = np.clip(z[np.isfinite(z)], -_OUTLIER, _OUTLIER)
+    z = _clipped(z)
     return 0.5 * float(np.mean(np.diff(z) ** 2)) if z.size > 1 else 0.0
 
 
 def power(z: FloatArray) -> float:
     """Return the mean square of a residual, shape (n,), clipped."""
-    z = np.clip(z[np.isfinite(z)], -_OUTLIER, _OUTLIER)
+    z = _clipped(z)
     return float(np.mean(z ** 2)) if z.size else 0.0
 
 
@@ -80,7 +84,7 @@ def structure(z: FloatArray) -> float:
         residual at even times, shape (n,)
 
     """
-    z = np.clip(z[np.isfinite(z)], -_OUTLIER, _OUTLIER)
+    z = _clipped(z)
     count = z.size // _BLOCK
     if count < 4 or not np.any(z):
         return 0.0

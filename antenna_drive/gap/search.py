@@ -309,9 +309,9 @@ class Search:
                       for part in effect.parts)
         state, point = base.state, base.state.point()
         whole = base.forms[0].parameters
-        for p in whole:
+        for p, *own in zip(whole, *(form.parameters for form in forms), strict=True):
             value = point.pop(p.name)
-            point.update({form.parameters[whole.index(p)].name: value for form in forms})
+            point.update({part.name: value for part in own})
         kept = [j for j, p in enumerate(state.parameters) if p not in whole]
         own_parts = [p for form in forms for p in form.parameters]
         residual = self.problem.residuals([point])[0]
