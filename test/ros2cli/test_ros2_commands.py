@@ -165,7 +165,8 @@ def test_topic_hz(drive: Shell) -> None:
 
 def test_node_info(drive: Shell) -> None:
     """A node shows its signals and the frames that it reads."""
-    info = drive.ask('node', 'info', '--no-daemon', '/motor_2')
+    # within the usual half second a busy machine has told the publishers only
+    info = drive.ask('node', 'info', '--no-daemon', '--spin-time', '3', '/motor_2')
     publishers = info.partition('Publishers:')[2].partition('Service')[0]
     assert '/motor_2/frame: std_msgs/msg/Float64MultiArray' in publishers
     assert '/motor_2/current: std_msgs/msg/Float64\n' in publishers
