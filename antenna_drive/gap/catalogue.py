@@ -25,7 +25,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math
 
-from antenna_drive.gap.model import Effect, Entry, Form, Parameter, Point
+from antenna_drive.gap.model import Effect, Entry, FloatArray, Form, Parameter, Point
 import numpy as np
 
 SCALE, ADD, SET = 'scale', 'add', 'set'
@@ -44,7 +44,7 @@ class DriveParameter(Parameter):
 @dataclass(frozen=True)
 class Wave(Form):
     """
-    A wave of two harmonics by their sine and cosine parts, with its cycles per revolution.
+    A wave of three harmonics by their sine and cosine parts, with its cycles per revolution.
 
     Attributes
     ----------
@@ -70,14 +70,26 @@ class Wave(Form):
                        order=order, sought=True)
 
     def settings(self, sine: float, cosine: float, change: float, second_sine: float,
-                 second_cosine: float) -> list[Setting]:
-        """Return what the sine and cosine parts of both harmonics set in the record."""
+                 second_cosine: float, third_sine: float, third_cosine: float) -> list[Setting]:
+        """Return what the sine and cosine parts of the harmonics set in the record."""
         values = (('', math.hypot(sine, cosine)), ('_phase', math.atan2(cosine, sine)),
                   ('_cycles', self.order * (1.0 + change)),
                   ('_second', math.hypot(second_sine, second_cosine)),
-                  ('_second_phase', math.atan2(second_cosine, second_sine)))
+                  ('_second_phase', math.atan2(second_cosine, second_sine)),
+                  ('_third', math.hypot(third_sine, third_cosine)),
+                  ('_third_phase', math.atan2(third_cosine, third_sine)))
         return [(f'{path}.{self.stem}{end}', SET, value)
                 for path in self.paths for end, value in values]
+
+    def along(self, angle: FloatArray, parts: Sequence[float]) -> FloatArray:
+        """Return the wave at angles of shape (n,), its parameters being as in `settings`."""
+        sine, cosine, change, *higher = parts
+        total = np.zeros_like(angle)
+        amplitudes = (sine, cosine, *higher)
+        for k, (a, b) in enumerate(zip(amplitudes[::2], amplitudes[1::2], strict=True), start=1):
+            turned = k * self.order * (1.0 + change) * angle
+            total += a * np.sin(turned) + b * np.cos(turned)
+        return total
 
 
 def _parameter(name: str, unit: str, low: float, high: float, step: float, how: str,
@@ -123,7 +135,8 @@ def _wave(key: str, unit: str, limit: float, step: float, paths: tuple[str, ...]
     parts = (amplitude('sine'), amplitude('cosine'),
              DriveParameter(f'{key}.cycles_change', '1', -0.05, 0.05, 2e-4, reading=reading,
                             shape=True),
-             amplitude('second_sine', shape=True), amplitude('second_cosine', shape=True))
+             amplitude('second_sine', shape=True), amplitude('second_cosine', shape=True),
+             amplitude('third_sine', shape=True), amplitude('third_cosine', shape=True))
     return Wave('', parts, stem=stem, paths=paths, angle=angle, orders=orders)
 
 

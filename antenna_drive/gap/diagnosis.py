@@ -183,6 +183,8 @@ def _diagnosed(model: Model, progress: Progress, threads: int,
     problem = Problem(model)
     search = Search(problem, lambda share, doing: progress(0.9 * share, doing), threads)
     candidates = search.run()
+    problem = search.whole
+    model = problem.model
     none = candidates[0]
     # what is left is judged after a fit that has converged; the ranking compares like with like
     best = search.polished(verdict.best(candidates))

@@ -120,7 +120,7 @@ class DriveModel:
             self.effects[coarse.id] = replace(
                 coarse, forms=(catalogue.quantisation_form(self._digit),))
         self.nuisances = offsets(self._tests, self.tolerance)
-        self.effects = {key: _tolerated(effect, {p.name for p in self.nuisances}, self.tolerance)
+        self.effects = {key: _tolerated(effect, self.nuisances)
                         for key, effect in self.effects.items()}
         self._by_name: dict[str, DriveParameter] = {}
         self._waves: dict[str, tuple[Wave, int]] = {}
@@ -128,14 +128,25 @@ class DriveModel:
                                         for form in effect.forms for p in form.parameters)):
             assert isinstance(item, DriveParameter)
             self._by_name[item.name] = item
-        self.experiments = tuple(self._experiment(test) for test in self._tests)
+        self.experiments = self._experiments({})
 
-    def _experiment(self, test: FieldTest) -> Experiment:
-        out = batch.run(test.record, schedule(test.command, test.bias, test.time,
-                                              Longest(LONGEST_STEP)))
-        noise = test.sensors.noise(out[:, :, 0], out[:, :, 1], test.jitter)
-        return Experiment(test.name, test.time, tuple(CHANNELS.values()), UNITS, test.measured,
-                          noise, coarse=('encoder',))
+    def _experiments(self, point: Point) -> tuple[Experiment, ...]:
+        """Return the tests, with the noise of readings that move as at a point."""
+        found = []
+        for k, test in enumerate(self._tests):
+            out = self._run(self._job(k, point, math.inf))
+            # what the model lacks may be steeper than anything in it: the readings tell
+            slope = np.fmax(np.abs(out[:, :, 1]), np.abs(test.slope))
+            noise = test.sensors.noise(out[:, :, 0], slope, test.jitter)
+            found.append(Experiment(test.name, test.time, tuple(CHANNELS.values()), UNITS,
+                                    test.measured, noise, coarse=('encoder',)))
+        return tuple(found)
+
+    def heard_at(self, point: Point) -> DriveModel:
+        """Return the model with the noise of readings that move as at a point."""
+        other = copy.copy(self)
+        other.experiments = self._experiments(point)
+        return other
 
     def brief(self) -> DriveModel:
         """Return the model with as much of each test as a search needs; a chirp stays whole."""
@@ -345,7 +356,7 @@ class DriveModel:
         shift = np.zeros(len(CHANNELS))
         gain = np.ones(len(CHANNELS))
         step = turn = 0.0
-        wave: list[float] = [0.0] * 5
+        parts: list[float] = []
         form: Wave | None = None
         for name, value in point.items():
             item = self._by_name[name]
@@ -357,7 +368,8 @@ class DriveModel:
                 shift[_CHANNEL[name.split(':')[1]]] += value
             elif name in self._waves:
                 form, part = self._waves[name]
-                wave[part] = value
+                parts = parts or [0.0] * len(form.parameters)
+                parts[part] = value
             elif item.fields[0] == catalogue.DIGIT:
                 step = value
             elif item.fields[0] == catalogue.TURN:
@@ -367,10 +379,7 @@ class DriveModel:
                 (gain if 'gain' in what else shift)[_METERS[effect]] += value
         values *= gain
         if form is not None:
-            angle = form.order * (1.0 + wave[2]) * out[:, ENCODER, 0]
-            values[:, ENCODER] += (
-                wave[0] * np.sin(angle) + wave[1] * np.cos(angle)
-                + wave[3] * np.sin(2.0 * angle) + wave[4] * np.cos(2.0 * angle))
+            values[:, ENCODER] += form.along(out[:, ENCODER, 0], parts)
         values += shift
         if step > 0.0 and self._digit:
             # whatever lies within the digit that was read would have been read
@@ -382,13 +391,15 @@ class DriveModel:
         return values
 
 
-def _tolerated(effect: Effect, offsets_known: set[str], tolerance: float) -> Effect:
-    """Return an effect whose parameters know that their numbers have a tolerance, if so."""
+def _tolerated(effect: Effect, offsets_known: Sequence[DriveParameter]) -> Effect:
+    """Return an effect whose parameters know by how much their numbers may be off anyway."""
+    may_be_off = {(path, item.how): item.high for item in offsets_known
+                  if item.experiment is None for path in item.fields}
+
     def told(item: Parameter) -> Parameter:
         assert isinstance(item, DriveParameter)
-        known = item.how == SCALE and all(f'offset:{path}' in offsets_known
-                                          for path in item.fields)
-        return replace(item, tolerance=tolerance) if known else item
+        known = [may_be_off.get((path, item.how), 0.0) for path in item.fields]
+        return replace(item, tolerance=min(known, default=0.0))
 
     return replace(effect, forms=tuple(
         replace(form, parameters=tuple(told(p) for p in form.parameters))

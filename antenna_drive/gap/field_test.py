@@ -16,7 +16,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from typing import Any
 
@@ -63,6 +63,7 @@ class FieldTest:
     bias : source of bias voltage, where the share circuit is not connected
     time : of the samples that are compared, shape (n,) [s]
     measured : readings, shape (n, 6), NaN where there is none
+    slope : their slopes over time as recorded, shape (n, 6), NaN where there is none
     sensors : what they add
     jitter : of the time stamps [s]
 
@@ -74,14 +75,15 @@ class FieldTest:
     bias: Bias
     time: FloatArray
     measured: FloatArray
+    slope: FloatArray
     sensors: Sensors
     jitter: float
 
     def until(self, end: float) -> FieldTest:
         """Return the test cut short at a time [s]."""
         n = int(np.searchsorted(self.time, end))
-        return FieldTest(self.name, self.record, self.command, self.bias, self.time[:n],
-                         self.measured[:n], self.sensors, self.jitter)
+        return replace(self, time=self.time[:n], measured=self.measured[:n],
+                       slope=self.slope[:n])
 
     @property
     def repeats(self) -> bool:
@@ -121,7 +123,7 @@ def prepared(name: str, recording: Recording, drive: Drive, note: Note) -> Field
     command = _command(name, recording.sheet.waveform, given, note)
     time = _times(recording)
     return FieldTest(name, record_of(drive), command, bias, time,
-                     _measured(name, recording, time, note), Sensors.of(recording.sheet.sensors),
+                     *_measured(name, recording, time, note), Sensors.of(recording.sheet.sensors),
                      jitter_of(command, given.time_s, given.values))
 
 
@@ -186,8 +188,10 @@ def _times(recording: Recording) -> FloatArray:
     return np.asarray(time[::every])
 
 
-def _measured(name: str, recording: Recording, time: FloatArray, note: Note) -> FloatArray:
-    measured = np.full((time.size, len(CHANNELS)), np.nan)
+def _measured(name: str, recording: Recording, time: FloatArray,
+              note: Note) -> tuple[FloatArray, FloatArray]:
+    """Return readings and their slopes at these times, NaN where there is none."""
+    measured, slope = np.full((2, time.size, len(CHANNELS)), np.nan)
     for c, channel_name in enumerate(CHANNELS):
         channel = _channel(recording, channel_name)
         if channel is None:
@@ -197,4 +201,7 @@ def _measured(name: str, recording: Recording, time: FloatArray, note: Note) -> 
         at = np.clip(np.searchsorted(times, time - 1e-9), 0, times.size - 1)
         there = np.abs(times[at] - time) < 1e-6
         measured[there, c] = channel.values[at[there]]
-    return measured
+        # before they are thinned, samples tell the slope of what is too fast to be told after
+        if times.size > 1:
+            slope[there, c] = np.gradient(channel.values, times)[at[there]]
+    return measured, slope

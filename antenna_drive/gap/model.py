@@ -183,6 +183,13 @@ class Model(Protocol):
     def brief(self) -> Model:
         """Return the model with as much of its tests as a search needs, or the model itself."""
 
+    def heard_at(self, point: Point) -> Model:
+        """
+        Return the model with the noise that its sensors have at a point, or the model itself.
+
+        A time stamp that is off makes a fast reading noisier than a slow one.
+        """
+
     def forms(self, effect: Effect, residuals: Sequence[FloatArray]) -> Sequence[Form]:
         """
         Return the forms of an effect that are worth a trial.

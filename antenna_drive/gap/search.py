@@ -450,7 +450,6 @@ class Search:
         All share the derivatives by the offsets, which are taken anew in every pass, where the
         best candidate is then.
         """
-        whole = self.whole
         least = min(c.priced for c in (*singles, *pairs))
         chosen = [singles[0], *(c for c in (*singles[1:FULL_SINGLES], *pairs[:FULL_PAIRS])
                                 if c.priced < least + REACH)]
@@ -460,6 +459,8 @@ class Search:
             chosen += [c for c in (self._dropped(pairs[0], e) for e in pairs[0].effects)
                        if (c.effects, c.forms) not in known]
         anchor = min(chosen, key=lambda c: c.priced)
+        # what was found may be faster than anything the model knew of
+        self.whole = whole = Problem(self.whole.model.heard_at(anchor.state.point()))
         before = np.inf
         for number in range(PASSES):
             self.progress(0.7 + 0.3 * number / PASSES, 'the likeliest in full')

@@ -249,6 +249,10 @@ class ServoModel:
         """Return the model itself: a servo's tests are short."""
         return self
 
+    def heard_at(self, point: Point) -> ServoModel:
+        """Return the model itself: a servo's readings are as noisy at any speed."""
+        return self
+
     def forms(self, effect: Effect, residuals: Sequence[FloatArray]) -> Sequence[Form]:
         """Return all forms: a servo's runs are short."""
         return effect.forms

@@ -138,6 +138,9 @@ class Motor:
     torque_ripple_second: float = _effect(
         0.0, 'N m', 0.0, 20.0, 'amplitude of the second harmonic of the torque ripple')
     torque_ripple_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
+    torque_ripple_third: float = _effect(
+        0.0, 'N m', 0.0, 20.0, 'amplitude of the third harmonic of the torque ripple')
+    torque_ripple_third_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,6 +164,9 @@ class Gearbox:
     transmission_error_second: float = _effect(
         0.0, 'rad', 0.0, 1.0, 'amplitude of the second harmonic of the transmission error')
     transmission_error_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
+    transmission_error_third: float = _effect(
+        0.0, 'rad', 0.0, 1.0, 'amplitude of the third harmonic of the transmission error')
+    transmission_error_third_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,6 +181,9 @@ class Tachometer:
     ripple_second: float = _effect(
         0.0, '1', 0.0, 1.0, 'amplitude of the second harmonic of the ripple')
     ripple_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
+    ripple_third: float = _effect(
+        0.0, '1', 0.0, 1.0, 'amplitude of the third harmonic of the ripple')
+    ripple_third_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -244,6 +253,9 @@ class Axis:
     friction_wave_second: float = _effect(
         0.0, '1', 0.0, 0.9, 'amplitude of the second harmonic of that variation')
     friction_wave_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
+    friction_wave_third: float = _effect(
+        0.0, '1', 0.0, 0.9, 'amplitude of the third harmonic of that variation')
+    friction_wave_third_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
     gravity_torque: float = _effect(
         0.0, 'N m', -1e7, 1e7, 'imbalance: torque at zero elevation, pulling down')
     steady_wind_torque: float = _effect(0.0, 'N m', -1e7, 1e7, 'torque of a steady wind')
@@ -267,6 +279,9 @@ class Encoder:
     cyclic_error_second: float = _effect(
         0.0, 'rad', 0.0, 0.1, 'amplitude of the second harmonic of the cyclic error')
     cyclic_error_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
+    cyclic_error_third: float = _effect(
+        0.0, 'rad', 0.0, 0.1, 'amplitude of the third harmonic of the cyclic error')
+    cyclic_error_third_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -37,10 +37,12 @@ def twist(motor_angle: float, axis_angle: float, gear_ratio: float, p: Gearbox) 
 
     """
     angle = motor_angle - gear_ratio * axis_angle
-    if p.transmission_error != 0.0 or p.transmission_error_second != 0.0:
-        angle += wave(motor_angle, p.transmission_error, p.transmission_error_second,
-                      p.transmission_error_cycles, p.transmission_error_phase,
-                      p.transmission_error_second_phase)
+    if (p.transmission_error != 0.0 or p.transmission_error_second != 0.0
+            or p.transmission_error_third != 0.0):
+        angle += wave(
+            motor_angle, p.transmission_error, p.transmission_error_second,
+            p.transmission_error_third, p.transmission_error_cycles, p.transmission_error_phase,
+            p.transmission_error_second_phase, p.transmission_error_third_phase)
     return angle
 
 
@@ -50,11 +52,12 @@ def twist_rate(
 ) -> float:
     """Return the time derivative of `twist` [rad/s]; rates in rad/s, otherwise as there."""
     rate = motor_rate - gear_ratio * axis_rate
-    if p.transmission_error != 0.0 or p.transmission_error_second != 0.0:
+    if (p.transmission_error != 0.0 or p.transmission_error_second != 0.0
+            or p.transmission_error_third != 0.0):
         rate += motor_rate * wave_slope(
             motor_angle, p.transmission_error, p.transmission_error_second,
-            p.transmission_error_cycles, p.transmission_error_phase,
-            p.transmission_error_second_phase)
+            p.transmission_error_third, p.transmission_error_cycles, p.transmission_error_phase,
+            p.transmission_error_second_phase, p.transmission_error_third_phase)
     return rate
 
 

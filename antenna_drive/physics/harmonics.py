@@ -21,31 +21,34 @@ from antenna_drive.physics.compiling import inner
 
 
 @inner
-def wave(angle: float, amplitude: float, second: float, cycles: float, phase: float,
-         second_phase: float) -> float:
+def wave(angle: float, amplitude: float, second: float, third: float, cycles: float,
+         phase: float, second_phase: float, third_phase: float) -> float:
     """
-    Return a wave of two harmonics, in the unit of its amplitudes.
+    Return a wave of three harmonics, in the unit of its amplitudes.
 
     Parameters
     ----------
     angle
         that it follows [rad]
-    amplitude, second
-        of the first and the second harmonic
+    amplitude, second, third
+        of the harmonics
     cycles
         of the first harmonic per revolution
-    phase, second_phase
-        of either harmonic at angle zero [rad]
+    phase, second_phase, third_phase
+        of the harmonics at angle zero [rad]
 
     """
     turned = cycles * angle
-    return amplitude * math.sin(turned + phase) + second * math.sin(2.0 * turned + second_phase)
+    return (amplitude * math.sin(turned + phase)
+            + second * math.sin(2.0 * turned + second_phase)
+            + third * math.sin(3.0 * turned + third_phase))
 
 
 @inner
-def wave_slope(angle: float, amplitude: float, second: float, cycles: float, phase: float,
-               second_phase: float) -> float:
+def wave_slope(angle: float, amplitude: float, second: float, third: float, cycles: float,
+               phase: float, second_phase: float, third_phase: float) -> float:
     """Return the derivative of `wave` by the angle, per rad; everything as there."""
     turned = cycles * angle
     return cycles * (amplitude * math.cos(turned + phase)
-                     + 2.0 * second * math.cos(2.0 * turned + second_phase))
+                     + 2.0 * second * math.cos(2.0 * turned + second_phase)
+                     + 3.0 * third * math.cos(3.0 * turned + third_phase))

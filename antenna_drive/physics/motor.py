@@ -37,9 +37,10 @@ def driving_torque(current: float, angle: float, p: Motor) -> float:
 
     """
     torque = p.torque_constant * current
-    if p.torque_ripple != 0.0 or p.torque_ripple_second != 0.0:
-        torque += wave(angle, p.torque_ripple, p.torque_ripple_second, p.torque_ripple_cycles,
-                       p.torque_ripple_phase, p.torque_ripple_second_phase)
+    if p.torque_ripple != 0.0 or p.torque_ripple_second != 0.0 or p.torque_ripple_third != 0.0:
+        torque += wave(angle, p.torque_ripple, p.torque_ripple_second, p.torque_ripple_third,
+                       p.torque_ripple_cycles, p.torque_ripple_phase,
+                       p.torque_ripple_second_phase, p.torque_ripple_third_phase)
     return torque
 
 
@@ -79,9 +80,9 @@ def tachometer(rate: float, angle: float, p: Tachometer) -> float:
 
     """
     reading = p.gain * rate + p.offset
-    if p.ripple != 0.0 or p.ripple_second != 0.0:
-        reading += rate * wave(angle, p.ripple, p.ripple_second, p.ripple_cycles,
-                               p.ripple_phase, p.ripple_second_phase)
+    if p.ripple != 0.0 or p.ripple_second != 0.0 or p.ripple_third != 0.0:
+        reading += rate * wave(angle, p.ripple, p.ripple_second, p.ripple_third, p.ripple_cycles,
+                               p.ripple_phase, p.ripple_second_phase, p.ripple_third_phase)
     return reading
 
 

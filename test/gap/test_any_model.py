@@ -20,7 +20,7 @@ import math
 from typing import Any
 
 from antenna_drive.gap.diagnosis import diagnosed
-from antenna_drive.gap.model import Effect, Experiment, Form, Motion, Parameter
+from antenna_drive.gap.model import Effect, Experiment, Form, Motion, Parameter, Point
 import numpy as np
 import pytest
 
@@ -66,6 +66,10 @@ class Body:
         heated = point.get('heater.step.size', 0.0) * (TIME >= 4.0)
         body = STARTS[k] * np.exp(-cooled) + heated
         return np.column_stack([body * (1.0 + point.get('thermometer.gain.size', 0.0)), body])
+
+    def heard_at(self, point: Point) -> Body:
+        """Return the model itself."""
+        return self
 
     def brief(self) -> Body:
         """Return the model: it is brief."""

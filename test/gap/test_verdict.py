@@ -23,7 +23,9 @@ from antenna_drive.gap.model import FloatArray, Form, Parameter
 from antenna_drive.gap.price import price, TOLERATED
 from antenna_drive.gap.residuals import fast, power, structure
 from antenna_drive.gap.search import Candidate
-from antenna_drive.gap.verdict import rank, Remains, unknown_probability
+from antenna_drive.gap.verdict import (
+    DETECTABLE, LEAST, MOST, rank, Remains, unknown_probability,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -65,10 +67,11 @@ def test_more_of_anything_left_is_never_less_unknown(
 
 def test_noise_is_not_unknown_and_hum_is() -> None:
     """White noise of the sheet's size raises nothing; four times as loud a signal does."""
-    assert unknown_probability(Remains(0.0, 0.0)) < 0.01
-    assert unknown_probability(Remains(0.0, 0.0, fast=16.0, fast_left=1.0)) > 0.95
+    assert unknown_probability(Remains(0.0, 0.0)) == pytest.approx(LEAST, abs=0.01)
+    assert unknown_probability(
+        Remains(0.0, 0.0, fast=16.0, fast_left=1.0)) == pytest.approx(MOST, abs=0.05)
     # a wave that was fifty times as loud before is explained, but for its finer form
-    assert unknown_probability(Remains(0.0, 0.0, fast=16.0, fast_left=0.02)) < 0.05
+    assert unknown_probability(Remains(0.0, 0.0, fast=16.0, fast_left=0.02)) < LEAST + 0.05
 
 
 def test_one_sample_beside_its_edge_is_no_noise() -> None:
@@ -98,3 +101,12 @@ def test_one_effect_in_two_places_needs_less_proof_than_two_effects() -> None:
     pair = fitted(('motors.gain', 'axis.inertia'), 1000.0)
     assert rank([none, single, twins], 0.0)[0].candidate is twins
     assert rank([none, single, pair], 0.0)[0].candidate is single
+
+
+def test_what_is_far_below_the_noise_is_no_gap() -> None:
+    """A machine whose form differs from the model's by little raises no alarm."""
+    none = fitted((), 16000.0)
+    within = fitted(('motor.gain',), 16000.0 * (1.0 - 0.8 * DETECTABLE))
+    beyond = fitted(('motor.gain',), 16000.0 * (1.0 - 3.0 * DETECTABLE))
+    assert rank([none, within], 0.0)[0].candidate is none
+    assert rank([none, beyond], 0.0)[0].candidate is beyond

@@ -19,9 +19,11 @@ from antenna_drive.gap.catalogue import catalogue, Wave
 from antenna_drive.gap.field_test import CHANNELS, CURRENT_1, TACH_1, TACH_2, UNITS
 from antenna_drive.gap.model import Experiment
 from antenna_drive.gap.waves import likely_orders
+from antenna_drive.physics.harmonics import wave
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
+import pytest
 
 
 def experiment(seed: int) -> Experiment:
@@ -47,3 +49,15 @@ def test_planted_wave_is_found_beneath_a_slow_misfit_that_is_louder(order: int,
     residual = np.random.default_rng(seed).normal(size=test.measured.shape)
     residual[:, CURRENT_1] += 2.0 * np.sin(order * angle + 0.3) + 6.0 * np.sign(rate)
     assert float(order) in likely_orders(form, [test], [residual], 3)
+
+
+@given(st.lists(st.floats(-1e-3, 1e-3), min_size=7, max_size=7), st.floats(-0.5, 0.5))
+def test_wave_of_readings_is_that_of_the_physics(parts: list[float], angle: float) -> None:
+    """Sine and cosine parts on readings say what the settings of the record say to the physics."""
+    form = catalogue()['encoder.cyclic_error'].forms[0]
+    assert isinstance(form, Wave)
+    form = form.at(700.0)
+    value = {path.rpartition('cyclic_error')[2]: v for path, _, v in form.settings(*parts)}
+    assert form.along(np.array([angle]), parts)[0] == pytest.approx(wave(
+        angle, value[''], value['_second'], value['_third'], value['_cycles'], value['_phase'],
+        value['_second_phase'], value['_third_phase']), abs=1e-12)

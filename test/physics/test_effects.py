@@ -30,21 +30,26 @@ import pytest
 ANGLES = st.floats(-20.0, 20.0)
 
 
-@given(ANGLES, st.floats(0.1, 40.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
+PHASES = st.floats(-3.0, 3.0)
+
+
+@given(ANGLES, st.floats(0.1, 40.0), PHASES, PHASES, PHASES)
 def test_slope_of_a_wave_is_its_derivative(angle: float, cycles: float, phase: float,
-                                           second: float) -> None:
+                                           second: float, third: float) -> None:
     d = 1e-6 / cycles
-    here = [wave(angle + s * d, 0.7, 0.2, cycles, phase, second) for s in (-1.0, 1.0)]
-    slope = wave_slope(angle, 0.7, 0.2, cycles, phase, second)
+    here = [wave(angle + s * d, 0.7, 0.2, 0.1, cycles, phase, second, third)
+            for s in (-1.0, 1.0)]
+    slope = wave_slope(angle, 0.7, 0.2, 0.1, cycles, phase, second, third)
     assert slope == pytest.approx((here[1] - here[0]) / (2.0 * d), abs=1e-6 * cycles)
 
 
-def test_a_wave_holds_its_two_harmonics_and_nothing_else() -> None:
+def test_a_wave_holds_its_harmonics_and_nothing_else() -> None:
     turn = np.arange(64) * 2.0 * math.pi / 64
-    lines = np.fft.rfft([wave(a, 0.7, 0.2, 3.0, 0.4, 1.1) for a in turn]) / 32.0
+    lines = np.fft.rfft([wave(a, 0.7, 0.2, 0.1, 3.0, 0.4, 1.1, 0.6) for a in turn]) / 32.0
     assert abs(lines[3]) == pytest.approx(0.7)
     assert abs(lines[6]) == pytest.approx(0.2)
-    assert np.abs(np.delete(lines, [3, 6])).max() < 1e-12
+    assert abs(lines[9]) == pytest.approx(0.1)
+    assert np.abs(np.delete(lines, [3, 6, 9])).max() < 1e-12
 
 
 def test_crossover_swallows_what_it_is_said_to() -> None:
