@@ -28,15 +28,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field, replace
-import math
+from dataclasses import dataclass, field
 import time
 from typing import Any
 
-from antenna_drive.gap import residuals, unknown_input, verdict, where
+from antenna_drive.gap import unknown_input, verdict, where
 from antenna_drive.gap.drive_model import DriveModel
-from antenna_drive.gap.fit import Problem, pull_of, State
-from antenna_drive.gap.model import FloatArray, Model, Motion
+from antenna_drive.gap.fit import Problem, pull_of
+from antenna_drive.gap.how_far import how_far
+from antenna_drive.gap.model import Model
+from antenna_drive.gap.remains import remains, tests
 from antenna_drive.gap.search import Candidate, parameters_of, Search
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.recording import Recording
@@ -50,13 +51,6 @@ Progress = Callable[[float, str], None]
 # How many entries of `which` are given beside 'unknown' and 'none', and what is left out below.
 _ENTRIES = 12
 _LEAST = 1e-4
-_BLOCK_S = 1.0
-# A gap that is less than this share of the energy is none.
-_NO_GAP = 1e-3
-_TURNS = ('each recording in turn, with the effect as the others have it; offsets within the '
-          'tolerance were fitted to it, with the effect and without')
-_HALVES = 'the second half of the recording, predicted from the first'
-_RESAMPLES = 400
 # More numbers than these are not told one by one.
 _TOLD = 12
 
@@ -180,29 +174,49 @@ def diagnosed(model: Model, progress: Progress = lambda share, doing: None, thre
 def _diagnosed(model: Model, progress: Progress, threads: int,
                notes: Sequence[str]) -> Diagnosis:
     began = time.monotonic()
-    problem = Problem(model)
-    search = Search(problem, lambda share, doing: progress(0.9 * share, doing), threads)
+    search = Search(Problem(model), lambda share, doing: progress(0.9 * share, doing), threads)
     candidates = search.run()
-    problem = search.whole
-    model = problem.model
+    # the noise is that of the motion which was found
+    problem, model = search.whole, search.whole.model
     none = candidates[0]
     # what is left is judged after a fit that has converged; the ranking compares like with like
     best = search.polished(verdict.best(candidates))
-    excess = _excess(problem, best.state)
-    raw = problem.residuals([{}])[0]
-    left = _left(problem, raw, best)
     progress(0.9, 'how far it goes')
-    how_far = _how_far(problem, none, best)
-    loudest, fast, fast_left = _fast(problem, raw, best)
-    point = best.state.point()
-    unknown = verdict.unknown_probability(verdict.Remains(
-        excess, left, fast, fast_left,
-        max((form.strangeness(point) for form in best.forms), default=0.0),
-        how_far['explained_fraction']['ci95'][1]))
+    reach = how_far(problem, none, best)
+    left = remains(problem, best, reach['explained_fraction']['ci95'][1])
+    unknown = verdict.unknown_probability(left)
     ranked = verdict.rank(candidates, unknown)
+    entries = _entries(ranked, unknown)
+    word = _word(entries[0]['effects'], unknown)
+    motions = [model.motion(k) for k in range(len(model.experiments))]
+    places: Sequence[unknown_input.Place] = ()
+    if word in ('unknown_effect', 'partly_explained'):
+        progress(0.95, 'where something unknown may have entered')
+        lies, places = where.of_the_unknown(problem, model, none.state, left.loudest, left.fast)
+    if word != 'unknown_effect':
+        lies = where.of_effects(problem, model, ranked, none.state, best.state)
+    result = {
+        'verdict': word,
+        'where': lies,
+        'which': entries,
+        'confusable': verdict.confusable(candidates) if best.effects else [],
+        'how_far': reach,
+        'residual_tests': tests(problem, best.state, left, motions),
+        'may_enter_at': [vars(place) for place in places if place.evidence > 0.0],
+        'seconds': time.monotonic() - began,
+        'notes': list(notes),
+    }
+    progress(1.0, 'done')
+    return Diagnosis(result, model, none, best, candidates, notes)
+
+
+def _entries(ranked: Sequence[verdict.Ranked], unknown: float) -> list[dict[str, Any]]:
+    """Return the likeliest hypotheses for the JSON, 'none' and 'unknown' among them."""
     entries: list[dict[str, Any]] = []
+    likeliest = set(ranked[0].candidate.effects)
     for item in ranked[:_ENTRIES]:
-        if item.probability >= _LEAST or item is ranked[0] or not item.candidate.effects:
+        # a pair's members alone, and nothing, are told however improbable they are
+        if item.probability >= _LEAST or set(item.candidate.effects) <= likeliest:
             entries.append({'effects': list(item.candidate.effects) or ['none'],
                             'probability': item.probability,
                             'parameters': _parameters(item.candidate)})
@@ -213,28 +227,7 @@ def _diagnosed(model: Model, progress: Progress, threads: int,
     total = sum(entry['probability'] for entry in entries)
     for entry in entries:
         entry['probability'] /= total
-    entries.sort(key=lambda entry: -entry['probability'])
-    word = _word(entries[0]['effects'], unknown)
-    motions = [model.motion(k) for k in range(len(model.experiments))]
-    places: Sequence[unknown_input.Place] = ()
-    if word in ('unknown_effect', 'partly_explained'):
-        progress(0.95, 'where something unknown may have entered')
-        lies, places = where.of_the_unknown(problem, model, none.state, loudest, fast)
-    if word != 'unknown_effect':
-        lies = where.of_effects(problem, model, ranked, none.state, best.state)
-    result = {
-        'verdict': word,
-        'where': lies,
-        'which': entries,
-        'confusable': verdict.confusable(candidates) if best.effects else [],
-        'how_far': how_far,
-        'residual_tests': _tests(problem, best.state, excess, left, motions),
-        'may_enter_at': [vars(place) for place in places if place.evidence > 0.0],
-        'seconds': time.monotonic() - began,
-        'notes': list(notes),
-    }
-    progress(1.0, 'done')
-    return Diagnosis(result, model, none, best, candidates, notes)
+    return sorted(entries, key=lambda entry: -entry['probability'])
 
 
 def _word(top: list[str], unknown: float) -> str:
@@ -243,80 +236,6 @@ def _word(top: list[str], unknown: float) -> str:
     if top == ['unknown']:
         return 'unknown_effect'
     return 'explained' if unknown < 0.3 else 'partly_explained'
-
-
-def _excess(problem: Problem, state: State) -> float:
-    """
-    Return how much of the residual is no noise: the mean over tests and signals.
-
-    Beyond what white noise of the same fast part would give, so that a sensor noisier than its
-    sheet says raises no alarm; outliers are clipped.
-    """
-    found = []
-    for k, experiment in enumerate(problem.experiments):
-        z = np.clip(problem.shaped(state, k), -6.0, 6.0)
-        # at rest the encoder's residual is a fraction of one step, and no noise at all
-        found += [residuals.structure(z[:, c]) for c, channel in enumerate(experiment.channels)
-                  if channel not in experiment.coarse and np.isfinite(z[:, c]).sum() > 50]
-    return float(np.mean(np.maximum(found, -0.5))) if found else 0.0
-
-
-def _left(problem: Problem, raw: FloatArray, best: Candidate) -> float:
-    """Return the share of the raw gap above the noise that the best candidate leaves."""
-    noise = 0.0
-    energy = np.zeros(2)
-    for k, experiment in enumerate(problem.experiments):
-        z = problem.shaped(best.state, k)
-        first = raw[problem.rows(k)].reshape(experiment.measured.shape)
-        for c in range(len(experiment.channels)):
-            if experiment.channels[c] in experiment.coarse or not np.isfinite(z[:, c]).any():
-                continue
-            white = 0.5 * float(np.nanmean(np.diff(z[:, c]) ** 2))
-            energy += [min(float(np.nanmean(z[:, c] ** 2)), 1e6) - white,
-                       min(float(np.mean(first[:, c] ** 2)), 1e6) - white]
-            noise += white
-    return float(np.clip(energy[0] / max(energy[1], 0.05 * noise), 0.0, 1.0))
-
-
-def _fast(problem: Problem, raw: FloatArray, best: Candidate) -> tuple[str, float, float]:
-    """
-    Return the signal whose fast part is the loudest, how loud, and what share was there before.
-
-    In the variance of its sensor's noise, the mean over the tests.
-    """
-    signal, loudest, share = '', 0.0, 1.0
-    for c, channel in enumerate(problem.experiments[0].channels):
-        pairs = []
-        for k, experiment in enumerate(problem.experiments):
-            z = problem.shaped(best.state, k)[:, c]
-            if np.isfinite(z).sum() < 50:
-                continue
-            first = raw[problem.rows(k)].reshape(experiment.measured.shape)[:, c]
-            # a coarse reading at rest is a fraction of a step off, slow or fast, and never more
-            loud = residuals.power if channel in experiment.coarse else residuals.fast
-            pairs.append([loud(z), loud(first)])
-        if pairs:
-            now, before = np.mean(pairs, axis=0)
-            if now > loudest:
-                signal, loudest = channel, float(now)
-                share = float(np.clip((now - 1.0) / max(before - 1.0, 1e-3), 0.0, 1.0))
-    return signal, loudest, share
-
-
-def _tests(problem: Problem, state: State, excess: float, left: float,
-           motions: Sequence[Motion]) -> dict[str, Any]:
-    signals: dict[str, Any] = {}
-    zs = [problem.shaped(state, k) for k in range(len(problem.experiments))]
-    for c, channel in enumerate(problem.experiments[0].channels):
-        z = np.concatenate([part[:, c] for part in zs])
-        if np.isfinite(z).any():
-            signals[channel] = {
-                'rms': float(np.sqrt(np.nanmean(z ** 2))),
-                'slow_excess': float(np.mean([residuals.structure(part[:, c]) for part in zs])),
-                'greatest_correlation': max(residuals.correlation(part[:, c]) for part in zs),
-            }
-    return {'excess_over_noise': excess, 'share_left': left, 'signals': signals,
-            'depends_on': residuals.dependences(problem.experiments, motions, zs)}
 
 
 def _parameters(candidate: Candidate) -> dict[str, Any]:
@@ -336,101 +255,3 @@ def _parameters(candidate: Candidate) -> dict[str, Any]:
                                      min(value + wide, parameter.high)],
             'unit': parameter.unit}
     return found
-
-
-# -- how far --------------------------------------------------------------------------------------
-
-def _how_far(problem: Problem, none: Candidate, best: Candidate) -> dict[str, Any]:
-    """Return the gap before and after, on data that the fits have not seen."""
-    count = len(problem.experiments)
-    channels = problem.experiments[0].channels
-    none, best = (replace(c, state=problem.start(c.state.parameters, c.state.point()))
-                  if c.state.jacobian.size == 0 else c for c in (none, best))
-    before, after = [], []
-    for k in range(count):
-        unseen = [_unseen(problem, candidate, k) for candidate in (none, best)]
-        before.append(unseen[0])
-        after.append(unseen[1] if best.effects else unseen[0])
-    floor = 1.0
-    seen = [np.isfinite(z).sum() for z in before]
-    energy = [float(np.nansum(np.concatenate([np.ravel(z) for z in part]) ** 2) / sum(seen))
-              for part in (before, after)]
-    fraction: float | None = None
-    interval: list[float | None] = [None, None]
-    if best.effects:
-        sums = [_blocks(problem.experiments[k].time, before[k], after[k]) for k in range(count)]
-        blocks = np.concatenate(sums)
-        fraction = _fraction(blocks.sum(axis=0))
-        random = np.random.default_rng(0)
-        draws = [_fraction(blocks[random.integers(0, len(blocks), len(blocks))].sum(axis=0))
-                 for _ in range(_RESAMPLES)]
-        interval = [float(np.quantile(draws, 0.025)), float(np.quantile(draws, 0.975))]
-    per_signal = {}
-    for c, channel in enumerate(channels):
-        pair = [np.concatenate([z[:, c] for z in part]) for part in (before, after)]
-        if np.isfinite(pair[0]).any():
-            per_signal[channel] = {'before': float(np.sqrt(np.nanmean(pair[0] ** 2))),
-                                   'after': float(np.sqrt(np.nanmean(pair[1] ** 2)))}
-    return {'before': math.sqrt(energy[0]), 'after': math.sqrt(energy[1]), 'noise_floor': floor,
-            'explained_fraction': {'value': fraction, 'ci95': interval},
-            'per_signal': per_signal,
-            'held_out': _TURNS if count > 1 else _HALVES}
-
-
-def _unseen(problem: Problem, candidate: Candidate, k: int) -> FloatArray:
-    """Return the residuals of an experiment that the machine's parameters were not fitted to."""
-    experiments = problem.experiments
-    used = [np.full(e.time.size, i != k) for i, e in enumerate(experiments)]
-    half = experiments[k].time[-1] / 2.0
-    if len(experiments) == 1:
-        used[0] = experiments[0].time < half
-    training = Problem(problem.model, used)
-    state = candidate.state
-    fitted = training.start(state.parameters, state.point(), state.jacobian)
-    fitted = training.fit(fitted, 6)
-    if len(experiments) > 1:
-        # The effect is as the other tests have it. Offsets within the tolerance are no part of
-        # it: they are fitted to the withheld test alone, with the effect and without.
-        effects = {p.name for form in candidate.forms for p in form.parameters
-                   if p.experiment != k}
-        own = [j for j, p in enumerate(fitted.parameters) if p.name not in effects]
-        values = fitted.point()
-        fixed = {name: values[name] for name in effects}
-        testing = _Held(problem.model, [np.full(e.time.size, i == k)
-                                        for i, e in enumerate(experiments)], fixed)
-        parts = [fitted.parameters[j] for j in own]
-        here = testing.start(parts, values, state.jacobian[:, own])
-        fitted = testing.fit(here, 6)
-        return testing.shaped(fitted, k)
-    whole = problem.shaped(problem.start(state.parameters, fitted.point(), state.jacobian), k)
-    whole[used[0]] = np.nan
-    return whole
-
-
-class _Held(Problem):
-    """A problem some of whose parameters are held."""
-
-    def __init__(self, model: Model, used: Sequence[Any], fixed: dict[str, float]) -> None:
-        super().__init__(model, used)
-        self._fixed = fixed
-
-    def residuals(self, points: Sequence[dict[str, float]],
-                  alone: int | None = None) -> list[FloatArray]:
-        return super().residuals([{**self._fixed, **point} for point in points], alone)
-
-
-def _blocks(time_s: FloatArray, before: FloatArray, after: FloatArray) -> FloatArray:
-    """Return energy before, after and of noise in each block of a second, shape (blocks, 3)."""
-    block = (time_s / _BLOCK_S).astype(int)
-    count = int(block[-1]) + 1
-    columns = [np.nansum(before ** 2, axis=1), np.nansum(after ** 2, axis=1),
-               np.isfinite(before).sum(axis=1)]
-    return np.column_stack([np.bincount(block, column, minlength=count) for column in columns])
-
-
-def _fraction(sums: FloatArray) -> float:
-    """Return the explained share of the energy above the noise, at most 1; 0 of nothing."""
-    before, after, floor = sums
-    # a floor above what is left would explain more than all
-    gap = before - min(floor, after)
-    return float((before - after) / gap) if gap > _NO_GAP * before else 0.0

@@ -230,6 +230,12 @@ class Problem:
         weight = robust_weight(residual, self.valid)
         return _state(tuple(parameters), x, residual, jacobian, weight)
 
+    def begun(self, known: Sequence[Parameter], columns: NDArray[np.float32],
+              others: Sequence[Parameter], point: dict[str, float]) -> State:
+        """Begin a fit at a point; derivatives by `known` are given, by the others taken."""
+        fresh = self.columns(point, others, self.residuals([point])[0], central=True)
+        return self.start((*known, *others), point, np.column_stack([columns, fresh]))
+
     def refreshed(self, state: State, central: bool = True) -> State:
         """Return the state with fresh derivatives and weights."""
         jacobian = self.columns(state.point(), state.parameters, state.residual, central)

@@ -56,6 +56,8 @@ REACH = 250.0
 # Beyond this residual, in standard deviations, something strong is missing; below it, the noise
 # is the sensors'.
 FAR = 1.5
+# A reading that is so many standard deviations off, in such a share of its samples, is no chance.
+ODD, OFTEN = 5.0, 0.01
 # The noise is set down when so little of it is left.
 SHARPER = 0.7
 # A single effect that leaves more than this, in standard deviations, may have a partner.
@@ -313,12 +315,9 @@ class Search:
             value = point.pop(p.name)
             point.update({part.name: value for part in own})
         kept = [j for j, p in enumerate(state.parameters) if p not in whole]
-        own_parts = [p for form in forms for p in form.parameters]
-        residual = self.problem.residuals([point])[0]
-        columns = self.problem.columns(point, own_parts, residual, central=True)
-        start = self.problem.start(
-            (*(state.parameters[j] for j in kept), *own_parts), point,
-            np.column_stack([state.jacobian[:, kept], columns]))
+        start = self.problem.begun(
+            [state.parameters[j] for j in kept], state.jacobian[:, kept],
+            [p for form in forms for p in form.parameters], point)
         return [Candidate(effect.parts, forms, self.problem.fit(start, 8))]
 
     def _fitted(self, base: Candidate, tangent: _Tangent, fresh: bool, turns: int) -> Candidate:
@@ -344,7 +343,7 @@ class Search:
         screened = self._screen(none.state)
         found = self._sorted(lambda item: self._fitted(none, item[1], False, 5),
                              screened[:SINGLES])
-        if self.problem.scale > 1.0:
+        if self.problem.scale > 1.0 or self._lost(none.state):
             found += self._sorted(lambda item: self._from_afar(none, *item),
                                   self._scanned(none.state))
             found.sort(key=lambda c: c.priced)
@@ -354,6 +353,16 @@ class Search:
         leading[:2] = self._sorted(self._settled, leading[:2])
         leading.sort(key=lambda c: c.priced)
         return [*leading[:BASES], *(_light(c) for c in leading[BASES:])]
+
+    def _lost(self, state: State) -> bool:
+        """
+        Tell whether some reading is far off now and then.
+
+        What is at work for moments only, like a limit, may have no derivative where a fit begins.
+        """
+        return any(float(np.mean(np.abs(z) > ODD)) > OFTEN for residual, e in zip(
+            self._residuals(state), self.problem.experiments, strict=True)
+            for z in (residual / e.noise).T)
 
     def _scanned(self, state: State, besides: Sequence[str] = (),
                  ) -> list[tuple[_Tangent, float]]:
@@ -399,11 +408,8 @@ class Search:
         """Fit an effect on top of a candidate, from a value far away."""
         form, problem = tangent.form, self.problem
         name = next(p.name for p in form.parameters if not p.shape)
-        point = {**base.state.point(), **starts(form), name: value}
-        columns = problem.columns(point, form.parameters, problem.residuals([point])[0],
-                                  central=True)
-        state = problem.start((*base.state.parameters, *form.parameters), point,
-                              np.column_stack([base.state.jacobian, columns]))
+        state = problem.begun(base.state.parameters, base.state.jacobian, form.parameters,
+                              {**base.state.point(), **starts(form), name: value})
         return Candidate((*base.effects, tangent.effect), (*base.forms, form),
                          problem.fit(state, 8))
 
@@ -517,14 +523,12 @@ class Search:
     def _refitted(self, problem: Problem, candidate: Candidate, taken: _Derivatives,
                   turns: int) -> Candidate:
         """Fit a candidate to another problem, with derivatives that were taken for several."""
-        point = candidate.state.point()
-        residual = problem.residuals([point])[0]
-        columns = [taken.free[form.name] if form.name in taken.free else
-                   problem.columns(point, form.parameters, residual, central=True)
-                   for form in candidate.forms]
-        own = [p for form in candidate.forms for p in form.parameters]
-        state = problem.start((*self.model.nuisances, *own), point,
-                              np.column_stack([taken.offsets, *columns]))
+        free = [form for form in candidate.forms if form.name in taken.free]
+        state = problem.begun(
+            (*self.model.nuisances, *(p for form in free for p in form.parameters)),
+            np.column_stack([taken.offsets, *(taken.free[form.name] for form in free)]),
+            [p for form in candidate.forms if form not in free for p in form.parameters],
+            candidate.state.point())
         return replace(candidate, state=problem.fit(state, turns))
 
 

@@ -121,6 +121,7 @@ class Remains:
     strangeness : of the effects' values, see `Form.strangeness`
     explained : upper end of the interval of what its effects explain of a test that they were not
         fitted to; None without effects
+    loudest : signal whose fast part is the loudest
 
     """
 
@@ -130,6 +131,7 @@ class Remains:
     fast_left: float = 1.0
     strangeness: float = 0.0
     explained: float | None = None
+    loudest: str = ''
 
 
 def unknown_probability(remains: Remains) -> float:

@@ -29,7 +29,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 FakeCommand = Callable[[str], None]
 MODULE = """\
-import signal
+import time
 
 def add_arguments(parser):
     pass
@@ -172,7 +172,8 @@ def test_faults_of_ours_are_not_hidden(fake: FakeCommand) -> None:
 
 def test_interrupt(tmp_path: Path) -> None:
     """Ctrl-C ends a command with one line and the exit code that shells give it."""
-    process = start(tmp_path, 'print("ready", flush=True); signal.pause()')
+    # signal.pause() would wait for a second signal, had the first come just before it
+    process = start(tmp_path, 'print("ready", flush=True)\n    while True: time.sleep(0.05)')
     assert process.stdout is not None
     assert process.stdout.readline() == 'ready\n'
     process.send_signal(signal.SIGINT)
