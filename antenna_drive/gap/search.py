@@ -56,8 +56,6 @@ REACH = 250.0
 # Beyond this residual, in standard deviations, something strong is missing; below it, the noise
 # is the sensors'.
 FAR = 1.5
-# A reading that is so many standard deviations off, in such a share of its samples, is no chance.
-ODD, OFTEN = 5.0, 0.01
 # The noise is set down when so little of it is left.
 SHARPER = 0.7
 # A single effect that leaves more than this, in standard deviations, may have a partner.
@@ -343,7 +341,7 @@ class Search:
         screened = self._screen(none.state)
         found = self._sorted(lambda item: self._fitted(none, item[1], False, 5),
                              screened[:SINGLES])
-        if self.problem.scale > 1.0 or self._lost(none.state):
+        if self.problem.scale > 1.0:
             found += self._sorted(lambda item: self._from_afar(none, *item),
                                   self._scanned(none.state))
             found.sort(key=lambda c: c.priced)
@@ -353,16 +351,6 @@ class Search:
         leading[:2] = self._sorted(self._settled, leading[:2])
         leading.sort(key=lambda c: c.priced)
         return [*leading[:BASES], *(_light(c) for c in leading[BASES:])]
-
-    def _lost(self, state: State) -> bool:
-        """
-        Tell whether some reading is far off now and then.
-
-        What is at work for moments only, like a limit, may have no derivative where a fit begins.
-        """
-        return any(float(np.mean(np.abs(z) > ODD)) > OFTEN for residual, e in zip(
-            self._residuals(state), self.problem.experiments, strict=True)
-            for z in (residual / e.noise).T)
 
     def _scanned(self, state: State, besides: Sequence[str] = (),
                  ) -> list[tuple[_Tangent, float]]:
