@@ -192,9 +192,9 @@ def _diagnosed(model: Model, progress: Progress, threads: int,
     places: Sequence[unknown_input.Place] = ()
     if word in ('unknown_effect', 'partly_explained'):
         progress(0.95, 'where something unknown may have entered')
-        lies, places = where.of_the_unknown(problem, model, none.state, left.loudest, left.fast)
+        lies, places = where.of_the_unknown(problem, none.state, left.loudest, left.fast)
     if word != 'unknown_effect':
-        lies = where.of_effects(problem, model, ranked, none.state, best.state)
+        lies = where.of_effects(problem, ranked, none.state, best.state)
     result = {
         'verdict': word,
         'where': lies,

@@ -25,7 +25,7 @@ from typing import Any
 
 from antenna_drive.gap import residuals, unknown_input
 from antenna_drive.gap.fit import Problem, State
-from antenna_drive.gap.model import FloatArray, Model
+from antenna_drive.gap.model import FloatArray
 from antenna_drive.gap.verdict import NOISIER, Ranked
 import numpy as np
 
@@ -38,7 +38,7 @@ _EVIDENCE = 20.0
 Entry = dict[str, Any]
 
 
-def of_effects(problem: Problem, model: Model, ranked: Sequence[Ranked], none: State,
+def of_effects(problem: Problem, ranked: Sequence[Ranked], none: State,
                best: State) -> list[Entry]:
     """
     Return where the effects of a verdict lie, the largest share first.
@@ -47,8 +47,6 @@ def of_effects(problem: Problem, model: Model, ranked: Sequence[Ranked], none: S
     ----------
     problem
         the model against its experiments
-    model
-        of the machine
     ranked
         the candidates with their probabilities
     none, best
@@ -58,13 +56,13 @@ def of_effects(problem: Problem, model: Model, ranked: Sequence[Ranked], none: S
     parts: dict[str, float] = {}
     for item in ranked:
         for effect in item.candidate.effects:
-            part = model.effects[effect].component
+            part = problem.model.effects[effect].component
             parts[part] = parts.get(part, 0.0) + item.probability / len(item.candidate.effects)
-    return _entries(problem, model, parts, lambda k: problem.shaped(none, k) ** 2
+    return _entries(problem, parts, lambda k: problem.shaped(none, k) ** 2
                     - problem.shaped(best, k) ** 2)
 
 
-def of_the_unknown(problem: Problem, model: Model, none: State, loudest: str,
+def of_the_unknown(problem: Problem, none: State, loudest: str,
                    loudness: float) -> tuple[list[Entry], list[unknown_input.Place]]:
     """
     Return where something lies that no effect names, and where it may have entered.
@@ -73,8 +71,6 @@ def of_the_unknown(problem: Problem, model: Model, none: State, loudest: str,
     ----------
     problem
         the model against its experiments
-    model
-        of the machine
     none
         where the fit ended without any effect
     loudest, loudness
@@ -82,17 +78,17 @@ def of_the_unknown(problem: Problem, model: Model, none: State, loudest: str,
         too fast for a pulse shows in one reading, and lies there
 
     """
-    found = unknown_input.places(Problem(model.brief()), none.point())
+    found = unknown_input.places(Problem(problem.model.brief()), none.point())
     if found[0].evidence > _EVIDENCE:
         parts = unknown_input.components(found)
     elif loudness > NOISIER:
         parts = {loudest: 1.0}
     else:
         return [], found
-    return _entries(problem, model, parts, lambda k: problem.shaped(none, k) ** 2 - 1.0), found
+    return _entries(problem, parts, lambda k: problem.shaped(none, k) ** 2 - 1.0), found
 
 
-def _entries(problem: Problem, model: Model, parts: Mapping[str, float],
+def _entries(problem: Problem, parts: Mapping[str, float],
              energy: Callable[[int], FloatArray]) -> list[Entry]:
     """Return the shares of parts, signals and regimes, given the energy of each sample."""
     total = sum(parts.values())
@@ -100,7 +96,7 @@ def _entries(problem: Problem, model: Model, parts: Mapping[str, float],
         return []
     shares: dict[tuple[str, str], float] = {}
     for k, experiment in enumerate(problem.experiments):
-        regime = residuals.regimes(experiment, model.motion(k))
+        regime = residuals.regimes(experiment, problem.model.motion(k))
         sample = np.nan_to_num(energy(k))
         for c, channel in enumerate(experiment.channels):
             for r, name in enumerate(residuals.REGIMES):

@@ -23,6 +23,7 @@ from antenna_drive.gap.catalogue import catalogue, DriveParameter, Wave
 from antenna_drive.gap.confusability import BUILT_IN, planned
 from antenna_drive.gap.drive_model import DriveModel
 from antenna_drive.gap.excitation import Bias, Longest, schedule, SheetCommand
+from antenna_drive.gap.field_test import TACH_1
 from antenna_drive.gap.search import starts
 from antenna_drive.parameters import load
 from antenna_drive.parameters.records import record_of
@@ -93,6 +94,37 @@ def test_effect_changes_some_reading(model: Any, effect: Any) -> None:
             sum(model.simulate(points), []), 2 * reference, strict=True))
     # this short test does not saturate, a limit set higher does not show
     assert changed_one or effect.id.endswith('current_limit')
+
+
+@pytest.mark.parametrize('name', ['motor_1.current_limit.change', 'motors.torque_constant.change',
+                                  'motor_2.armature_resistance.change'])
+def test_effect_knows_by_how_much_its_number_may_be_off_anyway(model: Any, name: str) -> None:
+    """Whether a number is scaled or added to, and whatever else it moves with."""
+    resistance = load().motor_2.armature.resistance
+    expected = model.tolerance * (resistance if 'resistance' in name else 1.0)
+    found = {p.name: p.tolerance for effect in model.effects.values()
+             for form in effect.forms for p in form.parameters}
+    assert found[name] == pytest.approx(expected)
+    assert found['motor_1.viscous_friction.torque_per_rate'] == 0.0
+
+
+def test_time_stamps_err_more_on_what_is_faster(model: Any) -> None:
+    """The noise of a reading that ripples is the sheet's and the ripple's slope times jitter."""
+    form = model.effects['tach_1.ripple'].forms[0].at(3.0)
+    model.register(form)
+    point = {**starts(form), form.parameters[0].name: 0.2}
+    quiet, loud = model.experiments, model.heard_at(point).experiments
+    late = 1e-6
+    for k, (test, before, after) in enumerate(zip(model._tests, quiet, loud, strict=True)):
+        shifted = model.simulate([point, {**point, f'clock:{test.name}': late}])
+        slope = (shifted[1][k] - shifted[0][k])[:, TACH_1] / late
+        more = after.noise[:, TACH_1] ** 2 - (test.jitter * slope) ** 2
+        rate = shifted[0][k][:, TACH_1]
+        sheet = test.sensors
+        assert more == pytest.approx(sheet.tach_noise ** 2 + sheet.tach_step ** 2 / 12.0
+                                     + (sheet.tach_relative * rate) ** 2, rel=1e-6)
+        assert after.noise[:, TACH_1].max() > before.noise[:, TACH_1].max()
+        assert after.measured is before.measured
 
 
 def test_every_field_of_the_catalogue_is_one_of_the_record() -> None:
