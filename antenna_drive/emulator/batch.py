@@ -31,6 +31,7 @@ from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.physics import motor_drive, structure, torque_share
 from antenna_drive.physics.compiling import compiled, inner, shared
 from antenna_drive.physics.integrator import located_runge_kutta, work_space
+from antenna_drive.physics.motor import ammeter, tachometer
 import numpy as np
 from numpy.typing import NDArray
 
@@ -107,7 +108,26 @@ def _switch(t, x, mode, u, p, commit):  # type: ignore[no-untyped-def]
     return changed
 
 
-_advance = located_runge_kutta(_rates, _switch)
+# What acts on the whole drive from outside is no faster than its states, but for jumps of the
+# command: what they switch is located just behind them.
+_advance = located_runge_kutta(_rates, _switch, inputs_jump=False)
+
+
+@inner
+def _read(x, dx, mode, drive, out):  # type: ignore[no-untyped-def]
+    """Write what the sensors say, and how fast it changes, at a state and its derivative."""
+    for m in range(2):
+        first = _M1 if m == 0 else _M2
+        p = drive.motor_1 if m == 0 else drive.motor_2
+        current, rate = first + motor_drive.CURRENT, first + motor_drive.RATE
+        out[m, 0] = ammeter(x[current], p.ammeter)
+        out[m, 1] = p.ammeter.gain * dx[current]
+        out[2 + m, 0] = tachometer(x[rate], x[first + motor_drive.ANGLE], p.tachometer)
+        out[2 + m, 1] = p.tachometer.gain * dx[rate]
+    out[4, 0] = structure.encoder(x[_PLANT + structure.ANGLE], drive.plant.encoder)
+    out[4, 1] = x[_PLANT + structure.RATE]
+    out[5, 0], out[5, 1] = torque_share.voltmeter(
+        x[_SHARE:_PLANT], mode[_MODE_SHARE:_MODE_PLANT], drive.torque_share.torque_share)
 
 
 @compiled
@@ -134,23 +154,7 @@ def _run(  # type: ignore[no-untyped-def]
             continue
         t = steps[k, LENGTH] if k >= 0 else 0.0
         _rates(t, x, mode, u, drive, dx)
-        for m in range(2):
-            if m == 0:
-                motor_drive.outputs(x[:_M2], mode[:_MODE_2], motor, 0.0, drive.motor_1, y_motor)
-            else:
-                motor_drive.outputs(x[_M2:_SHARE], mode[_MODE_2:_MODE_SHARE], motor, 0.0,
-                                    drive.motor_2, y_motor)
-            out[row, m, 0] = y_motor[4, 0]
-            out[row, m, 1] = y_motor[4, 1]
-            out[row, 2 + m, 0] = y_motor[3, 0]
-            out[row, 2 + m, 1] = y_motor[3, 1]
-        structure.outputs(x[_PLANT:], mode[_MODE_PLANT:], plant, 0.0, drive.plant, y_plant)
-        out[row, 4, 0] = y_plant[2, 0]
-        out[row, 4, 1] = y_plant[2, 1]
-        torque_share.outputs(x[_SHARE:_PLANT], mode[_MODE_SHARE:_MODE_PLANT], share, 0.0,
-                             drive.torque_share, y_share)
-        out[row, 5, 0] = y_share[1, 0]
-        out[row, 5, 1] = y_share[1, 1]
+        _read(x, dx, mode, drive, out[row])
 
 
 @dataclass(frozen=True)
@@ -198,9 +202,10 @@ def run(record: np.ndarray[Any, np.dtype[Any]], schedule: Schedule) -> FloatArra
     """
     states = _PLANT + structure.states(int(record[0]['plant']['axis']['mode_inertias_count']))
     out = np.empty((schedule.rows, len(CHANNELS), 2))
-    record = record.copy()
+    numbers = record.view(np.float64).copy()
+    record = numbers.view(record.dtype)
     record['torque_share']['torque_share']['fixed_voltage'] = schedule.steps[0, FIXED_BIAS]
-    _run(record, record.view(np.float64), schedule.changing, schedule.steps, schedule.keep,
+    _run(record, numbers, schedule.changing, schedule.steps, schedule.keep,
          np.zeros(states), np.zeros(states), np.zeros(_MODES, np.int64),
          np.zeros((motor_drive.INPUTS, 2)), np.zeros((torque_share.INPUTS, 2)),
          np.zeros((structure.INPUTS, 2)), work_space(states),

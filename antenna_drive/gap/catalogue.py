@@ -102,6 +102,8 @@ def _parameter(name: str, unit: str, low: float, high: float, step: float, how: 
 MOTORS: Mapping[str, tuple[str, ...]] = {
     'motor_1': ('motor_1',), 'motor_2': ('motor_2',), 'motors': ('motor_1', 'motor_2'),
 }
+# Bounds and step of a flow index: grease thins as it is sheared, windage grows with the square.
+_FLOW = (0.5, 2.0, 0.02)
 MOTOR_ORDERS = tuple(float(k) for k in range(1, 49))
 
 
@@ -147,10 +149,11 @@ def _motor_effects(into: _Catalogue, component: str, paths: tuple[str, ...]) -> 
     def one(name: str, cause: str, look: str, *parts: DriveParameter, form: str = '') -> None:
         into.add(component, name, cause, look, _form(f'{component}.{name}', *parts, name=form))
 
-    one('viscous_friction', 'lubricant or seals drag in proportion to the rate',
+    one('viscous_friction', 'lubricant or seals drag the more, the faster the motor turns',
         'current grows with the rate, in both directions',
         _parameter('torque_per_rate', 'N m s/rad', 0.0, 0.5, 2e-3, ADD,
-                   *at('motor.viscous_friction')))
+                   *at('motor.viscous_friction')),
+        _parameter('flow_index', '1', *_FLOW, SET, *at('motor.flow_index'), start=1.0))
     key = f'{component}.stribeck_friction'
     into.add(component, 'stribeck_friction',
              'the lubricating film breaks down at creep and friction rises',
@@ -285,7 +288,8 @@ def _axis_effects(into: _Catalogue) -> None:
         _parameter('change', '1', -0.9, 3.0, 5e-3, SCALE, f'{path}.coulomb_torque'))
     one('viscous_friction', 'cold grease', 'both currents grow with the rate',
         _parameter('torque_per_rate', 'N m s/rad', 0.0, 1e9, 1e5, ADD,
-                   f'{path}.viscous_friction'))
+                   f'{path}.viscous_friction'),
+        _parameter('flow_index', '1', *_FLOW, SET, f'{path}.flow_index', start=1.0))
     into.add('axis', 'stribeck_friction', 'the film of the axis bearing breaks down at creep',
              'stick-slip of the axis, both currents rise close to standstill',
              *(_form('axis.stribeck_friction', _parameter(

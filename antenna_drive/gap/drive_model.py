@@ -16,7 +16,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 import copy
 from dataclasses import dataclass, replace
@@ -44,9 +44,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 LONGEST_STEP = 2.5e-3
-# A search looks at so much of a test [s], with longer steps.
+# A search looks at so much of a test [s]; it and derivatives take longer steps, whose error is a
+# tenth of the noise.
 BRIEF_S = 15.0
-BRIEF_LONGEST_STEP = 3.4e-3
+ROUGH_STEP = 5.3e-3
 # A wave of the motors' angle turns by no more than this in a step [rad], however short [s].
 WAVE_STEP = 0.9
 SHORTEST_STEP = 7e-4
@@ -54,9 +55,13 @@ SHORTEST_STEP = 7e-4
 COARSER = 1.3
 # How many cycles per revolution are tried of each wave.
 _WAVES = 3
+# Hysteresis runs in faster than long steps can follow.
+_STIFF = ('hysteresis', 'hysteresis_share')
 # The mode that the record has room for and the configuration has not.
 _EXTRA = 3
 _CACHE = 120
+# How many tables of steps are kept: a test has one for each bias voltage and each wave.
+_PLANS = 24
 # A gust's torque is smooth; within so much time it may be a straight line [s].
 _GUST_S = 0.02
 
@@ -98,11 +103,12 @@ class DriveModel:
         self._cache: OrderedDict[_Job, FloatArray] = OrderedDict()
         self._lock = Lock()
         self._longest_step = LONGEST_STEP
+        self._rougher: DriveModel | None = None
         self.notes: list[str] = []
         self.runs = 0
         self._tests = [prepared(name, recording, drive, self.notes.append)
                        for name, recording in recordings.items()]
-        self._plans: dict[tuple[int, float], batch.Schedule] = {}
+        self._plans: OrderedDict[tuple[int, Longest, Bias], batch.Schedule] = OrderedDict()
         for test in self._tests:
             test.record['plant']['axis']['mode_frequencies'][0, _EXTRA] = 1.0
         given = [recording.sheet.parameter_tolerance for recording in recordings.values()
@@ -152,8 +158,8 @@ class DriveModel:
         """Return the model with as much of each test as a search needs; a chirp stays whole."""
         other = copy.copy(self)
         other._cache = OrderedDict()
-        other._plans = {}
-        other._longest_step = BRIEF_LONGEST_STEP
+        other._plans = OrderedDict()
+        other._longest_step = ROUGH_STEP
         other._tests = [test.until(BRIEF_S if test.repeats else math.inf)
                         for test in self._tests]
         sizes = [test.time.size for test in other._tests]
@@ -161,6 +167,17 @@ class DriveModel:
             replace(e, time=e.time[:n], measured=e.measured[:n], noise=e.noise[:n])
             for n, e in zip(sizes, self.experiments, strict=True))
         return other
+
+    def rough(self) -> DriveModel:
+        """Return the model with the longer steps that do for derivatives."""
+        if self._longest_step >= ROUGH_STEP:
+            return self
+        if self._rougher is None:
+            self._rougher = copy.copy(self)
+            self._rougher._cache = OrderedDict()
+            self._rougher._plans = OrderedDict()
+            self._rougher._longest_step = ROUGH_STEP
+        return self._rougher
 
     def motion(self, experiment: int) -> Motion:
         """Return how the machine moved in an experiment: as measured, else as simulated."""
@@ -276,9 +293,10 @@ class DriveModel:
 
     def _run(self, job: _Job, push: tuple[DriveEntry, Input] | None = None) -> FloatArray:
         test = self._tests[job.experiment]
-        record = test.record.copy()
-        numbers = record.view(np.float64)
-        kind = record.dtype
+        kind = test.record.dtype
+        # as plain numbers: numpy copies a record field by field
+        numbers = test.record.view(np.float64).copy()
+        record = numbers.view(kind)
         waves: dict[Wave, list[float]] = {}
         gust: FloatArray | None = None
         bias, delay = test.bias, 0.0
@@ -314,7 +332,11 @@ class DriveModel:
             knots = catalogue.GUST_KNOT_S * np.arange(gust.size)
             fine = np.arange(0.0, knots[-1] + _GUST_S, _GUST_S)
             torque = (fine, CubicSpline(knots, gust)(fine))
-        plan = self._plan(job.experiment, bias, delay, torque, turns)
+        stiff = any(record[motor]['gearbox'][name][0] > 0.0
+                    for motor in ('motor_1', 'motor_2') for name in _STIFF)
+        longest = min(self._longest_step, LONGEST_STEP) if stiff else self._longest_step
+        plan = self._plan(job.experiment, bias, delay, torque, Longest(
+            longest, SHORTEST_STEP, WAVE_STEP, turns))
         if push is not None:
             plan = _with(plan, record, *push)
         samples = int(np.count_nonzero(test.time < job.until))
@@ -327,28 +349,35 @@ class DriveModel:
         return out
 
     def _plan(self, k: int, bias: Bias, delay: float,
-              torque: tuple[FloatArray, FloatArray] | None, turns: float) -> batch.Schedule:
-        """Return the steps of a run; a wave turns by `turns` per turn of the axis."""
+              torque: tuple[FloatArray, FloatArray] | None, longest: Longest) -> batch.Schedule:
+        """Return the steps of a run."""
         test = self._tests[k]
-        longest = Longest(self._longest_step, SHORTEST_STEP, WAVE_STEP, turns)
         if delay:
             return schedule(test.command, bias, test.time, longest, delay, torque)
-        plan = self._plans.get((k, turns))
-        if plan is None:
-            plan = schedule(test.command, test.bias, test.time, longest)
-            self._plans[k, turns] = plan
-        if torque is None and bias == test.bias:
+        plan = self._kept((k, longest, bias), lambda: _biased(self._kept(
+            (k, longest, test.bias),
+            lambda: schedule(test.command, test.bias, test.time, longest)), bias))
+        if torque is None:
             return plan
         steps = plan.steps.copy()
         length = steps[:, batch.LENGTH]
         ends = np.cumsum(length)
-        if torque is not None:
-            left = np.interp(ends - length, *torque)
-            steps[:, batch.TORQUE] = left
-            steps[:, batch.TORQUE_SLOPE] = (np.interp(ends, *torque) - left) / length
-        steps[:, batch.FIXED_BIAS] = np.where(ends - 0.5 * length < bias.at, bias.before,
-                                              bias.after)
+        left = np.interp(ends - length, *torque)
+        steps[:, batch.TORQUE] = left
+        steps[:, batch.TORQUE_SLOPE] = (np.interp(ends, *torque) - left) / length
         return batch.Schedule(steps, plan.keep)
+
+    def _kept(self, key: tuple[int, Longest, Bias],
+              made: Callable[[], batch.Schedule]) -> batch.Schedule:
+        """Return the table of steps of a test, made if it is not known."""
+        plan = self._plans.get(key)
+        if plan is None:
+            plan = made()
+            with self._lock:
+                self._plans[key] = plan
+                while len(self._plans) > _PLANS:
+                    self._plans.popitem(last=False)
+        return plan
 
     def _read(self, k: int, out: FloatArray, point: Point) -> FloatArray:
         """Return the readings of a run: what sensors do that nothing feeds back."""
@@ -419,6 +448,15 @@ _CHANNEL = {name: c for c, name in enumerate(CHANNELS.values())}
 # Which channel a meter's errors act on, by where they are in the record.
 _METERS = {'motor_1.ammeter': CURRENT_1, 'motor_2.ammeter': CURRENT_2, 'plant.encoder': ENCODER,
            'torque_share.torque_share': BIAS}
+
+
+def _biased(plan: batch.Schedule, bias: Bias) -> batch.Schedule:
+    """Return a plan with other voltages of its source of bias, which steps at the same time."""
+    steps = plan.steps.copy()
+    length = steps[:, batch.LENGTH]
+    middle = np.cumsum(length) - 0.5 * length
+    steps[:, batch.FIXED_BIAS] = np.where(middle < bias.at, bias.before, bias.after)
+    return batch.Schedule(steps, plan.keep)
 
 
 def _with(plan: batch.Schedule, record: np.ndarray[Any, np.dtype[Any]], entry: DriveEntry,

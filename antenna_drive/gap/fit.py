@@ -156,8 +156,10 @@ class Problem:
         """Return the residuals of several variants, shape (n,) each; those of one test alone."""
         alone = self._alone if alone is None else alone
         only = [alone] * len(points) if alone is not None else None
-        return [np.concatenate([self.scaled(k, values) for k, values in enumerate(result)])
-                for result in self.model.simulate(points, only)]
+        return [self._row(result) for result in self.model.simulate(points, only)]
+
+    def _row(self, result: Sequence[FloatArray | None]) -> FloatArray:
+        return np.concatenate([self.scaled(k, values) for k, values in enumerate(result)])
 
     def seen(self, state: State, scale: float) -> State:
         """Return a state of another scale as this problem sees it, without derivatives."""
@@ -203,9 +205,13 @@ class Problem:
                 only.append(item.experiment)
                 plan.append((j, side, len(sides)))
         jacobian = np.zeros((residual.size, len(parameters)), np.float32)
+        model = self.model.rough()
+        if model is not self.model and variants:
+            # a difference of two runs, both of them as rough
+            residual = self._row(model.simulate([point])[0])
         for first in range(0, len(variants), _CHUNK):
             part = slice(first, first + _CHUNK)
-            results = self.model.simulate(variants[part], only[part])
+            results = model.simulate(variants[part], only[part])
             for (j, side, count), result in zip(plan[part], results, strict=True):
                 for k, values in enumerate(result):
                     if values is None:

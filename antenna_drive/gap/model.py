@@ -183,6 +183,13 @@ class Model(Protocol):
     def brief(self) -> Model:
         """Return the model with as much of its tests as a search needs, or the model itself."""
 
+    def rough(self) -> Model:
+        """
+        Return the model as it is simulated for derivatives, or the model itself.
+
+        It takes the same points and gives nearly the same readings for less.
+        """
+
     def heard_at(self, point: Point) -> Model:
         """
         Return the model with the noise that its sensors have at a point, or the model itself.

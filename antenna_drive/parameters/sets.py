@@ -120,7 +120,12 @@ class Motor:
     stiction_ratio: float = _given('1', 1.0, 5.0, 'stiction over Coulomb friction, Eq. (4)')
     velocity_threshold: float = _given(
         'rad/s', 0.0, 1.0, 'rate below which friction can stop the rotor [v_t]')
-    viscous_friction: float = _effect(0.0, 'N m s/rad', 0.0, 1.0, 'friction torque per rate')
+    viscous_friction: float = _effect(
+        0.0, 'N m s/rad', 0.0, 1.0, 'friction torque per rate, at viscous_rate')
+    viscous_rate: float = _effect(
+        10.0, 'rad/s', 1e-3, 1e3, 'rate at which the flow index makes no difference')
+    flow_index: float = _effect(
+        1.0, '1', 0.1, 3.0, 'exponent of the rate in viscous friction: below 1 it thins')
     stribeck_torque: float = _effect(
         0.0, 'N m', 0.0, 10.0, 'friction above the Coulomb level at creep')
     stribeck_rate: float = _effect(
@@ -238,7 +243,12 @@ class Axis:
         'rad/s', 0.0, 1e-3, 'rate below which friction can stop the axis [v_t]')
     start_elevation: float = _option(
         math.pi / 4, Entry('rad', -0.2, 3.4, 'elevation at the start'))
-    viscous_friction: float = _effect(0.0, 'N m s/rad', 0.0, 1e10, 'friction torque per rate')
+    viscous_friction: float = _effect(
+        0.0, 'N m s/rad', 0.0, 1e10, 'friction torque per rate, at viscous_rate')
+    viscous_rate: float = _effect(
+        1e-3, 'rad/s', 1e-7, 1.0, 'rate at which the flow index makes no difference')
+    flow_index: float = _effect(
+        1.0, '1', 0.1, 3.0, 'exponent of the rate in viscous friction: below 1 it thins')
     stribeck_torque: float = _effect(
         0.0, 'N m', 0.0, 1e7, 'friction above the Coulomb level at creep')
     stribeck_rate: float = _effect(

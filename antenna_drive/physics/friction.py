@@ -52,8 +52,32 @@ def friction_torque(
 
 
 @inner
+def drag(rate: float, viscous: float, viscous_rate: float, flow_index: float) -> float:
+    """
+    Return the size of the viscous friction torque [N m]: a power law of the rate.
+
+    Parameters
+    ----------
+    rate
+        [rad/s]
+    viscous
+        torque per rate at viscous_rate, zero in the article [N m s/rad]
+    viscous_rate
+        [rad/s]
+    flow_index
+        exponent: 1 for oil, less for grease that thins as it is sheared (2/3 for the bearings
+        of Palmgren, Ball and Roller Bearing Engineering, 1959), 2 for windage [1]
+
+    """
+    torque = viscous * abs(rate)
+    if viscous != 0.0 and flow_index != 1.0 and rate != 0.0:
+        torque *= (abs(rate) / viscous_rate) ** (flow_index - 1.0)
+    return torque
+
+
+@inner
 def slip_level(
-        rate: float, coulomb: float, viscous: float, stribeck: float, stribeck_rate: float,
+        rate: float, coulomb: float, dragging: float, stribeck: float, stribeck_rate: float,
         stribeck_shape: float, asymmetry: float,
 ) -> float:
     """
@@ -65,8 +89,8 @@ def slip_level(
         [rad/s]; where it is zero the level of forward slip is given
     coulomb
         T_c [N m]
-    viscous
-        torque per rate, zero in the article [N m s/rad]
+    dragging
+        viscous friction torque, from `drag` [N m]
     stribeck
         how much more torque slipping begins with than it settles at, zero in the article
         [N m]; it fades as exp(-(rate / stribeck_rate)^stribeck_shape)
@@ -82,7 +106,7 @@ def slip_level(
         level += stribeck * math.exp(-(abs(rate) / stribeck_rate) ** stribeck_shape)
     if asymmetry != 0.0:
         level *= 1.0 + (asymmetry if rate >= 0.0 else -asymmetry)
-    return level + viscous * abs(rate)
+    return level + dragging
 
 
 @inner

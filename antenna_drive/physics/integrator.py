@@ -44,7 +44,7 @@ def work_space(states: int) -> FloatArray:
 
 
 def located_runge_kutta(
-    rates: Callable[..., Any], switch: Callable[..., Any],
+    rates: Callable[..., Any], switch: Callable[..., Any], inputs_jump: bool = True,
 ) -> Callable[..., Any]:
     """
     Make the compiled function that advances one unit over one macro-step.
@@ -58,6 +58,9 @@ def located_runge_kutta(
     switch
         compiled function (t, x, mode, u, p, commit) -> bool: tells whether the mode no
         longer holds; if commit is true it also writes the new mode and resets states
+    inputs_jump
+        True if u may jump from one macro-step to the next, so that the mode at its start is
+        looked at anew; otherwise what switches there is located just behind it
 
     Returns
     -------
@@ -80,7 +83,8 @@ def located_runge_kutta(
         k1, k2, k3, k4 = work[0], work[1], work[2], work[3]
         k5, y, z = work[4], work[5], work[6]
         step = h / steps
-        settle(0.0, x, mode, u, p)
+        if inputs_jump:
+            settle(0.0, x, mode, u, p)
         t = 0.0
         done = 0
         switchings = 0

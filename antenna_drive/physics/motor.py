@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from antenna_drive.parameters.sets import Ammeter, Motor, Tachometer
 from antenna_drive.physics.compiling import inner
-from antenna_drive.physics.friction import slip_level
+from antenna_drive.physics.friction import drag, slip_level
 from antenna_drive.physics.harmonics import wave
 
 
@@ -62,7 +62,8 @@ def friction_level(rate: float, gear_torque: float, p: Motor) -> float:
     coulomb = p.coulomb_torque * p.friction_torque_per_ampere
     if p.load_dependent_friction != 0.0:
         coulomb += p.load_dependent_friction * abs(gear_torque)
-    return slip_level(rate, coulomb, p.viscous_friction, p.stribeck_torque, p.stribeck_rate,
+    dragging = drag(rate, p.viscous_friction, p.viscous_rate, p.flow_index)
+    return slip_level(rate, coulomb, dragging, p.stribeck_torque, p.stribeck_rate,
                       p.stribeck_shape, p.friction_asymmetry)
 
 

@@ -29,7 +29,7 @@ import math
 from antenna_drive.parameters.sets import Axis, Encoder, Plant
 from antenna_drive.physics.arrays import FloatArray, IntArray
 from antenna_drive.physics.compiling import compiled, inner, shared
-from antenna_drive.physics.friction import next_slip, slip_level
+from antenna_drive.physics.friction import drag, next_slip, slip_level
 from antenna_drive.physics.harmonics import wave
 from antenna_drive.physics.integrator import located_runge_kutta
 import numpy as np
@@ -79,7 +79,8 @@ def _friction_level(rate: float, angle: float, p: Axis) -> float:
             angle, p.friction_wave, p.friction_wave_second, p.friction_wave_third,
             p.friction_wave_cycles, p.friction_wave_phase, p.friction_wave_second_phase,
             p.friction_wave_third_phase))
-    return slip_level(rate, coulomb, p.viscous_friction, p.stribeck_torque, p.stribeck_rate,
+    dragging = drag(rate, p.viscous_friction, p.viscous_rate, p.flow_index)
+    return slip_level(rate, coulomb, dragging, p.stribeck_torque, p.stribeck_rate,
                       p.stribeck_shape, 0.0)
 
 

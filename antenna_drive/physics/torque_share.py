@@ -81,6 +81,15 @@ def _bias_voltage(x: FloatArray, p: TorqueShare) -> float:
 
 
 @inner
+def voltmeter(x: FloatArray, mode: IntArray, p: TorqueShare) -> tuple[float, float]:
+    """Return the bias voltage as it is read, and its time derivative [V], [V/s]."""
+    rate = 0.0
+    if p.bias_source == CIRCUIT and mode[SATURATION] == 0:
+        rate = p.voltmeter_gain * p.bias_pot * _share_rate(x, p)
+    return p.voltmeter_gain * _bias_voltage(x, p), rate
+
+
+@inner
 def _counter_torque_rate(t: float, x: FloatArray, u: FloatArray, p: Share) -> float:
     return counter_torque_rate(
         x[COUNTER_TORQUE], _bias_voltage(x, p.torque_share),
@@ -139,13 +148,9 @@ def outputs(
         receives value and derivative of each output, shape (2, 2)
 
     """
-    share = p.torque_share
     y[0, 0] = x[COUNTER_TORQUE]
     y[0, 1] = _counter_torque_rate(t, x, u, p)
-    y[1, 0] = share.voltmeter_gain * _bias_voltage(x, share)
-    y[1, 1] = 0.0
-    if share.bias_source == CIRCUIT and mode[SATURATION] == 0:
-        y[1, 1] = share.voltmeter_gain * share.bias_pot * _share_rate(x, share)
+    y[1, 0], y[1, 1] = voltmeter(x, mode, p.torque_share)
 
 
 @compiled

@@ -67,6 +67,10 @@ class Body:
         body = STARTS[k] * np.exp(-cooled) + heated
         return np.column_stack([body * (1.0 + point.get('thermometer.gain.size', 0.0)), body])
 
+    def rough(self) -> Body:
+        """Return the model itself."""
+        return self
+
     def heard_at(self, point: Point) -> Body:
         """Return the model itself."""
         return self

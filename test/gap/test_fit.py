@@ -46,6 +46,9 @@ class Decay:
             'toy', time, ('y',), ('1',), (clean + noise * random.normal(size=400))[:, np.newaxis],
             np.full((400, 1), noise)),)
 
+    def rough(self) -> Decay:
+        return self
+
     def heard_at(self, point: Point) -> Decay:
         """Return the model itself."""
         return self

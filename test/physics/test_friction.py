@@ -13,7 +13,7 @@
 # limitations under the License.
 """Friction against Eq. (2), and its modes against what they stand for."""
 
-from antenna_drive.physics.friction import friction_torque, next_slip, slip_level
+from antenna_drive.physics.friction import drag, friction_torque, next_slip, slip_level
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
@@ -72,8 +72,17 @@ def test_the_neutral_slip_level_is_the_coulomb_torque() -> None:
 
 
 def test_the_terms_of_the_slip_level() -> None:
-    assert slip_level(-3.0, 2.0, 0.5, 0.0, 1.0, 2.0, 0.0) == 3.5
+    assert slip_level(-3.0, 2.0, 1.5, 0.0, 1.0, 2.0, 0.0) == 3.5
     assert slip_level(1.5, 2.0, 0.0, 0.8, 1.5, 2.0, 0.0) == pytest.approx(2.0 + 0.8 / np.e)
     assert slip_level(-3.0, 2.0, 0.0, 0.8, 1.5, 1.0, 0.0) == pytest.approx(2.0 + 0.8 / np.e ** 2)
     assert slip_level(1.0, 2.0, 0.0, 0.0, 1.0, 2.0, 0.1) == pytest.approx(2.2)
     assert slip_level(-1.0, 2.0, 0.0, 0.0, 1.0, 2.0, 0.1) == pytest.approx(1.8)
+
+
+def test_drag_is_proportional_to_the_rate_unless_the_lubricant_thins() -> None:
+    assert drag(-3.0, 0.5, 10.0, 1.0) == 1.5
+    for index in (2.0 / 3.0, 1.0, 2.0):
+        assert drag(0.0, 0.5, 10.0, index) == 0.0
+        assert drag(10.0, 0.5, 10.0, index) == 5.0
+        # eight times the rate: four times the torque of a bearing, eight of oil, 64 of windage
+        assert drag(-80.0, 0.5, 10.0, index) == pytest.approx(5.0 * 8.0 ** index)
