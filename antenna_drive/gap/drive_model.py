@@ -134,6 +134,12 @@ class DriveModel:
                                         for form in effect.forms for p in form.parameters)):
             assert isinstance(item, DriveParameter)
             self._by_name[item.name] = item
+        kind = self._tests[0].record.dtype
+        # where in the record those act that change numbers of it and nothing else
+        self._places = {name: tuple(place_of(kind, path) for path in item.fields)
+                        for name, item in self._by_name.items()
+                        if item.fields and not item.reading
+                        and not name.startswith(catalogue.GUST)}
         self.experiments = self._experiments({})
 
     def _experiments(self, point: Point) -> tuple[Experiment, ...]:
@@ -301,8 +307,11 @@ class DriveModel:
         gust: FloatArray | None = None
         bias, delay = test.bias, 0.0
         for name, value in job.items:
-            item = self._by_name[name]
-            if name in self._waves:
+            places = self._places.get(name)
+            if places is not None:
+                for place in places:
+                    _change(numbers, place, self._by_name[name].how, value)
+            elif name in self._waves:
                 form, part = self._waves[name]
                 waves.setdefault(form, [0.0] * len(form.parameters))[part] = value
             elif name == catalogue.DELAY:
@@ -315,9 +324,6 @@ class DriveModel:
                     gust[knot] = value
             elif name.startswith(SUPPLY):
                 bias = Bias(bias.before * (1.0 + value), bias.after * (1.0 + value), bias.at)
-            else:
-                for path in item.fields:
-                    _change(numbers, place_of(kind, path), item.how, value)
         turns = 0.0
         for form, values in waves.items():
             for path, how, value in form.settings(*values):

@@ -149,7 +149,9 @@ class Problem:
         z = ((experiment.measured - predicted) / (self.scale * experiment.noise)).ravel()
         z[~self.valid[self.rows(k)]] = 0.0
         # a prediction that has run away is a bad one, not a broken one
-        return np.asarray(np.clip(np.nan_to_num(z, nan=1e4, posinf=1e4, neginf=-1e4), -1e4, 1e4))
+        if not np.isfinite(z).all():
+            z = np.nan_to_num(z, nan=1e4, posinf=1e4, neginf=-1e4)
+        return np.asarray(np.clip(z, -1e4, 1e4, out=z))
 
     def residuals(self, points: Sequence[dict[str, float]],
                   alone: int | None = None) -> list[FloatArray]:

@@ -41,18 +41,23 @@ _BRIEF_WAIT_S = 0.02
 # No wait is longer than this [s]: signals and reports are served in between.
 _LONGEST_WAIT_S = 0.2
 
+# No one at a screen sees the drive ahead of the clock by so much [s]; a process that has to wait
+# for a core mostly waits less.
+_LEAD_S = 0.02
+
 _AMPERES = 'armature.physical_amperes_per_article_ampere'
 
 PUBLISH_RATE = Entry('Hz', 0.0, 1e4, 'readings per simulated second on each signal topic, 0: none',
                      live=True)
 PACE = Entry('1', 0.0, 1e3, 'how many times faster than real time, 0: as fast as possible',
              live=True)
+LEAD = Entry('s', 0.0, 1.0, 'how long before it is due a step may be made')
 STEP = Entry('s', 1e-5, 0.1, 'macro-step')
 DURATION = Entry('s', 0.0, 1e9, 'simulated time after which the run ends, 0: never')
 
 # What a node itself may be told, beside the settings of its unit.
-OWN_PARAMETERS = ('config', 'publish_rate', 'run.step', 'run.pace', 'run.duration',
-                  'run.observers')
+OWN_PARAMETERS = ('config', 'publish_rate', 'run.step', 'run.pace', 'run.lead',
+                  'run.duration', 'run.observers')
 
 
 class DriveNode:
@@ -124,14 +129,16 @@ class DriveNode:
             return Member(self._unit, birth)
         step_s = overrides.number('run.step', STEP, 1e-3)
         pace = overrides.number('run.pace', PACE, 1.0)
+        lead_s = overrides.number('run.lead', LEAD, _LEAD_S)
         duration = overrides.number('run.duration', DURATION, 0.0)
         own['run.step'] = (STEP, step_s)
         own['run.pace'] = (PACE, pace)
+        own['run.lead'] = (LEAD, lead_s)
         own['run.duration'] = (DURATION, duration)
         observers = overrides.names('run.observers', ())
         ros_parameters.declare_names(self._node, 'run.observers', observers,
                                      'names of recorders that every step waits for')
-        self._pace = Pace(pace)
+        self._pace = Pace(pace, lead_s)
         return Conductor(self._unit, birth, step_s, round(duration / step_s) or None,
                          observers=observers)
 

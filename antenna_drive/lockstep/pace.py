@@ -20,19 +20,22 @@ class Pace:
     """
     The timetable of a run on a clock that the caller reads.
 
-    Step k is due at start + k * step_s / factor: nothing adds up, so nothing drifts. A step
-    that comes late is counted and made all the same; the next ones catch up.
+    Step k is due at start + k * step_s / factor: nothing adds up, so nothing drifts. It may be
+    made a little earlier, so that a process which has to wait for the machine makes none late. A
+    step that comes late is counted and made all the same; the next ones catch up.
 
     Attributes
     ----------
     factor : how many times faster than real time; 0 for as fast as possible
+    lead_s : how long before it is due a step may be made [s]
     late_steps : steps of this run that came more than one step's time after they were due
 
     """
 
-    def __init__(self, factor: float) -> None:
+    def __init__(self, factor: float, lead_s: float = 0.0) -> None:
         """Set the pace."""
         self.factor = factor
+        self.lead_s = lead_s
         self.late_steps = 0
         self._start = 0.0
         self._first_step = 0
@@ -53,10 +56,10 @@ class Pace:
         return self._start + (step - self._first_step) * step_s / self.factor
 
     def remaining(self, step: int, step_s: float, now: float) -> float:
-        """Return how long it is until `step` is due [s], zero or less if it is."""
-        return self.due(step, step_s) - now if self.factor > 0.0 else 0.0
+        """Return how long it is until `step` may be made [s], zero or less if it may."""
+        return self.due(step, step_s) - self.lead_s - now if self.factor > 0.0 else 0.0
 
     def note(self, step: int, step_s: float, now: float) -> None:
         """Count `step`, made at `now`, if it is late."""
-        if self.factor > 0.0 and -self.remaining(step, step_s, now) > step_s / self.factor:
+        if self.factor > 0.0 and now - self.due(step, step_s) > step_s / self.factor:
             self.late_steps += 1

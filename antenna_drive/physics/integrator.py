@@ -44,7 +44,8 @@ def work_space(states: int) -> FloatArray:
 
 
 def located_runge_kutta(
-    rates: Callable[..., Any], switch: Callable[..., Any], inputs_jump: bool = True,
+    rates: Callable[..., Any], switch: Callable[..., Any], states: int = 0,
+    inputs_jump: bool = True,
 ) -> Callable[..., Any]:
     """
     Make the compiled function that advances one unit over one macro-step.
@@ -58,6 +59,8 @@ def located_runge_kutta(
     switch
         compiled function (t, x, mode, u, p, commit) -> bool: tells whether the mode no
         longer holds; if commit is true it also writes the new mode and resets states
+    states
+        how many there always are, which compiles to straight code; 0 if their number varies
     inputs_jump
         True if u may jump from one macro-step to the next, so that the mode at its start is
         looked at anew; otherwise what switches there is located just behind it
@@ -79,7 +82,7 @@ def located_runge_kutta(
     def advance(
             x: FloatArray, mode: IntArray, u: Any, p: Any, h: float, steps: int, work: FloatArray,
     ) -> None:
-        n = x.size
+        n = states if states else x.size
         k1, k2, k3, k4 = work[0], work[1], work[2], work[3]
         k5, y, z = work[4], work[5], work[6]
         step = h / steps

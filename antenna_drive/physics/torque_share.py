@@ -124,7 +124,7 @@ def _switch(
     return changed
 
 
-_advance = located_runge_kutta(_rates, _switch)
+_advance = located_runge_kutta(_rates, _switch, STATES)
 
 
 @compiled

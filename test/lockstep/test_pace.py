@@ -52,3 +52,22 @@ def test_a_new_pace_goes_on_from_where_the_run_is() -> None:
     pace.begin(0.0)
     pace.change(4.0, now=10.0, step=5000)
     assert pace.remaining(5004, 1e-3, 10.0) == pytest.approx(0.001)
+
+
+def test_a_lead_lets_steps_come_early_and_makes_none_late() -> None:
+    pace = Pace(1.0, lead_s=0.02)
+    pace.begin(0.0)
+    assert pace.remaining(15, 1e-3, 0.0) == pytest.approx(-0.005)
+    assert pace.remaining(25, 1e-3, 0.0) == pytest.approx(0.005)
+    # whoever has made step 20 at once and then stands still for 15 ms is late with nothing
+    pace.note(21, 1e-3, 0.015)
+    assert pace.late_steps == 0
+    # lateness is told from when a step is due, as without a lead
+    pace.note(22, 1e-3, 0.0241)
+    assert pace.late_steps == 1
+
+
+def test_a_lead_is_wall_time_at_any_pace() -> None:
+    pace = Pace(4.0, lead_s=0.02)
+    pace.begin(0.0)
+    assert pace.remaining(80, 1e-3, 0.0) == pytest.approx(0.0, abs=1e-12)
