@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 import signal
 import threading
 import time
@@ -50,7 +50,7 @@ PATIENCE_S = 30.0
 _IN_A_ROW = 5
 # A setting is tried until it has taken this long [s], or so often.
 _LEAST_S = 0.3
-_TRIES = 7
+_TRIES = 50
 
 Run = Callable[[], FloatArray]
 
@@ -265,6 +265,7 @@ def run_whole(problem: Problem, step_s: float) -> FloatArray:
     return np.asarray(cubics(problem.grid), np.float64)
 
 
+@lru_cache(maxsize=16)
 def _knots(problem: Problem, step_s: float) -> FloatArray:
     """Return the times of the grid, every other if the steps are longer, and of every corner."""
     grid = problem.grid[::max(1, round(step_s / GRID_S))]
@@ -272,8 +273,13 @@ def _knots(problem: Problem, step_s: float) -> FloatArray:
     return knots[np.r_[True, np.diff(knots) > 1e-9]]
 
 
+@lru_cache(maxsize=16)
 def plan(problem: Problem, step_s: float) -> batch.Schedule:
-    """Return the steps of `run_whole`: to each of its knots, at most `step_s` [s] at a time."""
+    """
+    Return the steps of `run_whole`: to each of its knots, at most `step_s` [s] at a time.
+
+    It is made once for a test, as in the diagnosis, and as the peers' equations and pieces are.
+    """
     start, _, value, slope = (np.array(column) for column in zip(*problem.pieces, strict=True))
     knots = _knots(problem, step_s)
     parts = max(1, round(GRID_S / step_s))
