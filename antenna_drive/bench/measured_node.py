@@ -37,7 +37,7 @@ def main() -> int:
     class MeasuredNode(node.DriveNode):
         def _publish(self, outputs: FloatArray) -> None:
             step = self._member.step
-            if step == 0 and self._pace is not None and self._pace.factor > 0.0:
+            if step == 1 and self._pace is not None and self._pace.factor > 0.0:
                 stamps.due_s = self._pace.due(0, self._member.step_s)
             stamps.note(step)
             super()._publish(outputs)

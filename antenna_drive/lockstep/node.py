@@ -26,7 +26,7 @@ from antenna_drive.emulator.unit import FloatArray, Unit
 from antenna_drive.emulator.wiring import TEST_SIGNAL
 from antenna_drive.lockstep import ros_parameters
 from antenna_drive.lockstep.member import Conductor, Member
-from antenna_drive.lockstep.pace import Pace
+from antenna_drive.lockstep.pace import LEAD_S, Pace
 from antenna_drive.lockstep.readings import ChangeRecord, READING_QOS, Readings
 from antenna_drive.lockstep.report import Report
 from antenna_drive.lockstep.ros_link import FrameLink
@@ -40,10 +40,6 @@ _BRIEF_WAIT_S = 0.02
 
 # No wait is longer than this [s]: signals and reports are served in between.
 _LONGEST_WAIT_S = 0.2
-
-# No one at a screen sees the drive ahead of the clock by so much [s]; a process that has to wait
-# for a core mostly waits less.
-_LEAD_S = 0.02
 
 _AMPERES = 'armature.physical_amperes_per_article_ampere'
 
@@ -129,7 +125,7 @@ class DriveNode:
             return Member(self._unit, birth)
         step_s = overrides.number('run.step', STEP, 1e-3)
         pace = overrides.number('run.pace', PACE, 1.0)
-        lead_s = overrides.number('run.lead', LEAD, _LEAD_S)
+        lead_s = overrides.number('run.lead', LEAD, LEAD_S)
         duration = overrides.number('run.duration', DURATION, 0.0)
         own['run.step'] = (STEP, step_s)
         own['run.pace'] = (PACE, pace)
@@ -210,7 +206,10 @@ class DriveNode:
             if self._pace.remaining(member.step + 1, member.step_s, now) > 0.0:
                 return None
             outputs = member.go_on()
-            if outputs is not None:
+            if outputs is not None and member.step == 1:
+                # all are there: how long they took to begin is no lateness
+                self._pace.change(self._pace.factor, now, 1)
+            elif outputs is not None:
                 self._pace.note(member.step, member.step_s, now)
             return outputs
         return member.go_on()

@@ -15,6 +15,10 @@
 
 from __future__ import annotations
 
+# No one at a screen sees a drive ahead of the clock by so much [s]; a process that has to wait
+# for a core mostly waits less.
+LEAD_S = 0.02
+
 
 class Pace:
     """

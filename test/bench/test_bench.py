@@ -29,6 +29,7 @@ from antenna_drive.bench.stamps import WARM_STEPS
 from antenna_drive.cli import BAD_INPUT, main
 from antenna_drive.emulator.run import simulate
 from antenna_drive.emulator.wiring import UNITS
+from antenna_drive.lockstep.pace import LEAD_S
 import numpy as np
 import pytest
 
@@ -116,7 +117,8 @@ def test_five_processes_note_every_step(exchange: transport.Run, pace: float,
         assert run.cpu_per_step(unit) > 0.0
     assert np.all(run.latencies > 0.0)  # nobody makes a step before the conductor's is there
     if pace:
-        assert np.all(run.delays > 0.0)  # step k is never made before it is due
+        # step k is never made before it may be
+        assert np.all(run.delays > (-LEAD_S if exchange is transport.own else 0.0) - 1e-6)
 
 
 @pytest.mark.parametrize(('value', 'goal'), [(0.9, 'reached'), (0.7, 'not reached')])
