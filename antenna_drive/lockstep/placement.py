@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Where a drive's processes run, and who may interrupt whom, on a machine that is theirs.
+Where a drive's processes run, and who may interrupt whom, when they run as fast as they can.
 
 A node that publishes a frame wakes its readers. Left to itself the kernel lets each of them
 interrupt the publisher, or moves it to another core, several times in every step; that costs

@@ -48,9 +48,8 @@ def idle(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures('idle')
-@pytest.mark.parametrize('pace', [0.0, 1.0])
-def test_processes_on_an_idle_machine_are_placed(two_cores: set[int], pace: float) -> None:
-    with DriveProcesses({TEST_SIGNAL: {'run.pace': pace}}, commands=WAITING) as drive:
+def test_processes_at_full_speed_are_placed(two_cores: set[int]) -> None:
+    with DriveProcesses({TEST_SIGNAL: {'run.pace': 0.0}}, commands=WAITING) as drive:
         pids = {unit: drive.process(unit).pid for unit in UNITS}
         assert {os.sched_getscheduler(pid) for pid in pids.values()} == {os.SCHED_BATCH}
         cores = {unit: os.sched_getaffinity(pid) for unit, pid in pids.items()}
@@ -68,6 +67,16 @@ def test_a_node_started_again_is_placed_as_before(two_cores: set[int]) -> None:
         drive.start(PLANT)
         assert os.sched_getaffinity(drive.process(PLANT).pid) == core
         assert os.sched_getscheduler(drive.process(PLANT).pid) == os.SCHED_BATCH
+
+
+@pytest.mark.usefixtures('idle')
+@pytest.mark.parametrize('parameters', [{}, {TEST_SIGNAL: {'run.pace': 1.0}}])
+def test_processes_at_a_pace_are_left_to_the_system(
+        two_cores: set[int], parameters: dict[str, dict[str, float]]) -> None:
+    with DriveProcesses(parameters, commands=WAITING) as drive:
+        for unit in UNITS:
+            assert os.sched_getscheduler(drive.process(unit).pid) == os.SCHED_OTHER
+            assert os.sched_getaffinity(drive.process(unit).pid) == two_cores
 
 
 def test_on_a_busy_machine_they_are_left_to_the_system(
