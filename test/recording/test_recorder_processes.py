@@ -230,11 +230,12 @@ def test_an_existing_target_is_refused_at_once(tmp_path: Path, fresh_domain: int
     assert list((tmp_path / 'run').iterdir()) == []
 
 
+# Of 0.4 MB in a second of the drive: room for what is made safe once or twice a second to be so.
 FULL_DISK = """
 import resource, signal, sys
 from antenna_drive.nodes.recorder import main
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+resource.setrlimit(resource.RLIMIT_FSIZE, (700_000, 700_000))
 sys.exit(main(sys.argv[1:]))
 """
 
