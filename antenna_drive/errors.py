@@ -26,3 +26,10 @@ class UserError(Exception):
     def __init__(self, message: str) -> None:
         """Keep the message in one line, whatever a key or a path in it may hold."""
         super().__init__(' '.join(message.split()))
+
+
+def one_line(text: object, longest: int = 120) -> str:
+    """Return a text that fits into an error of one line, whatever a file held."""
+    line = ''.join(c if c.isprintable() else ' ' for c in str(text)[:10 * longest])
+    line = ' '.join(line.split())
+    return line if len(line) <= longest else line[:longest - 3] + '...'

@@ -20,7 +20,8 @@ import io
 from typing import Any
 
 from antenna_drive.calibration.problem import Problem
-from antenna_drive.parameters.loading import find, read_yaml
+from antenna_drive.parameters.loading import find
+from antenna_drive.parameters.plain_yaml import read_yaml
 import yaml
 
 # More digits than any figure determines, and few enough to read.

@@ -39,7 +39,8 @@ from antenna_drive.article.measures import (
     article_experiments, article_measures, Measure, OLD_CIRCUIT, Reading, Results,
 )
 from antenna_drive.parameters import Drive, load, ParameterError
-from antenna_drive.parameters.loading import find, MOTOR_SECTIONS, read_yaml, SECTIONS
+from antenna_drive.parameters.loading import find, MOTOR_SECTIONS, SECTIONS
+from antenna_drive.parameters.plain_yaml import read_yaml
 from antenna_drive.parameters.schema import Entry, nearest
 from antenna_drive.parameters.sets import changed, entries, values
 

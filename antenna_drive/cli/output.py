@@ -23,11 +23,11 @@ import math
 import os
 from pathlib import Path
 import sys
-import tempfile
 import time
 from types import TracebackType
 from typing import Any, IO, TextIO
 
+from antenna_drive.drafts import drafted
 from antenna_drive.errors import UserError
 import numpy as np
 
@@ -82,20 +82,10 @@ def replaced(path: Path) -> Iterator[IO[bytes]]:
 
     """
     try:
-        handle, draft = tempfile.mkstemp(dir=path.parent, prefix=f'.{path.name}.')
-    except OSError as error:
-        raise UserError(f'{path}: cannot be written, {error.strerror}') from error
-    try:
-        with open(handle, 'wb') as stream:
+        with drafted(path) as stream:
             yield stream
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.chmod(draft, _usual_mode())  # a draft is for its owner's eyes, a result is not
-        os.replace(draft, path)
     except OSError as error:
         raise UserError(f'{path}: cannot be written, {error.strerror}') from error
-    finally:
-        Path(draft).unlink(missing_ok=True)
 
 
 class Progress:
@@ -169,9 +159,3 @@ def _plain(value: object) -> Any:
     if isinstance(value, float) and math.isnan(value):
         return None
     return value
-
-
-def _usual_mode() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return 0o666 & ~mask

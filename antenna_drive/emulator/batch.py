@@ -48,6 +48,8 @@ _MODE_2 = motor_drive.MODES
 _MODE_SHARE = 2 * motor_drive.MODES
 _MODE_PLANT = _MODE_SHARE + torque_share.MODES
 _MODES = _MODE_PLANT + structure.MODES
+# Of the unit that has the most.
+_OUTPUTS = max(motor_drive.OUTPUTS, torque_share.OUTPUTS, structure.OUTPUTS)
 
 # Columns of the table of steps.
 LENGTH, COMMAND, SLOPE, CURVE, TORQUE, TORQUE_SLOPE, FIXED_BIAS, CHANGE = range(8)
@@ -132,17 +134,15 @@ def _read(x, dx, mode, drive, out):  # type: ignore[no-untyped-def]
 
 @compiled
 def _run(  # type: ignore[no-untyped-def]
-        p, numbers, changing, steps, keep, x, dx, mode, motor, share, plant, work, y_motor,
-        y_share, y_plant, out):
+        p, numbers, changing, steps, keep, x, dx, mode, motor, share, plant, work, y, out):
     """Run one variant over a table of steps; write what the sensors say into out."""
     drive = p[0]
     given = numbers[changing]
     u = (steps[0], motor, share, plant)
-    motor_drive.start(drive.motor_1, x[:_M2], mode[:_MODE_2], y_motor)
-    motor_drive.start(drive.motor_2, x[_M2:_SHARE], mode[_MODE_2:_MODE_SHARE], y_motor)
-    torque_share.start(drive.torque_share, x[_SHARE:_PLANT], mode[_MODE_SHARE:_MODE_PLANT],
-                       y_share)
-    structure.start(drive.plant, x[_PLANT:], mode[_MODE_PLANT:], y_plant)
+    motor_drive.start(drive.motor_1, x[:_M2], mode[:_MODE_2], y)
+    motor_drive.start(drive.motor_2, x[_M2:_SHARE], mode[_MODE_2:_MODE_SHARE], y)
+    torque_share.start(drive.torque_share, x[_SHARE:_PLANT], mode[_MODE_SHARE:_MODE_PLANT], y)
+    structure.start(drive.plant, x[_PLANT:], mode[_MODE_PLANT:], y)
     for k in range(-1, steps.shape[0]):
         if k >= 0:
             u = (steps[k], motor, share, plant)
@@ -208,9 +208,7 @@ def run(record: np.ndarray[Any, np.dtype[Any]], schedule: Schedule) -> FloatArra
     _run(record, numbers, schedule.changing, schedule.steps, schedule.keep,
          np.zeros(states), np.zeros(states), np.zeros(_MODES, np.int64),
          np.zeros((motor_drive.INPUTS, 2)), np.zeros((torque_share.INPUTS, 2)),
-         np.zeros((structure.INPUTS, 2)), work_space(states),
-         np.zeros((motor_drive.OUTPUTS, 2)), np.zeros((torque_share.OUTPUTS, 2)),
-         np.zeros((structure.OUTPUTS, 2)), out)
+         np.zeros((structure.INPUTS, 2)), work_space(states), np.zeros((_OUTPUTS, 2)), out)
     return out
 
 

@@ -27,7 +27,7 @@ from typing import Any
 from antenna_drive.emulator import batch
 from antenna_drive.gap import catalogue
 from antenna_drive.gap.catalogue import ADD, DriveEntry, DriveParameter, SCALE, Wave
-from antenna_drive.gap.excitation import Bias, Longest, schedule
+from antenna_drive.gap.excitation import Bias, Longest, schedule, with_bias, with_torque
 from antenna_drive.gap.field_test import (
     BIAS, CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, prepared, TACH_1, TACH_2, UNITS,
 )
@@ -160,12 +160,17 @@ class DriveModel:
         other.experiments = self._experiments(point)
         return other
 
-    def brief(self) -> DriveModel:
-        """Return the model with as much of each test as a search needs; a chirp stays whole."""
+    def _stepping(self, longest_step: float) -> DriveModel:
+        """Return the model with other steps, and so with runs and tables of steps of its own."""
         other = copy.copy(self)
         other._cache = OrderedDict()
         other._plans = OrderedDict()
-        other._longest_step = ROUGH_STEP
+        other._longest_step = longest_step
+        return other
+
+    def brief(self) -> DriveModel:
+        """Return the model with as much of each test as a search needs; a chirp stays whole."""
+        other = self._stepping(ROUGH_STEP)
         other._tests = [test.until(BRIEF_S if test.repeats else math.inf)
                         for test in self._tests]
         sizes = [test.time.size for test in other._tests]
@@ -179,10 +184,7 @@ class DriveModel:
         if self._longest_step >= ROUGH_STEP:
             return self
         if self._rougher is None:
-            self._rougher = copy.copy(self)
-            self._rougher._cache = OrderedDict()
-            self._rougher._plans = OrderedDict()
-            self._rougher._longest_step = ROUGH_STEP
+            self._rougher = self._stepping(ROUGH_STEP)
         return self._rougher
 
     def motion(self, experiment: int) -> Motion:
@@ -359,19 +361,12 @@ class DriveModel:
         """Return the steps of a run."""
         test = self._tests[k]
         if delay:
-            return schedule(test.command, bias, test.time, longest, delay, torque)
-        plan = self._kept((k, longest, bias), lambda: _biased(self._kept(
-            (k, longest, test.bias),
-            lambda: schedule(test.command, test.bias, test.time, longest)), bias))
-        if torque is None:
-            return plan
-        steps = plan.steps.copy()
-        length = steps[:, batch.LENGTH]
-        ends = np.cumsum(length)
-        left = np.interp(ends - length, *torque)
-        steps[:, batch.TORQUE] = left
-        steps[:, batch.TORQUE_SLOPE] = (np.interp(ends, *torque) - left) / length
-        return batch.Schedule(steps, plan.keep)
+            plan = schedule(test.command, bias, test.time, longest, delay)
+        else:
+            plan = self._kept((k, longest, bias), lambda: with_bias(self._kept(
+                (k, longest, test.bias),
+                lambda: schedule(test.command, test.bias, test.time, longest)), bias))
+        return plan if torque is None else with_torque(plan, *torque)
 
     def _kept(self, key: tuple[int, Longest, Bias],
               made: Callable[[], batch.Schedule]) -> batch.Schedule:
@@ -454,15 +449,6 @@ _CHANNEL = {name: c for c, name in enumerate(CHANNELS.values())}
 # Which channel a meter's errors act on, by where they are in the record.
 _METERS = {'motor_1.ammeter': CURRENT_1, 'motor_2.ammeter': CURRENT_2, 'plant.encoder': ENCODER,
            'torque_share.torque_share': BIAS}
-
-
-def _biased(plan: batch.Schedule, bias: Bias) -> batch.Schedule:
-    """Return a plan with other voltages of its source of bias, which steps at the same time."""
-    steps = plan.steps.copy()
-    length = steps[:, batch.LENGTH]
-    middle = np.cumsum(length) - 0.5 * length
-    steps[:, batch.FIXED_BIAS] = np.where(middle < bias.at, bias.before, bias.after)
-    return batch.Schedule(steps, plan.keep)
 
 
 def _with(plan: batch.Schedule, record: np.ndarray[Any, np.dtype[Any]], entry: DriveEntry,

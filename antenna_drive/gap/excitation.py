@@ -155,8 +155,7 @@ class Longest:
 
 
 def schedule(command: Command, bias: Bias, samples: FloatArray, longest: Longest,
-             delay: float = 0.0, torque: tuple[FloatArray, FloatArray] | None = None,
-             ) -> batch.Schedule:
+             delay: float = 0.0) -> batch.Schedule:
     """
     Plan the integration of a test: no step reaches across a sample, a jump, or `longest`.
 
@@ -170,8 +169,6 @@ def schedule(command: Command, bias: Bias, samples: FloatArray, longest: Longest
         step, where the axis turns as commanded
     delay
         by which the command comes late [s]
-    torque
-        times [s] and values [N m] of a torque on the axis, straight lines between
 
     """
     end = float(samples[-1])
@@ -198,13 +195,28 @@ def schedule(command: Command, bias: Bias, samples: FloatArray, longest: Longest
     steps[:, batch.COMMAND] = shape[:, 0]
     steps[:, batch.SLOPE] = shape[:, 1] / length
     steps[:, batch.CURVE] = shape[:, 2] / length ** 2
-    steps[:, batch.FIXED_BIAS] = np.where(places[:, 1] < bias.at, bias.before, bias.after)
-    if torque is not None:
-        left = np.interp(start, *torque)
-        steps[:, batch.TORQUE] = left
-        steps[:, batch.TORQUE_SLOPE] = (np.interp(start + length, *torque) - left) / length
     rows = np.full(start.size + 1, -1)
     ends = np.r_[0.0, np.cumsum(length)]
     at = np.searchsorted(ends, samples - 1e-8)
     rows[np.minimum(at, start.size)] = np.arange(samples.size)
-    return batch.Schedule(steps, rows)
+    return with_bias(batch.Schedule(steps, rows), bias)
+
+
+def with_bias(plan: batch.Schedule, bias: Bias) -> batch.Schedule:
+    """Return a plan with the voltages of a source of bias, which steps as the plan's own does."""
+    steps = plan.steps.copy()
+    length = steps[:, batch.LENGTH]
+    middle = np.cumsum(length) - 0.5 * length
+    steps[:, batch.FIXED_BIAS] = np.where(middle < bias.at, bias.before, bias.after)
+    return batch.Schedule(steps, plan.keep)
+
+
+def with_torque(plan: batch.Schedule, time: FloatArray, torque: FloatArray) -> batch.Schedule:
+    """Return a plan with a torque on the axis: times [s], values [N m], straight lines between."""
+    steps = plan.steps.copy()
+    length = steps[:, batch.LENGTH]
+    ends = np.cumsum(length)
+    left = np.interp(ends - length, time, torque)
+    steps[:, batch.TORQUE] = left
+    steps[:, batch.TORQUE_SLOPE] = (np.interp(ends, time, torque) - left) / length
+    return batch.Schedule(steps, plan.keep)

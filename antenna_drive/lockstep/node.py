@@ -199,17 +199,14 @@ class DriveNode:
         if self._quiet:
             outputs = member.new_run(time.time_ns() / 1e3)
             if outputs is not None:
-                self._pace.begin(time.monotonic())
+                self._pace.begin()
                 return outputs
         if self._pace.factor > 0.0 and member.run:
             now = time.monotonic()
             if self._pace.remaining(member.step + 1, member.step_s, now) > 0.0:
                 return None
             outputs = member.go_on()
-            if outputs is not None and member.step == 1:
-                # all are there: how long they took to begin is no lateness
-                self._pace.change(self._pace.factor, now, 1)
-            elif outputs is not None:
+            if outputs is not None:
                 self._pace.note(member.step, member.step_s, now)
             return outputs
         return member.go_on()

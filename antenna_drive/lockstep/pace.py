@@ -24,9 +24,10 @@ class Pace:
     """
     The timetable of a run on a clock that the caller reads.
 
-    Step k is due at start + k * step_s / factor: nothing adds up, so nothing drifts. It may be
-    made a little earlier, so that a process which has to wait for the machine makes none late. A
-    step that comes late is counted and made all the same; the next ones catch up.
+    It begins with the first step that is noted: how long the nodes took to get there is no
+    lateness. Step k is due at start + k * step_s / factor: nothing adds up, so nothing drifts. It
+    may be made a little earlier, so that a process which has to wait for the machine makes none
+    late. A step that comes late is counted and made all the same; the next ones catch up.
 
     Attributes
     ----------
@@ -41,17 +42,23 @@ class Pace:
         self.factor = factor
         self.lead_s = lead_s
         self.late_steps = 0
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin a run: its timetable begins with the next step that is noted."""
+        self.late_steps = 0
+        self._begun = False
         self._start = 0.0
         self._first_step = 0
-
-    def begin(self, now: float) -> None:
-        """Start the timetable: step 0 is made at `now` [s]."""
-        self.change(self.factor, now, 0)
-        self.late_steps = 0
 
     def change(self, factor: float, now: float, step: int) -> None:
         """Go on at another pace from `step`, which is made at `now` [s]."""
         self.factor = factor
+        if self._begun:
+            self._anchor(step, now)
+
+    def _anchor(self, step: int, now: float) -> None:
+        self._begun = True
         self._start = now
         self._first_step = step
 
@@ -61,9 +68,13 @@ class Pace:
 
     def remaining(self, step: int, step_s: float, now: float) -> float:
         """Return how long it is until `step` may be made [s], zero or less if it may."""
-        return self.due(step, step_s) - self.lead_s - now if self.factor > 0.0 else 0.0
+        if self.factor == 0.0 or not self._begun:
+            return 0.0
+        return self.due(step, step_s) - self.lead_s - now
 
     def note(self, step: int, step_s: float, now: float) -> None:
-        """Count `step`, made at `now`, if it is late."""
-        if self.factor > 0.0 and now - self.due(step, step_s) > step_s / self.factor:
+        """Note that `step` was made at `now`: the first begins the timetable, others are late."""
+        if not self._begun:
+            self._anchor(step, now)
+        elif self.factor > 0.0 and now - self.due(step, step_s) > step_s / self.factor:
             self.late_steps += 1

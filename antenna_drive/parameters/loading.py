@@ -28,12 +28,12 @@ from pathlib import Path
 from typing import Any
 
 from antenna_drive.parameters import files
+from antenna_drive.parameters.plain_yaml import read_yaml
 from antenna_drive.parameters.schema import Entry, nearest, ParameterError, Value
 from antenna_drive.parameters.sets import (
     Ammeter, Amplifier, Armature, Axis, Drive, Encoder, entries, Filter1, Gearbox, Motor,
     MotorDrive, Plant, RateCommand, Share, Tachometer, TestSignal, TorqueShare, Waveform,
 )
-import yaml
 
 MOTOR_SECTIONS: dict[str, type] = {
     'rate_command': RateCommand, 'amplifier': Amplifier, 'armature': Armature, 'motor': Motor,
@@ -96,44 +96,6 @@ def find(source: str | Path) -> Path:
     known = tuple(sorted(item.stem for item in files.config_dir().glob('*.yaml')))
     raise ParameterError(f'{source}: no such file, and no such set in config/ '
                          f'({", ".join(known)}){nearest(str(source), known)}')
-
-
-class _Loader(yaml.SafeLoader):
-    """A YAML reader that refuses a key given twice, of which only the last would count."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        seen: set[Any] = set()
-        for key_node, _ in node.value:
-            key = self.construct_object(key_node, deep=True)
-            if isinstance(key, (str, int, float)):
-                if key in seen:
-                    raise yaml.constructor.ConstructorError(
-                        None, None, f'{key} is given twice', key_node.start_mark)
-                seen.add(key)
-        return super().construct_mapping(node, deep)
-
-
-def read_yaml(path: Path) -> Any:
-    """
-    Return the content of a YAML file.
-
-    Raises
-    ------
-    ParameterError : the file cannot be read or is not YAML; one line names file and line
-
-    """
-    try:
-        return yaml.load(path.read_text(encoding='utf-8'), Loader=_Loader)
-    except OSError as error:
-        raise ParameterError(f'{path}: cannot be read: {error.strerror}') from error
-    except UnicodeDecodeError as error:
-        raise ParameterError(f'{path}: is not UTF-8 text: {error.reason}') from error
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        where = f', line {mark.line + 1}' if mark else ''
-        raise ParameterError(f'{path}{where}: {error.problem or "not YAML"}') from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ParameterError(f'{path}: not YAML: {str(error).splitlines()[0]}') from error
 
 
 def _read(path: Path) -> tuple[str, _Given]:

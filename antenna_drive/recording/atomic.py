@@ -23,6 +23,7 @@ import shutil
 import tempfile
 from typing import IO
 
+from antenna_drive.drafts import drafted, umask
 from antenna_drive.recording.recording import RecordingError
 
 
@@ -56,21 +57,10 @@ def new_file(path: Path) -> Iterator[IO[bytes]]:
     """
     refuse_existing(path)
     try:
-        handle, draft = tempfile.mkstemp(dir=path.parent, prefix=f'.{path.name}.')
-    except OSError as error:
-        raise refuse_io(path, error) from error
-    try:
-        with open(handle, 'wb') as stream:
+        with drafted(path, refuse_existing) as stream:
             yield stream
-            stream.flush()
-            os.fsync(stream.fileno())
-            os.fchmod(stream.fileno(), 0o666 & ~_umask())
-        refuse_existing(path)
-        os.rename(draft, path)
     except OSError as error:
         raise refuse_io(path, error) from error
-    finally:
-        Path(draft).unlink(missing_ok=True)
 
 
 @contextmanager
@@ -90,16 +80,10 @@ def new_folder(path: Path) -> Iterator[Path]:
         raise refuse_io(path, error) from error
     try:
         yield draft
-        draft.chmod(0o777 & ~_umask())
+        draft.chmod(0o777 & ~umask())
         refuse_existing(path)
         os.rename(draft, path)
     except OSError as error:
         raise refuse_io(path, error) from error
     finally:
         shutil.rmtree(draft, ignore_errors=True)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -23,7 +23,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.recording.plain import from_json, one_line, PlainDataError
+from antenna_drive.errors import one_line
+from antenna_drive.recording.plain import from_json, PlainDataError
 from antenna_drive.recording.recording import (
     make_channel, nanoseconds, Recording, RecordingError,
 )

@@ -35,8 +35,9 @@ import re
 from typing import Any, IO, NamedTuple, TextIO
 import warnings
 
+from antenna_drive.errors import one_line
 from antenna_drive.recording.atomic import new_file, refuse_existing
-from antenna_drive.recording.plain import from_json, one_line, PlainDataError, to_json
+from antenna_drive.recording.plain import from_json, PlainDataError, to_json
 from antenna_drive.recording.recording import (
     Change, Channel, check_name, make_channel, NANOSECONDS, Recording, RecordingError,
     RecordingWarning, unit_of,

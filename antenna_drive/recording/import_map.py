@@ -30,12 +30,12 @@ from typing import Any, TextIO
 import warnings
 
 from antenna_drive.emulator.wiring import OUTPUTS, signal_names
+from antenna_drive.errors import one_line
+from antenna_drive.parameters.plain_yaml import read_yaml
 from antenna_drive.parameters.schema import Entry, nearest, ParameterError
 from antenna_drive.recording.csv_format import (
     Cell, FIELD_COLUMNS, open_text, parse_nanoseconds, parse_number, rows,
 )
-from antenna_drive.recording.plain import one_line
-from antenna_drive.recording.plain_yaml import read_yaml
 from antenna_drive.recording.recording import (
     check_name, make_channel, NANOSECONDS, nanoseconds, Recording, RecordingError,
     RecordingWarning, unit_of,

@@ -39,11 +39,12 @@ import warnings
 import zlib
 
 from antenna_drive.emulator.wiring import signal_names
+from antenna_drive.errors import one_line
+from antenna_drive.parameters.plain_yaml import parse_yaml, read_yaml
 from antenna_drive.parameters.schema import ParameterError
 from antenna_drive.recording.atomic import new_folder, refuse_existing, refuse_io
 from antenna_drive.recording.csv_format import parse_known
-from antenna_drive.recording.plain import freeze, from_json, one_line, PlainDataError, to_json
-from antenna_drive.recording.plain_yaml import parse_yaml, read_yaml
+from antenna_drive.recording.plain import freeze, from_json, PlainDataError, to_json
 from antenna_drive.recording.recording import (
     make_channel, NANOSECONDS, Recording, RecordingError, RecordingWarning, unit_of,
 )

@@ -26,16 +26,11 @@ import numbers
 from types import MappingProxyType
 from typing import Any
 
+from antenna_drive.errors import one_line
+
 
 class PlainDataError(ValueError):
     """Something is no plain data: a text, number, truth value, None, list or mapping."""
-
-
-def one_line(text: object, longest: int = 120) -> str:
-    """Return a text that fits into an error of one line, whatever a file held."""
-    line = ''.join(c if c.isprintable() else ' ' for c in str(text)[:10 * longest])
-    line = ' '.join(line.split())
-    return line if len(line) <= longest else line[:longest - 3] + '...'
 
 
 def freeze(value: object, where: str = '') -> Any:

@@ -33,8 +33,8 @@ from types import MappingProxyType
 from typing import Any, Literal, NamedTuple
 
 from antenna_drive.emulator.wiring import OUTPUTS
-from antenna_drive.errors import UserError
-from antenna_drive.recording.plain import freeze, one_line, PlainDataError
+from antenna_drive.errors import one_line, UserError
+from antenna_drive.recording.plain import freeze, PlainDataError
 from antenna_drive.recording.sheet import TestSheet
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

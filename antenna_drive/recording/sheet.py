@@ -27,9 +27,9 @@ import math
 from pathlib import Path
 from typing import Any, ClassVar, get_args, get_type_hints
 
+from antenna_drive.errors import one_line
+from antenna_drive.parameters.plain_yaml import read_yaml
 from antenna_drive.parameters.schema import Entry, nearest, ParameterError
-from antenna_drive.recording.plain import one_line
-from antenna_drive.recording.plain_yaml import read_yaml
 import yaml
 
 FILE_NAME = 'test_sheet.yaml'

@@ -17,8 +17,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from antenna_drive.parameters.plain_yaml import LONGEST_FILE
 from antenna_drive.parameters.schema import ParameterError
-from antenna_drive.recording.plain_yaml import LONGEST_FILE
 from antenna_drive.recording.sheet import (
     CircuitBias, dump_sheet, load_sheet, Multisine, parse_sheet, sheet_tree, Square, TestSheet,
 )

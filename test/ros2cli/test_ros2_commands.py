@@ -102,9 +102,15 @@ def interrupt(process: subprocess.Popen[str]) -> tuple[int, str]:
     return process.returncode, printed
 
 
-@pytest.fixture(scope='module', params=['colcon', 'pip'])
+# What depends on how the package was installed is tried after both installations, the rest after
+# the one that needs nothing but pip.
+after_both = pytest.mark.parametrize('shell', ['colcon', 'pip'], indirect=True, scope='module')
+after_one = pytest.mark.parametrize('shell', ['pip'], indirect=True, scope='module')
+
+
+@pytest.fixture(scope='module')
 def shell(request: pytest.FixtureRequest, module_domain: int) -> Shell:
-    """Return a shell after either installation, or skip without rclpy or the ros2 command."""
+    """Return a shell after an installation, or skip without rclpy or the ros2 command."""
     pytest.importorskip('rclpy', reason='ROS 2 is not installed')
     if ROS2 is None:
         pytest.skip('the ros2 command line is not installed')
@@ -128,6 +134,7 @@ def drive(shell: Shell) -> Iterator[Shell]:
     assert {node: code for node, (code, _) in ended.items()} == dict.fromkeys(DRIVE, 0), ended
 
 
+@after_both
 @pytest.mark.parametrize('topic', ['/torque_share/bias_voltage', '/plant/encoder'])
 def test_topic_echo(drive: Shell, topic: str) -> None:
     """A signal can be listened to by its name alone."""
@@ -135,6 +142,7 @@ def test_topic_echo(drive: Shell, topic: str) -> None:
     assert math.isfinite(float(re.findall(r'^data: (\S+)$', printed, re.MULTILINE)[0]))
 
 
+@after_one
 def test_topic_list(drive: Shell) -> None:
     """The topics of the drive are listed with their types."""
     expected = {f'{topic} [{kind}]' for topic, kind in TOPICS.items()}
@@ -142,6 +150,7 @@ def test_topic_list(drive: Shell) -> None:
               until=lambda listed: expected <= set(listed.splitlines()))
 
 
+@after_one
 def test_topic_info(drive: Shell) -> None:
     """A signal has one publisher."""
     info = drive.ask('topic', 'info', '--no-daemon', '/motor_1/current')
@@ -149,6 +158,7 @@ def test_topic_info(drive: Shell) -> None:
     assert 'Publisher count: 1\n' in info
 
 
+@after_one
 def test_topic_hz(drive: Shell) -> None:
     """A signal comes at a steady rate that can be measured."""
     process = drive.start('topic', 'hz', '--window', '20', '/plant/axis_rate')
@@ -163,6 +173,7 @@ def test_topic_hz(drive: Shell) -> None:
     interrupt(process)
 
 
+@after_one
 def test_node_info(drive: Shell) -> None:
     """A node shows its signals and the frames that it reads."""
     # within the usual half second a busy machine has told the publishers only
@@ -175,12 +186,14 @@ def test_node_info(drive: Shell) -> None:
         assert f'/{node}/frame: std_msgs/msg/Float64MultiArray' in subscribers
 
 
+@after_one
 def test_param_list(drive: Shell) -> None:
     """Constants and tuning values are parameters of the unit's own node."""
     listed = drive.ask('param', 'list', '--no-daemon', '/torque_share').split()
     assert {'bias_pot', 'fade_out_voltage', 'filter_1.gain', 'filter_1.pole', 'k_2'} <= set(listed)
 
 
+@after_both
 def test_param_get_and_set(drive: Shell) -> None:
     """A tuning value is set while the drive runs, and reported once it is in force."""
     node = (*PATIENT, '/torque_share', 'bias_pot')
@@ -189,6 +202,7 @@ def test_param_get_and_set(drive: Shell) -> None:
     assert drive.ask('param', 'get', *node) == 'Double value is: 0.25\n'
 
 
+@after_one
 @pytest.mark.parametrize('name, value', [('bias_pot', '1.5'), ('k_2', '-3.0')])
 def test_param_set_is_refused(drive: Shell, name: str, value: str) -> None:
     """What is out of range, and a physical constant, is refused with a reason and unchanged."""
@@ -199,6 +213,7 @@ def test_param_set_is_refused(drive: Shell, name: str, value: str) -> None:
     assert drive.ask('param', 'get', *node) == before
 
 
+@after_one
 def test_param_describe(drive: Shell) -> None:
     """A parameter tells its unit, its range, and whether it may change."""
     described = drive.ask('param', 'describe', *PATIENT, '/torque_share', 'fade_out_voltage')
@@ -206,12 +221,14 @@ def test_param_describe(drive: Shell) -> None:
     assert re.search(r'Min value: -50\.0\s+Max value: 0\.0', described)
 
 
+@after_one
 def test_plant_constants_are_read_only(drive: Shell) -> None:
     """The read-only mark stands on what cannot be tuned."""
     described = drive.ask('param', 'describe', *PATIENT, '/plant', 'gear_ratio')
     assert 'Read only: true' in described
 
 
+@after_both
 def test_namespace_moves_a_node(shell: Shell) -> None:
     """In a namespace everything of a node is in the namespace; alone it waits, and can be left."""
     process = shell.start('run', 'antenna_drive', 'torque_share', '--ros-args', '-r',

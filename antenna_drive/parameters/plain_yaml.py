@@ -23,8 +23,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from antenna_drive.errors import one_line
 from antenna_drive.parameters.schema import ParameterError
-from antenna_drive.recording.plain import one_line
 import yaml
 
 LONGEST_FILE = 1_000_000  # bytes; a test sheet has some hundred

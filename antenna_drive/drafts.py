@@ -1,0 +1,64 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A file is written as a draft beside its place, and put there whole."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+import os
+from pathlib import Path
+import tempfile
+from typing import IO
+
+
+@contextmanager
+def drafted(path: Path, check: Callable[[Path], object] | None = None) -> Iterator[IO[bytes]]:
+    """
+    Give a stream whose content takes the place of `path` at the end, if all went well.
+
+    Whoever looks at `path` sees what was there before or all that is new, never a part of it.
+
+    Parameters
+    ----------
+    path
+        the file
+    check
+        called with `path` just before it is put there; what it raises leaves all as it was
+
+    Raises
+    ------
+    OSError : the file cannot be written there
+
+    """
+    handle, draft = tempfile.mkstemp(dir=path.parent, prefix=f'.{path.name}.')
+    try:
+        with open(handle, 'wb') as stream:
+            yield stream
+            stream.flush()
+            os.fsync(stream.fileno())
+            # a draft is for its owner's eyes, a result is not
+            os.fchmod(stream.fileno(), 0o666 & ~umask())
+        if check is not None:
+            check(path)
+        os.replace(draft, path)
+    finally:
+        Path(draft).unlink(missing_ok=True)
+
+
+def umask() -> int:
+    """Return what new files and folders are not allowed to be."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
