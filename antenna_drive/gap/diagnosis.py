@@ -33,6 +33,7 @@ import time
 from typing import Any
 
 from antenna_drive.gap import unknown_input, verdict, where
+from antenna_drive.gap.doubt import doubted
 from antenna_drive.gap.drive_model import DriveModel
 from antenna_drive.gap.fit import Problem, pull_of
 from antenna_drive.gap.how_far import how_far
@@ -175,12 +176,11 @@ def _diagnosed(model: Model, progress: Progress, threads: int,
                notes: Sequence[str]) -> Diagnosis:
     began = time.monotonic()
     search = Search(Problem(model), lambda share, doing: progress(0.9 * share, doing), threads)
-    candidates = search.run()
+    # what is left is judged after a fit that has converged; the ranking compares like with like
+    candidates, best = doubted(search, search.run())
     # the noise is that of the motion which was found
     problem, model = search.whole, search.whole.model
     none = candidates[0]
-    # what is left is judged after a fit that has converged; the ranking compares like with like
-    best = search.polished(verdict.best(candidates))
     progress(0.9, 'how far it goes')
     reach = how_far(problem, none, best)
     left = remains(problem, best, reach['explained_fraction']['ci95'][1])

@@ -488,6 +488,13 @@ class Search:
                 break
         return replace(candidate, state=state)
 
+    def without(self, candidate: Candidate, effect: str) -> Candidate:
+        """Return a candidate without one of its effects, fitted to the end from where it is."""
+        rest = self._dropped(candidate, effect)
+        state = self.whole.start(rest.state.parameters, rest.state.point(), central=True)
+        rest = self.polished(replace(rest, state=self.whole.fit(state, 8)))
+        return _light(rest, hessian=True)
+
     def _dropped(self, candidate: Candidate, effect: str) -> Candidate:
         """Return a candidate without one of its effects, not fitted yet."""
         gone = candidate.effects.index(effect)

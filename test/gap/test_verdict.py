@@ -18,13 +18,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 from antenna_drive.gap.catalogue import gust_form, GUST_KNOT_S, gust_knots
+from antenna_drive.gap.doubt import doubted
 from antenna_drive.gap.fit import State
 from antenna_drive.gap.model import FloatArray, Form, Parameter
 from antenna_drive.gap.price import price, TOLERATED
 from antenna_drive.gap.residuals import fast, power, structure
 from antenna_drive.gap.search import Candidate
 from antenna_drive.gap.verdict import (
-    DETECTABLE, LEAST, MOST, rank, Remains, unknown_probability,
+    best, DETECTABLE, LEAST, MOST, rank, Remains, unknown_probability,
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -110,3 +111,48 @@ def test_what_is_far_below_the_noise_is_no_gap() -> None:
     beyond = fitted(('motor.gain',), 16000.0 * (1.0 - 3.0 * DETECTABLE))
     assert rank([none, within], 0.0)[0].candidate is none
     assert rank([none, beyond], 0.0)[0].candidate is beyond
+
+
+class Ends:
+    """Fits whose ends are known: the cost of each set of effects."""
+
+    def __init__(self, ends: dict[tuple[str, ...], float]) -> None:
+        self.ends = ends
+        self.asked: list[tuple[str, ...]] = []
+
+    def polished(self, candidate: Candidate) -> Candidate:
+        return fitted(candidate.effects, min(self.ends[candidate.effects], candidate.cost))
+
+    def without(self, candidate: Candidate, effect: str) -> Candidate:
+        rest = tuple(e for e in candidate.effects if e != effect)
+        self.asked.append(rest)
+        return fitted(rest, self.ends[rest])
+
+
+def test_a_fit_of_the_offsets_that_got_stuck_raises_no_alarm() -> None:
+    fits = Ends({(): 15990.0, ('a',): 16000.0})
+    candidates, end = doubted(fits, [fitted((), 16470.0), fitted(('a',), 16002.0)])
+    assert end.effects == best(candidates).effects == ()
+    # others are as far from their ends as the best was: two
+    assert [c.cost for c in candidates] == [15992.0, 16002.0]
+
+
+def test_a_partner_that_only_helped_a_fit_along_is_let_go() -> None:
+    fits = Ends({(): 90000.0, ('a',): 16030.0, ('b',): 89000.0, ('a', 'b'): 16030.0})
+    candidates, end = doubted(fits, [
+        fitted((), 106000.0), fitted(('a', 'b'), 16140.0), fitted(('a',), 19100.0)])
+    assert end.effects == ('a',)
+    assert [c.effects for c in candidates] == [(), ('a', 'b'), ('a',)]
+
+
+def test_a_weak_effect_that_is_there_stays() -> None:
+    fits = Ends({(): 17400.0, ('a',): 16000.0})
+    candidates, end = doubted(fits, [fitted((), 17500.0), fitted(('a',), 16000.0)])
+    assert fits.asked == [()]
+    assert end.effects == best(candidates).effects == ('a',)
+
+
+def test_a_strong_effect_is_not_doubted() -> None:
+    fits = Ends({('a',): 16000.0})
+    doubted(fits, [fitted((), 160000.0), fitted(('a',), 16000.0)])
+    assert not fits.asked
