@@ -347,7 +347,7 @@ class DriveModel:
             longest, SHORTEST_STEP, WAVE_STEP, turns))
         if push is not None:
             plan = _with(plan, record, *push)
-        samples = int(np.count_nonzero(test.time < job.until))
+        samples = int(np.count_nonzero(test.time - test.time[0] < job.until))
         if samples == test.time.size:
             return batch.run(record, plan)
         steps = int(np.argmax(plan.keep == samples - 1))

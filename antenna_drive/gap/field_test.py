@@ -28,7 +28,7 @@ from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed, Drive
 from antenna_drive.recording import sheet as sheets
-from antenna_drive.recording.recording import Channel, Recording
+from antenna_drive.recording.recording import Channel, NANOSECONDS, Recording
 import numpy as np
 
 CHANNELS = {
@@ -43,6 +43,11 @@ _ALIASES = {'motor_1/ammeter': ('motor_1/current',), 'motor_2/ammeter': ('motor_
 _RATE_COMMAND = 'test_signal/rate_command'
 # Samples are thinned to about this rate; they are never averaged, which would hide a ripple.
 SAMPLE_RATE = 70.0
+# A recording that begins later is counted from its first sample [s], unless it joined the sheet's
+# waveform so long after that had begun.
+_PROMPT_S, _JOINED_S = 1.0, 60.0
+# Fewer samples tell nothing.
+_FEWEST = 10
 # What a sheet's word for a circuit sets.
 _CIRCUITS = {'circuit': ('torque_share.torque_share', ('k_2', 's_2', 'k_3', 'g_4')),
              'filter_1': ('torque_share.filter_1', ('gain', 'pole'))}
@@ -80,8 +85,8 @@ class FieldTest:
     jitter: float
 
     def until(self, end: float) -> FieldTest:
-        """Return the test cut short at a time [s]."""
-        n = int(np.searchsorted(self.time, end))
+        """Return as much of the test [s] from its first sample on."""
+        n = int(np.searchsorted(self.time, self.time[0] + end))
         return replace(self, time=self.time[:n], measured=self.measured[:n],
                        slope=self.slope[:n])
 
@@ -109,22 +114,37 @@ def prepared(name: str, recording: Recording, drive: Drive, note: Note) -> Field
 
     Raises
     ------
-    UserError : the rate command is missing, or there is no reading to compare
+    UserError : the rate command is missing, or there is no reading to compare, or nearly none
 
     """
-    if _RATE_COMMAND not in recording or len(recording[_RATE_COMMAND]) < 10:
+    if _RATE_COMMAND not in recording or len(recording[_RATE_COMMAND]) < _FEWEST:
         raise UserError(f'{name}: no rate command is recorded; {_RATE_COMMAND} '
                         '(rate_command_rad_s in a CSV) is needed')
     if all(_channel(recording, channel) is None for channel in CHANNELS):
         raise UserError(f'{name}: there is no reading beside the rate command, '
                         'at least one current is needed')
+    recording = _from_its_start(name, recording, note)
     drive, bias = _as_the_sheet_says(name, recording.sheet, drive, note)
     given = recording[_RATE_COMMAND]
     command = _command(name, recording.sheet.waveform, given, note)
     time = _times(recording)
+    if time.size < _FEWEST:
+        raise UserError(f'{name}: {time.size} samples to compare after the start, at least '
+                        f'{_FEWEST} are needed')
     return FieldTest(name, record_of(drive), command, bias, time,
                      *_measured(name, recording, time, note), Sensors.of(recording.sheet.sensors),
                      jitter_of(command, given.time_s, given.values))
+
+
+def _from_its_start(name: str, recording: Recording, note: Note) -> Recording:
+    """Return a recording whose time begins with the test, not with a clock's year."""
+    begins_s = recording.start_ns / NANOSECONDS
+    waveform = recording.sheet.waveform
+    if abs(begins_s) <= _PROMPT_S or (0.0 < begins_s < _JOINED_S and waveform is not None
+                                      and _is(SheetCommand(waveform), recording[_RATE_COMMAND])):
+        return recording
+    note(f'{name}: begins at {begins_s:.3f} s, time is counted from there')
+    return recording.shift_ns(-recording.start_ns)
 
 
 def _as_the_sheet_says(name: str, sheet: sheets.TestSheet, drive: Drive,
@@ -165,11 +185,16 @@ def _command(name: str, waveform: sheets.Waveform | None, given: Channel, note: 
         note(f'{name}: no waveform in the sheet, the recorded command was interpolated')
         return RecordedCommand.of(given.time_s, given.values)
     exact = SheetCommand(waveform)
-    wrong = np.abs(exact(given.time_s) - given.values) > 0.05 * np.ptp(given.values)
-    if np.mean(wrong) < 0.02:
+    if _is(exact, given):
         return exact
     note(f"{name}: the recorded command is not the sheet's waveform, it was interpolated")
     return RecordedCommand.of(given.time_s, given.values)
+
+
+def _is(command: Command, given: Channel) -> bool:
+    """Tell whether a command is the one that was recorded."""
+    wrong = np.abs(command(given.time_s) - given.values) > 0.05 * np.ptp(given.values)
+    return bool(np.mean(wrong) < 0.02)
 
 
 def _channel(recording: Recording, name: str) -> Channel | None:
@@ -184,6 +209,8 @@ def _times(recording: Recording) -> FloatArray:
     channels = [_channel(recording, name) for name in CHANNELS]
     time = max((c.time_s for c in channels if c is not None), key=len)
     time = time[time >= 0.0]
+    if time.size < _FEWEST:
+        return time
     every = max(1, round(1.0 / float(np.median(np.diff(time))) / SAMPLE_RATE))
     return np.asarray(time[::every])
 

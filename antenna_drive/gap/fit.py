@@ -361,7 +361,7 @@ def best_of(problem: Problem, trials: Sequence[dict[str, float]], experiment: in
 
     """
     here = problem.experiments[experiment]
-    early = (here.time < until)[:, np.newaxis]
+    early = (here.time - here.time[0] < until)[:, np.newaxis]
     best, least = trials[0], np.inf
     for first in range(0, len(trials), _CHUNK):
         part = trials[first:first + _CHUNK]

@@ -265,7 +265,8 @@ class Model(Protocol):
         only
             for each variant the one experiment that is wanted, None for all
         until
-            end of the simulation [s]; what would come later is NaN
+            end of the simulation after an experiment's first sample [s]; what would come later is
+            NaN
 
         Returns
         -------

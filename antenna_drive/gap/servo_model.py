@@ -297,7 +297,8 @@ class ServoModel:
     def _run(self, job: tuple[int, FloatArray, float]) -> FloatArray:
         k, values, until = job
         readings = self.tests[k].readings(values)[::self._strides[k]]
-        readings[self.experiments[k].time > until] = np.nan
+        time = self.experiments[k].time
+        readings[time - time[0] > until] = np.nan
         return readings
 
     def motion(self, experiment: int) -> Motion:
