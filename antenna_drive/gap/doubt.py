@@ -60,9 +60,9 @@ def doubted(fits: Fits, candidates: Sequence[Candidate]) -> tuple[list[Candidate
     """
     found = {frozenset(c.effects): c for c in candidates}
     tried: set[frozenset[str]] = set()
+    best = verdict.best(candidates)
+    polished = fits.polished(best)
     while True:
-        best = verdict.best(list(found.values()))
-        polished = fits.polished(best)
         rests = {effect: frozenset(best.effects) - {effect} for effect in best.effects}
         # what is not among the candidates any more was far behind
         doubts = {effect: rest for effect, rest in rests.items() if rest in found
@@ -76,3 +76,6 @@ def doubted(fits: Fits, candidates: Sequence[Candidate]) -> tuple[list[Candidate
             behind = simpler.cost + best.cost - polished.cost
             if behind < found[rest].cost:
                 found[rest] = replace(simpler, state=replace(simpler.state, cost=behind))
+        leading = verdict.best(list(found.values()))
+        if leading is not best:
+            best, polished = leading, fits.polished(leading)

@@ -160,17 +160,17 @@ class DriveModel:
         other.experiments = self._experiments(point)
         return other
 
-    def _stepping(self, longest_step: float) -> DriveModel:
-        """Return the model with other steps, and so with runs and tables of steps of its own."""
+    def _in_rough_steps(self) -> DriveModel:
+        """Return the model with longer steps, and so with runs and tables of steps of its own."""
         other = copy.copy(self)
         other._cache = OrderedDict()
         other._plans = OrderedDict()
-        other._longest_step = longest_step
+        other._longest_step = ROUGH_STEP
         return other
 
     def brief(self) -> DriveModel:
         """Return the model with as much of each test as a search needs; a chirp stays whole."""
-        other = self._stepping(ROUGH_STEP)
+        other = self._in_rough_steps()
         other._tests = [test.until(BRIEF_S if test.repeats else math.inf)
                         for test in self._tests]
         sizes = [test.time.size for test in other._tests]
@@ -184,7 +184,7 @@ class DriveModel:
         if self._longest_step >= ROUGH_STEP:
             return self
         if self._rougher is None:
-            self._rougher = self._stepping(ROUGH_STEP)
+            self._rougher = self._in_rough_steps()
         return self._rougher
 
     def motion(self, experiment: int) -> Motion:

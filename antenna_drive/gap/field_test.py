@@ -127,10 +127,7 @@ def prepared(name: str, recording: Recording, drive: Drive, note: Note) -> Field
     drive, bias = _as_the_sheet_says(name, recording.sheet, drive, note)
     given = recording[_RATE_COMMAND]
     command = _command(name, recording.sheet.waveform, given, note)
-    time = _times(recording)
-    if time.size < _FEWEST:
-        raise UserError(f'{name}: {time.size} samples to compare after the start, at least '
-                        f'{_FEWEST} are needed')
+    time = _times(name, recording)
     return FieldTest(name, record_of(drive), command, bias, time,
                      *_measured(name, recording, time, note), Sensors.of(recording.sheet.sensors),
                      jitter_of(command, given.time_s, given.values))
@@ -204,13 +201,14 @@ def _channel(recording: Recording, name: str) -> Channel | None:
     return None
 
 
-def _times(recording: Recording) -> FloatArray:
+def _times(name: str, recording: Recording) -> FloatArray:
     """Return the times of the samples that are used: those of the most sampled reading."""
     channels = [_channel(recording, name) for name in CHANNELS]
     time = max((c.time_s for c in channels if c is not None), key=len)
     time = time[time >= 0.0]
     if time.size < _FEWEST:
-        return time
+        raise UserError(f'{name}: {time.size} samples to compare after the start, at least '
+                        f'{_FEWEST} are needed')
     every = max(1, round(1.0 / float(np.median(np.diff(time))) / SAMPLE_RATE))
     return np.asarray(time[::every])
 

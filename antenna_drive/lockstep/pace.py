@@ -41,7 +41,6 @@ class Pace:
         """Set the pace."""
         self.factor = factor
         self.lead_s = lead_s
-        self.late_steps = 0
         self.begin()
 
     def begin(self) -> None:
@@ -73,7 +72,7 @@ class Pace:
         return self.due(step, step_s) - self.lead_s - now
 
     def note(self, step: int, step_s: float, now: float) -> None:
-        """Note that `step` was made at `now`: the first begins the timetable, others are late."""
+        """Note that `step` was made at `now`: the first begins the timetable, late ones count."""
         if not self._begun:
             self._anchor(step, now)
         elif self.factor > 0.0 and now - self.due(step, step_s) > step_s / self.factor:
