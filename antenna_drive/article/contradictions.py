@@ -85,7 +85,7 @@ def _variant(results: Results, name: str, **settings: Any) -> Run:
     """Run an experiment with other settings of the torque-share circuit."""
     experiment = experiments()[name]
     drive = experiment.applied_to(results.drives[experiment.circuit])
-    return simulate(changed(drive, {f'torque_share.torque_share.{key}': value
+    return simulate(changed(drive, {f'torque_share.circuit.{key}': value
                                     for key, value in settings.items()}), experiment.duration)
 
 
@@ -206,7 +206,7 @@ def bias_pot(results: Results) -> Contradiction:
 def fade_out_voltage(results: Results) -> Contradiction:
     """Return what DSS-13's fade-out voltage gives in the tests, which were made at DSS-26."""
     found = []
-    fitted = results.drives[OLD_CIRCUIT].torque_share.torque_share.fade_out_voltage
+    fitted = results.drives[OLD_CIRCUIT].torque_share.circuit.fade_out_voltage
     for volts, source in ((-9.0, 'as implemented at DSS 13'), (-11.0, 'Fig. 15(a)'),
                           (fitted, 'fitted')):
         old = _bias_range(_variant(results, 'T3a', fade_out_voltage=volts))

@@ -74,8 +74,8 @@ class Experiment:
         """Return a drive, which has this experiment's circuit, with all else that it sets."""
         settings = dict(self.settings)
         if self.bias_share is not None:
-            settings['torque_share.torque_share.bias_source'] = 'fixed'
-            settings['torque_share.torque_share.fixed_voltage'] = (
+            settings['torque_share.circuit.bias_source'] = 'fixed'
+            settings['torque_share.circuit.fixed_voltage'] = (
                 self.bias_share * drive.motor_1.motor.current_limit
                 * drive.torque_share.filter_1.difference_gain)
         return changed(drive, settings)
@@ -88,7 +88,7 @@ def _rate(waveform: Mapping[str, Any]) -> dict[str, Any]:
 def filter_variant(gain: float, pole: float) -> Experiment:
     """Return T4 with another Filter 1: k' [1/s] and p [1/s]."""
     return Experiment(f'T4 k {gain:.4g} p {pole:.4g}', 8.0, 'old_circuit', {
-        'torque_share.torque_share.bias_pot': 0.7,
+        'torque_share.circuit.bias_pot': 0.7,
         'torque_share.filter_1.gain': gain, 'torque_share.filter_1.pole': pole})
 
 
@@ -96,8 +96,8 @@ def experiments() -> dict[str, Experiment]:
     """Return T1 to T4 by name."""
     square = _rate(SQUARE)
     saw_tooth = _rate(SAW_TOOTH)
-    steady = {'torque_share.torque_share.start': 'steady'}
-    pot = 'torque_share.torque_share.bias_pot'
+    steady = {'torque_share.circuit.start': 'steady'}
+    pot = 'torque_share.circuit.bias_pot'
     return {item.name: item for item in (
         Experiment('T1', 4 * 6.3, 'old_circuit', square, 0.0),
         Experiment('T2', 4 * 6.3, 'old_circuit', square, 0.15),

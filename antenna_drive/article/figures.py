@@ -163,7 +163,7 @@ def _encoder(results: Results, name: str) -> Figure:
 def bias_fade_out(results: Results) -> Figure:
     """Fig. 15: Eq. (14) for its four parameters in turn."""
     figure, axes = _new(2, 5.0, 2, sharey=True)
-    text = as_in_the_text(results.drives[OLD_CIRCUIT].torque_share.torque_share)
+    text = as_in_the_text(results.drives[OLD_CIRCUIT].torque_share.circuit)
     dc_gain = text.k_2 / text.s_2
     panels = (
         ('(a) fade-out voltage', [
@@ -201,7 +201,7 @@ def bias_slopes(results: Results) -> Figure:
     for circuit, gain, style, label in (
             (NEW_CIRCUIT, NEW_GAIN, '-', '$g_2$ = -2.38, $k_2$ = 1.617'),
             (OLD_CIRCUIT, static_profile.TEXT_GAIN, _DASHED, '$g_2$ = -3.20, $k_2$ = 2.6')):
-        share = results.drives[circuit].torque_share.torque_share
+        share = results.drives[circuit].torque_share.circuit
         _profile(axes, as_in_the_text(share, gain), style, label)
     axes.set(xlabel="Current $i_1 + i_2$, A (the article's)", ylabel='Bias voltage, V')
     axes.legend(loc='upper right')

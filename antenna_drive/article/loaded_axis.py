@@ -78,7 +78,7 @@ def greatest_axial_torque(drive: Drive) -> float:
 
 def bias_pot(drive: Drive, share: float) -> float:
     """Return the bias pot that gives a torque bias, as a share of the greatest torque."""
-    greatest = drive.torque_share.torque_share.saturation_high
+    greatest = drive.torque_share.circuit.saturation_high
     return (share * drive.motor_1.motor.current_limit
             * drive.torque_share.filter_1.difference_gain / greatest)
 
@@ -98,8 +98,8 @@ def loaded(drive: Drive, circuit: str, share: float) -> LoadedAxis:
 
     """
     experiment = Experiment(f'loaded axis {share:g}', 1.25 * PERIOD, circuit, {
-        'torque_share.torque_share.bias_pot': bias_pot(drive, share),
-        'torque_share.torque_share.start': 'steady',
+        'torque_share.circuit.bias_pot': bias_pot(drive, share),
+        'torque_share.circuit.start': 'steady',
         'test_signal.torque.waveform': 'saw_tooth',
         'test_signal.torque.amplitude': AMPLITUDE * greatest_axial_torque(drive),
         'test_signal.torque.period': PERIOD})
@@ -133,7 +133,7 @@ def by_equation_14(drive: Drive, share: float, load: FloatArray) -> FloatArray:
 
     """
     most = drive.motor_1.motor.current_limit
-    circuit = drive.torque_share.torque_share
+    circuit = drive.torque_share.circuit
     volts = bias_voltage(circuit, 2.0 * most * load / 100.0) / circuit.bias_pot
     half = 50.0 * share * volts / circuit.saturation_high
     return np.column_stack([load - half, load + half])

@@ -235,7 +235,7 @@ def article_measures(drive: Drive) -> dict[str, Measure]:
                 {'plant/axis_rate': 1.0, 'test_signal/rate_command': -1.0}, calm, 'T1', 100.0),
         Reading('step.overshoot', 'percent', 'step', 'overshoot', tachs, {}, None, 100.0),
     ]
-    greatest = drive.torque_share.torque_share.saturation_high
+    greatest = drive.torque_share.circuit.saturation_high
     for name in ('T3a', 'T3b'):
         figures += [Reading(f'{name}.{quantity}', unit, name, quantity.removesuffix('_share'),
                             voltage, {'after': SAW_TOOTH['period']}, None, scale)

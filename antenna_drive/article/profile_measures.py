@@ -36,7 +36,7 @@ CIRCUITS = {'old': OLD_CIRCUIT, 'new': NEW_CIRCUIT}
 
 
 def _of_circuit(figure: Callable[[TorqueShare], float], drive: Drive) -> float:
-    return figure(drive.torque_share.torque_share)
+    return figure(drive.torque_share.circuit)
 
 
 def _dc_gain(share: TorqueShare) -> float:

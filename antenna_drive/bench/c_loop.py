@@ -117,7 +117,7 @@ def _motor(p: MotorDrive) -> list[float]:
 
 
 def _share(p: Share) -> list[float]:
-    circuit, filter_1 = p.torque_share, p.filter_1
+    circuit, filter_1 = p.circuit, p.filter_1
     return [
         circuit.bias_pot, circuit.fade_out_voltage, circuit.current_to_voltage,
         circuit.saturation_low, circuit.saturation_high, circuit.k_2, circuit.s_2, circuit.k_3,

@@ -71,7 +71,7 @@ def constants(drive: Drive) -> FloatArray:
     kappa = armature.physical_amperes_per_article_ampere
     coulomb = motor.motor.coulomb_torque * motor.motor.friction_torque_per_ampere
     hub_coulomb = axis.coulomb_torque * axis.friction_torque_per_ampere * axis.gear_ratio
-    circuit, filter_1 = share.torque_share, share.filter_1
+    circuit, filter_1 = share.circuit, share.filter_1
     gain_sum = armature.resistance + amplifier.current_feedback_gain
     p = np.array([
         motor.rate_command.k_s * motor.rate_command.k_1, motor.rate_command.tau_1,
@@ -98,7 +98,7 @@ def constants(drive: Drive) -> FloatArray:
 def initial_state(drive: Drive) -> FloatArray:
     """Return the state at rest, shape (STATES,); the torque share has settled if it says so."""
     x = np.zeros(STATES)
-    circuit = drive.torque_share.torque_share
+    circuit = drive.torque_share.circuit
     if circuit.start == 'steady':
         x[X_2] = circuit.k_2 * circuit.fade_out_voltage / circuit.s_2
     return x

@@ -289,7 +289,7 @@ def plan(problem: Problem, step_s: float) -> batch.Schedule:
     piece = np.searchsorted(start, begins + 1e-9, side='right') - 1
     steps[:, batch.COMMAND] = value[piece] + slope[piece] * (begins - start[piece])
     steps[:, batch.SLOPE] = slope[piece]
-    steps[:, batch.FIXED_BIAS] = problem.drive.torque_share.torque_share.fixed_voltage
+    steps[:, batch.FIXED_BIAS] = problem.drive.torque_share.circuit.fixed_voltage
     if step_s > GRID_S:
         return batch.Schedule(steps, np.arange(knots.size))
     keep = np.full(steps.shape[0] + 1, -1)

@@ -51,7 +51,7 @@ KINDS = ('value', 'at_least', 'at_most')
 _UNREADABLE = 100.0
 _LIST_ITEM = re.compile(r'(?P<key>.+)\[(?P<index>\d+)\]')
 _OWN_SECTIONS = {'axis': 'plant.axis', 'encoder': 'plant.encoder',
-                 'torque_share': 'torque_share.torque_share', 'filter_1': 'torque_share.filter_1'}
+                 'torque_share': 'torque_share.circuit', 'filter_1': 'torque_share.filter_1'}
 
 
 @dataclass(frozen=True)

@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyse the tests and say what they can tell."""
-    from antenna_drive.gap.confusability import BUILT_IN, confusability, planned
+    from antenna_drive.diagnosis.confusability import BUILT_IN, confusability, planned
     from antenna_drive.parameters.loading import load
     from antenna_drive.recording.sheet import load_sheet
 

@@ -31,8 +31,9 @@ import argparse
 from pathlib import Path
 import sys
 
-from antenna_drive.cli.output import add_json_option, Progress, replaced, STANDARD_OUTPUT
-from antenna_drive.cli.output import write_json
+from antenna_drive.cli.output import (
+    add_json_option, Progress, replaced, STANDARD_OUTPUT, write_json,
+)
 from antenna_drive.cli.reading import warnings_in_one_line
 from antenna_drive.errors import UserError
 from antenna_drive.recording.files import read_recording
@@ -54,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose, and write what was asked for; 0 whatever the verdict."""
     # the compiled physics takes a while to load: not before it is needed
-    from antenna_drive.gap.diagnosis import diagnose
+    from antenna_drive.diagnosis.diagnosis import diagnose
     from antenna_drive.parameters.loading import load
 
     if arguments.jobs < 1:
@@ -73,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         write_json(diagnosis.result, arguments.json)
     if arguments.report:
-        from antenna_drive.gap.report import page
+        from antenna_drive.diagnosis.page import page
         with replaced(Path(arguments.report)) as stream:
             stream.write(page(diagnosis).encode())
     stream_out = sys.stderr if arguments.json == STANDARD_OUTPUT else sys.stdout

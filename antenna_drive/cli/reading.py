@@ -19,9 +19,11 @@ import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
 import math
+from pathlib import Path
 import sys
 import warnings
 
+from antenna_drive.machines.servo.bam import read_bam
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.recording import Recording, RecordingWarning
 
@@ -42,7 +44,9 @@ def add_recording_options(parser: argparse.ArgumentParser, span: bool = True) ->
 def read(args: argparse.Namespace) -> Recording:
     """Read the recording that the options name; UserError says what is wrong with it."""
     with warnings_in_one_line():
-        recording = read_recording(args.recording, partial=args.partial)
+        # a servo's log belongs to its machine, which the room of recordings does not know
+        recording = (read_bam(args.recording) if Path(args.recording).suffix == '.json'
+                     else read_recording(args.recording, partial=args.partial))
     if 'start' in args and (args.start > -math.inf or args.end < math.inf):
         recording = recording.between(args.start, args.end)
     return recording

@@ -35,7 +35,7 @@ import sys
 
 from antenna_drive.cli.output import add_json_option, Progress, STANDARD_OUTPUT, write_json
 from antenna_drive.errors import UserError
-from antenna_drive.recording.bam import read_bam
+from antenna_drive.machines.servo.bam import read_bam
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -59,9 +59,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Compare; 0 if the diagnosis has the lower withheld error in every split, else 1."""
     # the compiled physics takes a while to load: not before it is needed
-    from antenna_drive.gap.servo_model import ServoTest
-    from antenna_drive.gap.servo_search import Effort
-    from antenna_drive.gap.servo_study import directions, SPLITS, study, text
+    from antenna_drive.machines.servo.machine import ServoTest
+    from antenna_drive.machines.servo.rounds import Effort
+    from antenna_drive.machines.servo.study import directions, SPLITS, study, text
 
     for name, least in (('runs', 20), ('jobs', 1)):
         if getattr(arguments, name) < least:

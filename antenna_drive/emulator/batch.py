@@ -129,7 +129,7 @@ def _read(x, dx, mode, drive, out):  # type: ignore[no-untyped-def]
     out[4, 0] = structure.encoder(x[_PLANT + structure.ANGLE], drive.plant.encoder)
     out[4, 1] = x[_PLANT + structure.RATE]
     out[5, 0], out[5, 1] = torque_share.voltmeter(
-        x[_SHARE:_PLANT], mode[_MODE_SHARE:_MODE_PLANT], drive.torque_share.torque_share)
+        x[_SHARE:_PLANT], mode[_MODE_SHARE:_MODE_PLANT], drive.torque_share.circuit)
 
 
 @compiled
@@ -146,7 +146,7 @@ def _run(  # type: ignore[no-untyped-def]
     for k in range(-1, steps.shape[0]):
         if k >= 0:
             u = (steps[k], motor, share, plant)
-            drive.torque_share.torque_share.fixed_voltage = steps[k, FIXED_BIAS]
+            drive.torque_share.circuit.fixed_voltage = steps[k, FIXED_BIAS]
             numbers[changing] = given + steps[k, CHANGE]
             _advance(x, mode, u, drive, steps[k, LENGTH], 1, work)
         row = keep[k + 1]
@@ -204,7 +204,7 @@ def run(record: np.ndarray[Any, np.dtype[Any]], schedule: Schedule) -> FloatArra
     out = np.empty((schedule.rows, len(CHANNELS), 2))
     numbers = record.view(np.float64).copy()
     record = numbers.view(record.dtype)
-    record['torque_share']['torque_share']['fixed_voltage'] = schedule.steps[0, FIXED_BIAS]
+    record['torque_share']['circuit']['fixed_voltage'] = schedule.steps[0, FIXED_BIAS]
     _run(record, numbers, schedule.changing, schedule.steps, schedule.keep,
          np.zeros(states), np.zeros(states), np.zeros(_MODES, np.int64),
          np.zeros((motor_drive.INPUTS, 2)), np.zeros((torque_share.INPUTS, 2)),

@@ -138,7 +138,7 @@ class TorqueShareUnit(_SteppedUnit):
     outputs: ClassVar[tuple[Signal, ...]] = wiring.TORQUE_SHARE_OUTPUTS
     _physics: ClassVar[Any] = torque_share
     _advance: ClassVar[Any] = staticmethod(steps.share_step)
-    _own = 'torque_share'
+    _own = 'circuit'
 
     def __init__(self, name: str, drive: Drive) -> None:
         """Take the torque share's parameters from the drive's."""
@@ -251,7 +251,7 @@ def home(parameter: str) -> tuple[str, str]:
     """
     Return the unit that a parameter of `Drive` belongs to, and its name there.
 
-    'torque_share.torque_share.bias_pot' is the setting bias_pot of the unit torque_share.
+    'torque_share.circuit.bias_pot' is the setting bias_pot of the unit torque_share.
 
     Raises
     ------

@@ -29,10 +29,10 @@ from typing import Any
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.errors import UserError
 from antenna_drive.lockstep.entry import choose_transport
+from antenna_drive.lockstep.following import Follower, Step
 from antenna_drive.lockstep.frame import FrameLayout
 from antenna_drive.lockstep.readings import CHANGES_QOS
 from antenna_drive.lockstep.ros_link import FrameLink
-from antenna_drive.recording.following import Follower, Step
 from antenna_drive.recording.recorder import RunRecorder
 from antenna_drive.recording.recording import RecordingError
 from antenna_drive.recording.sheet import load_sheet

@@ -220,7 +220,7 @@ def _drive(given: _Given, source: str) -> Drive:
         test_signal=_set(TestSignal, ('test_signal',), given, source, **parts),
         motor_1=_motor('motor_1', axis, given, source),
         motor_2=_motor('motor_2', axis, given, source),
-        torque_share=Share(torque_share=torque_share,
+        torque_share=Share(circuit=torque_share,
                            filter_1=_set(Filter1, ('filter_1',), given, source)),
         plant=Plant(axis=axis, encoder=_set(Encoder, ('encoder',), given, source)))
 

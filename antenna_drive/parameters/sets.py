@@ -339,7 +339,7 @@ class Filter1:
 class Share:
     """The torque-share unit: the circuit with Filter 1 behind it."""
 
-    torque_share: TorqueShare
+    circuit: TorqueShare
     filter_1: Filter1
 
 

@@ -92,7 +92,7 @@ def voltmeter(x: FloatArray, mode: IntArray, p: TorqueShare) -> tuple[float, flo
 @inner
 def _counter_torque_rate(t: float, x: FloatArray, u: FloatArray, p: Share) -> float:
     return counter_torque_rate(
-        x[COUNTER_TORQUE], _bias_voltage(x, p.torque_share),
+        x[COUNTER_TORQUE], _bias_voltage(x, p.circuit),
         u[CURRENT_1, 0] + u[CURRENT_1, 1] * t, u[CURRENT_2, 0] + u[CURRENT_2, 1] * t, p.filter_1)
 
 
@@ -100,7 +100,7 @@ def _counter_torque_rate(t: float, x: FloatArray, u: FloatArray, p: Share) -> fl
 def _rates(
         t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: Share, dx: FloatArray,
 ) -> None:
-    share = p.torque_share
+    share = p.circuit
     current_sum = u[CURRENT_1, 0] + u[CURRENT_2, 0] + (u[CURRENT_1, 1] + u[CURRENT_2, 1]) * t
     dx[LOAD] = -share.k_3 * (x[LOAD] + share.current_to_voltage * current_sum)
     dx[SHARE] = _share_rate(x, share)
@@ -113,9 +113,9 @@ def _switch(
 ) -> bool:
     negative = 1 if x[LOAD] < 0.0 else 0
     saturation = 0
-    if x[SHARE] > p.torque_share.saturation_high:
+    if x[SHARE] > p.circuit.saturation_high:
         saturation = 1
-    elif x[SHARE] < p.torque_share.saturation_low:
+    elif x[SHARE] < p.circuit.saturation_low:
         saturation = -1
     changed = negative != mode[NEGATIVE_LOAD] or saturation != mode[SATURATION]
     if commit and changed:
@@ -150,7 +150,7 @@ def outputs(
     """
     y[0, 0] = x[COUNTER_TORQUE]
     y[0, 1] = _counter_torque_rate(t, x, u, p)
-    y[1, 0], y[1, 1] = voltmeter(x, mode, p.torque_share)
+    y[1, 0], y[1, 1] = voltmeter(x, mode, p.circuit)
 
 
 @compiled
@@ -160,7 +160,7 @@ def start(p: Share, x: FloatArray, mode: IntArray, y: FloatArray) -> None:
 
     Every state is zero; with start steady the circuit has settled at zero current.
     """
-    share = p.torque_share
+    share = p.circuit
     x[:] = 0.0
     mode[:] = 0
     if share.start == STEADY:

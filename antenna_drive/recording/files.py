@@ -17,14 +17,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from antenna_drive.recording.bam import read_bam
 from antenna_drive.recording.csv_format import read_csv
 from antenna_drive.recording.recording import Recording, RecordingError
 
 
 def read_recording(path: str | Path, *, partial: bool = False) -> Recording:
     """
-    Read a rosbag2 folder, a file .mcap or .csv, or a servo's log .json.
+    Read a rosbag2 folder, or a file .mcap or .csv.
 
     Parameters
     ----------
@@ -46,8 +45,7 @@ def read_recording(path: str | Path, *, partial: bool = False) -> Recording:
         # CSV needs no library: the one for MCAP is asked for only where it is used
         from antenna_drive.recording.mcap_format import read_bag
         return read_bag(path, partial=partial)
-    readers = {'.csv': read_csv, '.json': read_bam}
-    if path.suffix not in readers:
-        raise RecordingError(f'{path}: no recording; allowed are a bag (a folder, or .mcap), '
-                             '.csv and .json')
-    return readers[path.suffix](path)
+    if path.suffix != '.csv':
+        raise RecordingError(f'{path}: no recording; allowed are a bag (a folder, or .mcap) '
+                             'and .csv')
+    return read_csv(path)

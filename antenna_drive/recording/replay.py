@@ -210,19 +210,19 @@ def of_sheet(sheet: TestSheet, step_s: float) -> tuple[Drive, Changes]:
     settings: dict[str, Any] = {}
     changes: Changes = {}
     if isinstance(sheet.bias, CircuitBias):
-        settings['torque_share.torque_share.bias_source'] = 'circuit'
+        settings['torque_share.circuit.bias_source'] = 'circuit'
         if sheet.bias.bias_pot is not None:
-            settings['torque_share.torque_share.bias_pot'] = sheet.bias.bias_pot
+            settings['torque_share.circuit.bias_pot'] = sheet.bias.bias_pot
         if sheet.bias.start is not None:
-            settings['torque_share.torque_share.start'] = sheet.bias.start
+            settings['torque_share.circuit.start'] = sheet.bias.start
     elif isinstance(sheet.bias, (FixedBias, FixedStepBias)):
-        settings['torque_share.torque_share.bias_source'] = 'fixed'
+        settings['torque_share.circuit.bias_source'] = 'fixed'
         voltage = sheet.bias.voltage_V or 0.0
         if isinstance(sheet.bias, FixedStepBias):
             changes[round((sheet.bias.at_s or 0.0) / step_s)] = {
                 wiring.TORQUE_SHARE: {'fixed_voltage': voltage}}
             voltage = 0.0
-        settings['torque_share.torque_share.fixed_voltage'] = voltage
+        settings['torque_share.circuit.fixed_voltage'] = voltage
     if sheet.elevation_deg is not None:
         settings['plant.axis.start_elevation'] = float(np.deg2rad(sheet.elevation_deg))
     return changed(drive, settings), changes

@@ -27,12 +27,13 @@ from typing import Any
 from antenna_drive.trial.effect import Effect
 from antenna_drive.trial.effects import CATALOGUE
 from antenna_drive.trial.machine import (
-    apply_tolerances, draw_tolerances, Machine, reference_machine)
+    apply_tolerances, draw_tolerances, Machine, reference_machine,
+)
 from antenna_drive.trial.outside import OUTSIDE
 from antenna_drive.trial.programme import draw_sheets
 from antenna_drive.trial.real_antenna import FloatArray, simulate
 from antenna_drive.trial.sensors import record, sample_instants
-from antenna_drive.trial.test_sheet import SensorGrade, TestSheet
+from antenna_drive.trial.sheet import SensorGrade, TestSheet
 import numpy as np
 
 MIX = {'single': 0.55, 'pair': 0.15, 'none': 0.15, 'outside': 0.15}

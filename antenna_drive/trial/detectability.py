@@ -29,12 +29,11 @@ import math
 
 from antenna_drive.trial.cases import build_machine, draw_truths, sheet_of, Truth
 from antenna_drive.trial.effects import CATALOGUE
-from antenna_drive.trial.machine import (
-    apply_tolerances, draw_tolerances, Machine, Tolerances)
+from antenna_drive.trial.machine import apply_tolerances, draw_tolerances, Machine, Tolerances
 from antenna_drive.trial.outside import OUTSIDE
 from antenna_drive.trial.real_antenna import FloatArray, simulate
 from antenna_drive.trial.sensors import record
-from antenna_drive.trial.test_sheet import SensorGrade
+from antenna_drive.trial.sheet import SensorGrade
 import numpy as np
 
 RECORDINGS = 3

@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from antenna_drive.trial.test_sheet import SensorGrade, TestSheet
+from antenna_drive.trial.sheet import SensorGrade, TestSheet
 import numpy as np
 
 RECORDINGS = ('rec_a', 'rec_b', 'rec_c')

@@ -27,7 +27,7 @@ import math
 from antenna_drive.trial import equations, integrator, waveform
 from antenna_drive.trial.equations import MOTOR_AT, MOTOR_SIZE
 from antenna_drive.trial.machine import Machine
-from antenna_drive.trial.test_sheet import TestSheet
+from antenna_drive.trial.sheet import TestSheet
 import numpy as np
 from numpy.typing import NDArray
 

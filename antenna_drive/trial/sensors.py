@@ -19,7 +19,7 @@ import math
 
 from antenna_drive.trial.machine import Machine
 from antenna_drive.trial.real_antenna import FloatArray, History
-from antenna_drive.trial.test_sheet import SensorGrade
+from antenna_drive.trial.sheet import SensorGrade
 import numpy as np
 
 JITTER = 0.03               # spread of the sampling instants, in sample periods

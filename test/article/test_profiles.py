@@ -29,14 +29,14 @@ import pytest
 @pytest.mark.parametrize('fade_out', [-7.0, -9.0, -11.0])
 def test_corners_are_those_of_equation_14(circuit: str, gain: float, dc_gain: float,
                                           fade_out: float) -> None:
-    share = as_in_the_text(load(circuit).torque_share.torque_share, gain, fade_out)
+    share = as_in_the_text(load(circuit).torque_share.circuit, gain, fade_out)
     found = corners(share)
     assert found.flat_A == pytest.approx((-fade_out - 13.0 / dc_gain) / gain, rel=1e-6)
     assert found.zero_A == pytest.approx(-fade_out / gain, rel=1e-6)
 
 
 def test_the_profile_is_even_and_bounded() -> None:
-    share = load('old_circuit').torque_share.torque_share
+    share = load('old_circuit').torque_share.circuit
     current = np.linspace(-10.0, 10.0, 401)
     volts = bias_voltage(share, current)
     assert volts == pytest.approx(volts[::-1])

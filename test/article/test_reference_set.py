@@ -31,11 +31,11 @@ REFERENCE: dict[str, Any] = {
     'plant.axis.coulomb_torque': 1.862,
     'plant.axis.stiction_ratio': 1.25,
     'plant.axis.velocity_threshold': 1.0e-9,
-    'torque_share.torque_share.fade_out_voltage': -10.74,
-    'torque_share.torque_share.current_to_voltage': 0.925,
-    'torque_share.torque_share.saturation_low': 0.0,
-    'torque_share.torque_share.saturation_high': 13.0,
-    'torque_share.torque_share.bias_pot': 0.7,
+    'torque_share.circuit.fade_out_voltage': -10.74,
+    'torque_share.circuit.current_to_voltage': 0.925,
+    'torque_share.circuit.saturation_low': 0.0,
+    'torque_share.circuit.saturation_high': 13.0,
+    'torque_share.circuit.bias_pot': 0.7,
     'torque_share.filter_1.difference_gain': 8.192149,
 }
 # The same in both motors.

@@ -70,7 +70,7 @@ def test_what_a_circuit_gives_is_not_the_candidates_to_change(tmp_path: Path) ->
     problem = read_problem(written(tmp_path, TARGETS.replace(
         'axis.coulomb_torque: {low: 1.0, high: 2.0}', 'torque_share.s_2: {low: 0.5, high: 2.0}')))
     drives = problem.results([0.5, 1.0, 0.5]).drives
-    assert drives['new_circuit'].torque_share.torque_share.s_2 == 0.8895
+    assert drives['new_circuit'].torque_share.circuit.s_2 == 0.8895
 
 
 def test_costs_are_misses_in_tolerances() -> None:

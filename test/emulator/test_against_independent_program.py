@@ -25,7 +25,7 @@ from antenna_drive.article.experiments import experiments
 from antenna_drive.emulator.run import simulate
 from antenna_drive.trial.machine import reference_machine
 from antenna_drive.trial.real_antenna import simulate as simulate_apart
-from antenna_drive.trial.test_sheet import TestSheet
+from antenna_drive.trial.sheet import TestSheet
 import numpy as np
 import pytest
 

@@ -79,8 +79,8 @@ def test_halving_the_macro_step_divides_the_error_by_four() -> None:
     # everything smooth: preloaded gears that stay in contact, no friction, a sine as command
     drive = changed(load('new_circuit'), {
         'plant.axis.coulomb_torque': 0.0, 'motor_1.motor.coulomb_torque': 0.0,
-        'motor_2.motor.coulomb_torque': 0.0, 'torque_share.torque_share.bias_source': 'fixed',
-        'torque_share.torque_share.fixed_voltage': 9.0, 'test_signal.rate.waveform': 'sine',
+        'motor_2.motor.coulomb_torque': 0.0, 'torque_share.circuit.bias_source': 'fixed',
+        'torque_share.circuit.fixed_voltage': 9.0, 'test_signal.rate.waveform': 'sine',
         'test_signal.rate.amplitude': 2e-4, 'test_signal.rate.period': 0.5,
         'test_signal.rate.start_after': 10.0})
 

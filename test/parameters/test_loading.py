@@ -36,7 +36,7 @@ def _file(tmp_path: Path, text: str) -> Path:
 def test_the_reference_is_number_for_number_what_its_file_says() -> None:
     content = yaml.safe_load(find('reference').read_text())
     drive = load()
-    homes = {'axis': (drive.plant.axis,), 'torque_share': (drive.torque_share.torque_share,),
+    homes = {'axis': (drive.plant.axis,), 'torque_share': (drive.torque_share.circuit,),
              'filter_1': (drive.torque_share.filter_1,)}
     checked = 0
     for section, entries in content.items():
@@ -62,7 +62,7 @@ def test_every_reference_entry_says_unit_range_and_source() -> None:
     ('new_circuit', -2.114, 0.8895, 3.831, 1.617, 48.67 / 0.73, 1.0 / 0.1125)])
 def test_the_circuits_are_table_1(name: str, k_2: float, s_2: float, k_3: float, g_4: float,
                                   gain: float, pole: float) -> None:
-    share, filter_1 = load(name).torque_share.torque_share, load(name).torque_share.filter_1
+    share, filter_1 = load(name).torque_share.circuit, load(name).torque_share.filter_1
     assert (share.k_2, share.s_2, share.k_3, share.g_4) == (k_2, s_2, k_3, g_4)
     assert filter_1.gain == pytest.approx(gain, rel=2e-3)
     assert filter_1.pole == pytest.approx(pole, rel=2e-3)

@@ -53,7 +53,7 @@ def _run_share(parameters: object, current_1: np.ndarray, current_2: np.ndarray)
 
 
 def test_filter_1_is_eq_15() -> None:
-    parameters = _share(torque_share__bias_source='fixed', torque_share__fixed_voltage=6.0)
+    parameters = _share(circuit__bias_source='fixed', circuit__fixed_voltage=6.0)
     time = np.arange(3000) * H
     zero = np.zeros(time.size)
     counter_torque = _run_share(parameters, zero, zero)[:, 0]
@@ -66,7 +66,7 @@ def test_filter_1_is_eq_15() -> None:
 
 
 def test_filter_1_acts_on_the_difference_of_the_currents() -> None:
-    parameters = _share(torque_share__bias_source='fixed', torque_share__fixed_voltage=0.0)
+    parameters = _share(circuit__bias_source='fixed', circuit__fixed_voltage=0.0)
     ones = np.ones(500)
     both = _run_share(parameters, ones, ones)[:, 0]
     np.testing.assert_array_equal(both, 0.0)
@@ -79,9 +79,9 @@ def test_filter_1_acts_on_the_difference_of_the_currents() -> None:
 
 @pytest.mark.parametrize('circuit', ['old_circuit', 'new_circuit'])
 def test_the_torque_share_is_eq_9(circuit: str) -> None:
-    share = replace(load(circuit).torque_share.torque_share, start='steady', bias_pot=0.8,
+    share = replace(load(circuit).torque_share.circuit, start='steady', bias_pot=0.8,
                     fade_out_voltage=-3.0, saturation_high=50.0)
-    unit = replace(load(circuit).torque_share, torque_share=share)
+    unit = replace(load(circuit).torque_share, circuit=share)
     time = np.arange(6000) * H
     current = 0.3 + 0.2 * np.sin(2.0 * np.pi * np.floor(time / 0.5) / 7.0)  # a staircase
     voltage = _run_share(unit, current, current)[:, 1]
@@ -109,7 +109,7 @@ def test_the_dc_gains_of_eq_13(k_2: float, s_2: float, g_2: float) -> None:
     (-9.0, 1.90, 3.46), (-7.0, 1.13, 2.69), (-11.0, 2.67, 4.23)])
 def test_the_corners_of_fig_15a(fade_out: float, flat: float, zero: float) -> None:
     share = record_of(replace(
-        load().torque_share.torque_share, bias_pot=0.7, fade_out_voltage=fade_out,
+        load().torque_share.circuit, bias_pot=0.7, fade_out_voltage=fade_out,
         current_to_voltage=1.0, g_4=2.6))[0]
     greatest = 0.7 * 13.0
     assert torque_share.steady_bias_voltage(flat - 0.01, share) == greatest

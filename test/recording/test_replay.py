@@ -72,7 +72,7 @@ def test_a_field_test_is_replayed_from_its_columns_and_sheet(tmp_path: Path) -> 
                          'bias': {'type': 'fixed_step', 'voltage_V': 5.69, 'at_s': 1.0}})
     drive, changes = of_sheet(sheet, 1e-3)
     assert drive.torque_share.filter_1 == load('new_circuit').torque_share.filter_1
-    assert drive.torque_share.torque_share.k_2 == load('old_circuit').torque_share.torque_share.k_2
+    assert drive.torque_share.circuit.k_2 == load('old_circuit').torque_share.circuit.k_2
     assert drive.plant.axis.start_elevation == pytest.approx(math.pi / 6)
     assert changes == {1000: {'torque_share': {'fixed_voltage': 5.69}}}
     drive = commanded(drive, waveform='saw_tooth', period=3.0, amplitude=math.radians(0.1))

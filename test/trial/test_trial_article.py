@@ -20,7 +20,7 @@ import math
 
 from antenna_drive.trial.machine import reference_machine
 from antenna_drive.trial.real_antenna import History, simulate
-from antenna_drive.trial.test_sheet import TestSheet
+from antenna_drive.trial.sheet import TestSheet
 import numpy as np
 from numpy.typing import NDArray
 import pytest

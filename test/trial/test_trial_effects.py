@@ -26,7 +26,7 @@ from antenna_drive.trial.machine import reference_machine
 from antenna_drive.trial.outside import OUTSIDE
 from antenna_drive.trial.real_antenna import simulate
 from antenna_drive.trial.sensors import record
-from antenna_drive.trial.test_sheet import TestSheet
+from antenna_drive.trial.sheet import TestSheet
 import numpy as np
 from numpy.typing import NDArray
 import pytest

@@ -21,7 +21,7 @@ from antenna_drive.trial import equations
 from antenna_drive.trial.equations import MODES_AT, MOTOR_AT, MOTOR_SIZE
 from antenna_drive.trial.machine import Machine, reference_machine
 from antenna_drive.trial.real_antenna import History, simulate
-from antenna_drive.trial.test_sheet import TestSheet
+from antenna_drive.trial.sheet import TestSheet
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

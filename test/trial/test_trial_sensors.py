@@ -17,11 +17,10 @@ from __future__ import annotations
 
 import math
 
-from antenna_drive.trial.machine import (
-    apply_tolerances, draw_tolerances, reference_machine)
+from antenna_drive.trial.machine import apply_tolerances, draw_tolerances, reference_machine
 from antenna_drive.trial.real_antenna import History
 from antenna_drive.trial.sensors import COLUMNS, record, sample_instants
-from antenna_drive.trial.test_sheet import SensorGrade
+from antenna_drive.trial.sheet import SensorGrade
 import numpy as np
 from numpy.typing import NDArray
 import pytest

@@ -1,0 +1,222 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+What a test did to the drive, from the test sheet or, failing that, from the recorded command.
+
+A sheet's waveform is exact: its jumps are known to the microsecond. A recorded command is a set
+of samples; between two that differ by more than their neighbours do, a jump is assumed halfway.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+from typing import Protocol
+
+from antenna_drive.diagnosis.machine import FloatArray
+from antenna_drive.emulator import batch
+from antenna_drive.recording import sheet as sheets
+import numpy as np
+
+DEGREE = np.pi / 180.0
+# The three places in a step at which its command is read: off its ends, where jumps may be.
+_PLACES = np.array([0.1, 0.5, 0.9])
+_PARABOLA = np.linalg.inv(np.vander(_PLACES, 3, increasing=True))
+
+
+class Command(Protocol):
+    """An axis rate command over time."""
+
+    def __call__(self, time: FloatArray) -> FloatArray:
+        """Return the rate command [rad/s] at these times [s]."""
+
+    def knots(self, end: float) -> FloatArray:
+        """Return the times up to `end` at which the command or its slope jumps [s]."""
+
+
+@dataclass(frozen=True)
+class SheetCommand:
+    """The waveform of a test sheet."""
+
+    waveform: sheets.Waveform
+
+    def __call__(self, time: FloatArray) -> FloatArray:
+        """Return the rate command [rad/s] at these times [s]."""
+        w = self.waveform
+        amplitude = float(w.amplitude_deg_s or 0.0) * DEGREE
+        if isinstance(w, (sheets.Square, sheets.Triangle)):
+            turn = np.mod(time / (w.period_s or 1.0) + (w.phase or 0.0), 1.0)
+            if isinstance(w, sheets.Square):
+                value = np.where(turn < 0.5, 1.0, -1.0)
+            else:
+                value = np.abs(np.mod(4.0 * turn - 1.0, 4.0) - 2.0) - 1.0
+            return np.where(time < 0.0, 0.0, amplitude * value)
+        since = time - (w.start_s or 0.0)
+        if isinstance(w, sheets.Multisine):
+            value = np.zeros_like(time)
+            for frequency, weight, phase in zip(w.frequencies_hz or (), w.weights or (),
+                                                w.phases or (), strict=True):
+                value += weight * np.sin(2.0 * np.pi * frequency * since + phase)
+            return np.where(since < 0.0, 0.0, amplitude * value)
+        f0, f1, duration = w.f0_hz or 0.0, w.f1_hz or 0.0, w.duration_s or 1.0
+        value = np.sin(2.0 * np.pi * (f0 + 0.5 * (f1 - f0) / duration * since) * since)
+        return np.where((since < 0.0) | (since > duration), 0.0, amplitude * value)
+
+    def knots(self, end: float) -> FloatArray:
+        """Return the times up to `end` at which the command or its slope jumps [s]."""
+        w = self.waveform
+        if isinstance(w, (sheets.Square, sheets.Triangle)):
+            period, phase = w.period_s or 1.0, w.phase or 0.0
+            first = 0.0 if isinstance(w, sheets.Square) else 0.25
+            turns = np.arange(np.floor(phase) - 1.0, end / period + phase + 1.0, 0.5) + first
+            times = (turns - phase) * period
+            return times[(times > 0.0) & (times < end)]
+        edges = [w.start_s or 0.0]
+        if isinstance(w, sheets.Chirp):
+            edges.append(edges[0] + (w.duration_s or 0.0))
+        return np.array([edge for edge in edges if 0.0 < edge < end])
+
+
+@dataclass(frozen=True)
+class RecordedCommand:
+    """A command that is known from its samples: straight lines, and jumps between."""
+
+    time: FloatArray
+    value: FloatArray
+    jumps: FloatArray
+
+    @classmethod
+    def of(cls, time: FloatArray, value: FloatArray) -> RecordedCommand:
+        """Take the samples of a command, shapes (n,), and find its jumps."""
+        change = np.abs(np.diff(value))
+        usual = np.median(change) + 1e-12
+        around = np.maximum(np.r_[change[1:], 0.0], np.r_[0.0, change[:-1]])
+        large = (change > 0.05 * np.ptp(value)) & (change > 20.0 * usual) & (change > 4.0 * around)
+        k = np.flatnonzero(large)
+        jumps = 0.5 * (time[k] + time[k + 1])
+        # two extra samples at each jump keep the straight lines on their own sides
+        times = np.r_[time, jumps - 1e-9, jumps + 1e-9]
+        values = np.r_[value, value[k], value[k + 1]]
+        order = np.argsort(times, kind='stable')
+        return cls(times[order], values[order], jumps)
+
+    def __call__(self, time: FloatArray) -> FloatArray:
+        """Return the rate command [rad/s] at these times [s]."""
+        return np.asarray(np.interp(time, self.time, self.value, left=0.0))
+
+    def knots(self, end: float) -> FloatArray:
+        """Return the times up to `end` at which the command jumps [s]."""
+        return self.jumps[self.jumps < end]
+
+
+@dataclass(frozen=True)
+class Bias:
+    """A source of bias voltage: `before` until `at` [s], `after` from then on [V]."""
+
+    before: float = 0.0
+    after: float = 0.0
+    at: float = 0.0
+
+
+@dataclass(frozen=True)
+class Longest:
+    """
+    How long a step of the integration may be.
+
+    Attributes
+    ----------
+    usual : at most so long [s]
+    shortest : even where a wave asks for less [s]
+    wave : angle by which a wave may turn in a step [rad]
+    turns : of the fastest wave, per turn of the axis, 0 for none
+
+    """
+
+    usual: float
+    shortest: float = 0.0
+    wave: float = math.inf
+    turns: float = 0.0
+
+    def at(self, rate: FloatArray) -> FloatArray:
+        """Return the longest step where the axis turns at these rates [rad/s], as an array."""
+        asked = self.wave / np.maximum(self.turns * np.abs(rate), 1e-9)
+        return np.asarray(np.minimum(self.usual, np.maximum(self.shortest, asked)))
+
+
+def schedule(command: Command, bias: Bias, samples: FloatArray, longest: Longest,
+             delay: float = 0.0) -> batch.Schedule:
+    """
+    Plan the integration of a test: no step reaches across a sample, a jump, or `longest`.
+
+    Parameters
+    ----------
+    command, bias
+        what the test does
+    samples
+        when the sensors are read, increasing, none before zero, shape (n,) [s]
+    longest
+        step, where the axis turns as commanded
+    delay
+        by which the command comes late [s]
+
+    """
+    end = float(samples[-1])
+    jumps = command.knots(end) + delay
+    if delay > 0.0:
+        jumps = np.r_[delay, jumps]
+    if 0.0 < bias.at < end:
+        jumps = np.r_[jumps, bias.at]
+    jumps = jumps[(jumps > 0.0) & (jumps < end)]
+    knots = np.unique(np.r_[0.0, samples, jumps])
+    # a step much shorter than its neighbours buys nothing: jumps that fall on a sample merge
+    keep = np.r_[True, np.diff(knots) > 1e-9]
+    knots = knots[keep]
+    rate = command(0.5 * (knots[:-1] + knots[1:]) - delay)
+    pieces = np.maximum(np.ceil(np.diff(knots) / longest.at(rate) - 1e-6).astype(int), 1)
+    first = np.repeat(knots[:-1], pieces)
+    length = np.repeat(np.diff(knots) / pieces, pieces)
+    number = np.arange(first.size) - np.repeat(np.r_[0, np.cumsum(pieces)[:-1]], pieces)
+    start = first + number * length
+    steps = np.zeros((start.size, batch.COLUMNS))
+    steps[:, batch.LENGTH] = length
+    places = start[:, np.newaxis] + _PLACES * length[:, np.newaxis]
+    shape = command(places.ravel() - delay).reshape(places.shape) @ _PARABOLA.T
+    steps[:, batch.COMMAND] = shape[:, 0]
+    steps[:, batch.SLOPE] = shape[:, 1] / length
+    steps[:, batch.CURVE] = shape[:, 2] / length ** 2
+    rows = np.full(start.size + 1, -1)
+    ends = np.r_[0.0, np.cumsum(length)]
+    at = np.searchsorted(ends, samples - 1e-8)
+    rows[np.minimum(at, start.size)] = np.arange(samples.size)
+    return with_bias(batch.Schedule(steps, rows), bias)
+
+
+def with_bias(plan: batch.Schedule, bias: Bias) -> batch.Schedule:
+    """Return a plan with the voltages of a source of bias, which steps as the plan's own does."""
+    steps = plan.steps.copy()
+    length = steps[:, batch.LENGTH]
+    middle = np.cumsum(length) - 0.5 * length
+    steps[:, batch.FIXED_BIAS] = np.where(middle < bias.at, bias.before, bias.after)
+    return batch.Schedule(steps, plan.keep)
+
+
+def with_torque(plan: batch.Schedule, time: FloatArray, torque: FloatArray) -> batch.Schedule:
+    """Return a plan with a torque on the axis: times [s], values [N m], straight lines between."""
+    steps = plan.steps.copy()
+    length = steps[:, batch.LENGTH]
+    ends = np.cumsum(length)
+    left = np.interp(ends - length, time, torque)
+    steps[:, batch.TORQUE] = left
+    steps[:, batch.TORQUE_SLOPE] = (np.interp(ends, time, torque) - left) / length
+    return batch.Schedule(steps, plan.keep)

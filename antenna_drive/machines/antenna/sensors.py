@@ -1,0 +1,108 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What the sensors add to the truth: noise, steps, and time stamps that are a little off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+from antenna_drive.diagnosis.machine import FloatArray
+from antenna_drive.machines.antenna.excitation import Command, RecordedCommand
+from antenna_drive.recording import sheet as sheets
+import numpy as np
+
+# From so few changes of a reading its digit is not told, and a multiple of it may be off by so
+# much.
+_CHANGES = 12
+_WHOLE = 0.05
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """What the sensors add: standard deviations and steps; usual ones if the sheet is silent."""
+
+    current_noise: float = 0.01
+    current_step: float = 0.01
+    tach_noise: float = 0.0035
+    tach_relative: float = 0.0015
+    tach_step: float = 0.002
+    encoder_step: float = 2.0 * math.pi / 2 ** 21
+    bias_noise: float = 0.01
+    bias_step: float = 0.01
+
+    @classmethod
+    def of(cls, given: sheets.Sensors | None) -> Sensors:
+        """Take what the sheet says."""
+        if given is None:
+            return cls()
+        known = {'current_noise': given.current_noise_A, 'current_step': given.current_step_A,
+                 'tach_noise': given.tach_noise_rad_s, 'tach_relative': given.tach_noise_relative,
+                 'tach_step': given.tach_step_rad_s, 'bias_noise': given.bias_noise_V,
+                 'bias_step': given.bias_step_V}
+        if given.encoder_bits is not None:
+            known['encoder_step'] = 2.0 * math.pi / 2 ** given.encoder_bits
+        return cls(**{name: value for name, value in known.items() if value is not None})
+
+    def noise(self, clean: FloatArray, slope: FloatArray, jitter: float) -> FloatArray:
+        """Return the standard deviation of each reading; arrays of shape (n, 6)."""
+        noise = np.empty_like(clean)
+        noise[:, :2] = math.hypot(self.current_noise, self.current_step / math.sqrt(12.0))
+        noise[:, 2:4] = np.sqrt(self.tach_noise ** 2 + self.tach_step ** 2 / 12.0
+                                + (self.tach_relative * clean[:, 2:4]) ** 2)
+        noise[:, 4] = 0.5 * self.encoder_step  # what is left within a step is no white noise
+        noise[:, 5] = math.hypot(self.bias_noise, self.bias_step / math.sqrt(12.0))
+        return np.asarray(np.sqrt(noise ** 2 + (slope * jitter) ** 2))
+
+
+def jitter_of(command: Command, time: FloatArray, values: FloatArray) -> float:
+    """
+    Return by how much time stamps are off [s]: by what an exactly known command differs.
+
+    Where the command tells nothing, a hundredth of the spacing is assumed.
+    """
+    usual = 0.01 * float(np.median(np.diff(time)))
+    if isinstance(command, RecordedCommand):
+        return usual
+    error = command(time) - values
+    slope = (command(time + 1e-4) - command(time - 1e-4)) / 2e-4
+    # where the command jumps or bends nothing can be said
+    good = (np.abs(error) < 0.02 * np.ptp(values)) & (np.abs(slope) > 0.3 * np.abs(slope).max())
+    if np.count_nonzero(good) < 50 or not np.any(slope[good]):
+        return usual
+    late = error[good] / slope[good]
+    return max(float(1.4826 * np.median(np.abs(late - np.median(late)))), 0.1 * usual)
+
+
+def digit_of(values: FloatArray) -> float:
+    """
+    Return the digit of which all readings are whole multiples, but for a constant; 0 if none is.
+
+    Parameters
+    ----------
+    values
+        readings in the order in which they were taken, NaN where there is none, shape (n,)
+
+    """
+    change = np.abs(np.diff(values[np.isfinite(values)]))
+    change = change[change > 0.0]
+    if change.size < _CHANGES:
+        return 0.0
+    digit = float(change.min())
+    for _ in range(3):
+        # the smallest change is rounded as any other: all of them together say it better
+        count = np.round(change / digit)
+        digit = float(change @ count / (count @ count))
+    off = np.abs(change / digit - np.round(change / digit))
+    return digit if float(off.max()) < _WHOLE else 0.0

@@ -1,0 +1,97 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Recordings of a real servo drive, as the BAM project (Rhoban) logs them, in JSON.
+
+A position-controlled servo swings a pendulum: mass, length, gain, supply voltage and the name of
+the trajectory at the top, then one entry per sample with its own time stamp.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from antenna_drive.errors import one_line
+from antenna_drive.recording.plain import from_json, PlainDataError
+from antenna_drive.recording.recording import make_channel, nanoseconds, Recording, RecordingError
+import numpy as np
+
+# The log's key of each signal, and the signal's name and unit. The load is the servo's own
+# register, 16 bits in two's complement; torque_enable is 1 while the servo drives, 0 while free.
+SIGNALS = {
+    'goal_position': ('servo/goal_position', 'rad'),
+    'position': ('servo/position', 'rad'),
+    'speed': ('servo/speed', 'rad/s'),
+    'load': ('servo/load', 'raw'),
+    'input_volts': ('servo/input_volts', 'V'),
+    'temp': ('servo/temperature', 'degC'),
+    'torque_enable': ('servo/torque_enable', '1'),
+}
+NOTES = {'mass': (int, float), 'length': (int, float), 'kp': (int, float), 'vin': (int, float),
+         'motor': (str,), 'trajectory': (str,)}
+
+
+def read_bam(path: str | Path) -> Recording:
+    """
+    Read one log of BAM.
+
+    Returns
+    -------
+    the recording; its notes hold mass [kg], length [m], kp, vin [V], motor, trajectory
+
+    Raises
+    ------
+    RecordingError : the file cannot be read, is no such log, or an entry lacks a number; one
+        line names the file and the entry
+
+    """
+    path = Path(path)
+    try:
+        log = from_json(path.read_bytes())
+    except OSError as error:
+        raise RecordingError(f'{path}: {error.strerror}') from error
+    except PlainDataError as error:
+        raise RecordingError(f'{path}: {error}') from None
+    if not isinstance(log, dict) or not isinstance(log.get('entries'), list):
+        raise RecordingError(f'{path}: no log of a servo, there is no list of entries')
+    notes: dict[str, Any] = {'source': path.name}
+    for key, kinds in NOTES.items():
+        if isinstance(log.get(key), kinds) and not isinstance(log[key], bool):
+            notes[key] = log[key]
+        else:
+            raise RecordingError(f'{path}: {key}: {one_line(repr(log.get(key)), 40)} given, '
+                                 f'allowed is a {"text" if kinds == (str,) else "number"}')
+    columns: dict[str, list[float]] = {key: [] for key in ('timestamp', *SIGNALS)}
+    for number, entry in enumerate(log['entries']):
+        for key, column in columns.items():
+            column.append(_number(path, number, key, entry))
+    try:
+        stamps = nanoseconds(np.array(columns.pop('timestamp'), dtype=np.float64))
+        return Recording({name: make_channel(name, unit, stamps, columns[key])
+                          for key, (name, unit) in SIGNALS.items()}, notes=notes)
+    except RecordingError as error:
+        raise RecordingError(f'{path}: {error}') from None
+
+
+def _number(path: Path, number: int, key: str, entry: object) -> float:
+    value = entry.get(key) if isinstance(entry, dict) else None
+    wanted = bool if key == 'torque_enable' else (int, float)
+    if not isinstance(value, wanted) or (isinstance(value, bool) and wanted is not bool):
+        raise RecordingError(f'{path}: entry {number}: {key}: {one_line(repr(value), 40)} given, '
+                             f'allowed is {"true or false" if wanted is bool else "a number"}')
+    try:
+        return float(value)
+    except OverflowError:
+        raise RecordingError(f'{path}: entry {number}: {key}: too large a number') from None

@@ -1,0 +1,340 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+What a position-controlled servo may have beyond a motor with Coulomb and viscous friction.
+
+`NUMBERS` says of every number of the servo how large it may be and where a fit begins;
+`catalogue` says which of them make up an effect. All effects are absent in the model that a
+diagnosis starts from. One more takes a term in physics.py, a number and an effect here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+import math
+from types import MappingProxyType
+from typing import Final
+
+from antenna_drive.diagnosis.machine import Effect, FloatArray, Form, Parameter
+from antenna_drive.machines.servo.physics import ORDER, UNITS
+import numpy as np
+
+# A number's name may end in '@N': a wave of so many cycles in a turn of the output shaft.
+CYCLES_MARK: Final = '@'
+# Eccentric wheels make a few cycles in a turn, the teeth of the last stage dozens.
+CYCLES: Final = (1, 2, *range(8, 41, 2))
+
+
+@dataclass(frozen=True)
+class Number:
+    """
+    How large a number of the servo may be.
+
+    Attributes
+    ----------
+    low, high : hard bounds
+    start : where a global fit begins
+    step : for difference quotients; of a logarithmic number, the relative one
+    logarithmic : True where only its order of magnitude is known beforehand
+    shape : True for a number that means nothing while its effect is absent
+
+    """
+
+    low: float
+    high: float
+    start: float
+    step: float
+    logarithmic: bool = False
+    shape: bool = False
+
+    def share(self, value: float) -> float:
+        """Return where a value lies between the bounds, 0 to 1."""
+        value = min(max(value, self.low), self.high)
+        if self.logarithmic:
+            return math.log(value / self.low) / math.log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
+
+    def value(self, share: float) -> float:
+        """Return the value that lies at a share of the way between the bounds."""
+        share = min(max(share, 0.0), 1.0)
+        if self.logarithmic:
+            return self.low * (self.high / self.low) ** share
+        return self.low + share * (self.high - self.low)
+
+
+# Nothing is known of a servo's motor and friction but that it is a servo.
+BASE: Final = ('torque_constant', 'resistance', 'armature_inertia', 'coulomb_torque',
+               'viscous_friction')
+# One number that stands for several: friction that does not ask who drives whom.
+TIED: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({
+    'load_friction': ('load_friction_motor', 'load_friction_external'),
+    'load_stribeck': ('load_stribeck_motor', 'load_stribeck_external'),
+})
+NUMBERS: Final[Mapping[str, Number]] = MappingProxyType({
+    'torque_constant': Number(0.05, 3.0, 0.3, 0.002, logarithmic=True),
+    'resistance': Number(0.3, 15.0, 2.0, 0.002, logarithmic=True),
+    'armature_inertia': Number(1e-4, 0.05, 2.5e-3, 0.005, logarithmic=True),
+    'coulomb_torque': Number(1e-4, 0.3, 0.02, 0.005, logarithmic=True),
+    'viscous_friction': Number(1e-5, 0.3, 0.01, 0.005, logarithmic=True),
+    'stribeck_torque': Number(0.0, 0.2, 0.01, 5e-4),
+    'stribeck_rate': Number(0.02, 5.0, 0.5, 0.02, logarithmic=True, shape=True),
+    'stribeck_shape': Number(0.5, 4.0, 1.35, 0.02, shape=True),
+    'load_friction': Number(0.0, 0.6, 0.1, 2e-3),
+    'load_friction_motor': Number(0.0, 0.6, 0.1, 2e-3),
+    'load_friction_external': Number(0.0, 0.6, 0.1, 2e-3),
+    'load_stribeck': Number(0.0, 1.0, 0.05, 2e-3),
+    'load_stribeck_motor': Number(0.0, 1.0, 0.05, 2e-3),
+    'load_stribeck_external': Number(0.0, 1.0, 0.05, 2e-3),
+    'load_quadratic_motor': Number(0.0, 1.0, 0.02, 4e-3),
+    'load_quadratic_external': Number(0.0, 1.0, 0.02, 4e-3),
+    'load_square': Number(0.0, 1.5, 0.05, 4e-3),
+    'load_square_stribeck': Number(0.0, 1.5, 0.05, 4e-3),
+    'ageing': Number(0.0, 0.15, 0.02, 2e-3),
+    'friction_asymmetry': Number(-0.5, 0.5, 0.0, 0.01),
+    'viscous_quadratic': Number(0.0, 0.01, 2e-4, 5e-5),
+    'viscous_thinning': Number(0.0, 3.0, 0.1, 0.01),
+    'friction_temperature': Number(-0.03, 0.03, 0.0, 5e-4),
+    'friction_cosine': Number(-0.3, 0.3, 0.0, 5e-3),
+    'friction_sine': Number(-0.3, 0.3, 0.0, 5e-3),
+    'ripple_cosine': Number(-0.03, 0.03, 0.0, 5e-4),
+    'ripple_sine': Number(-0.03, 0.03, 0.0, 5e-4),
+    'backlash': Number(0.0, 0.02, 3e-3, 5e-4),
+    'compliance': Number(0.0, 0.1, 0.01, 1e-3),
+    'saturation': Number(0.0, 0.3, 0.02, 2e-3),
+    'current_limit': Number(0.0, 1.0, 0.2, 5e-3),
+    'winding_temperature': Number(0.0, 6e-3, 0.0, 2e-4),
+    'coasting': Number(0.0, 1.0, 0.1, 0.01),
+    'bridge_drop': Number(0.0, 2.0, 0.05, 5e-3),
+    'braking': Number(0.0, 1.0, 0.02, 5e-3),
+    'supply_resistance': Number(0.0, 0.5, 0.05, 5e-3),
+    'gain_error': Number(-0.1, 0.1, 0.0, 2e-3),
+    'derivative_gain': Number(0.0, 0.02, 0.0, 2e-4),
+    'dead_band': Number(0.0, 0.05, 2e-3, 5e-4),
+    'duty_limit': Number(0.0, 0.6, 0.02, 5e-3),
+    'goal_slowness': Number(0.0, 2.0, 0.05, 5e-3),
+    'delay': Number(-6e-3, 0.05, 3e-3, 5e-4),
+    'position_offset': Number(-0.1, 0.1, 0.0, 1e-3),
+    'eccentricity_cosine': Number(-0.03, 0.03, 0.0, 1e-3),
+    'eccentricity_sine': Number(-0.03, 0.03, 0.0, 1e-3),
+    'load_moment': Number(-0.15, 0.15, 0.0, 5e-3),
+})
+
+
+def base_name(name: str) -> str:
+    """Return a number's name without the cycles of its wave."""
+    return name.partition(CYCLES_MARK)[0]
+
+
+def number(name: str) -> Number:
+    """Return what is known of a number; its name may have cycles."""
+    return NUMBERS[base_name(name)]
+
+
+def unit(name: str) -> str:
+    """Return a number's unit."""
+    name = base_name(name)
+    return UNITS[TIED[name][0] if name in TIED else name]
+
+
+def vector(values: Mapping[str, float]) -> FloatArray:
+    """
+    Return the numbers in the order of the physics, nought where none is given.
+
+    Parameters
+    ----------
+    values
+        by name, in the units of `UNITS`; tied names and cycles are resolved
+
+    Raises
+    ------
+    KeyError : there is no such number
+
+    """
+    row = np.zeros(len(ORDER))
+    for name, rest in (('stribeck_rate', 1.0), ('stribeck_shape', 1.0)):
+        row[_INDEX[name]] = rest  # what they shape is absent, but they divide
+    for name, value in values.items():
+        plain, _, cycles = name.partition(CYCLES_MARK)
+        for target in TIED.get(plain, (plain,)):
+            row[_INDEX[target]] = value
+        if cycles:
+            row[_INDEX[plain.partition('_')[0] + '_cycles']] = float(cycles)
+    return row
+
+
+_INDEX: Final = {name: i for i, name in enumerate(ORDER)}
+
+
+def parameter(name: str) -> Parameter:
+    """Return a number of an absent effect as a parameter: nought, or its shape's start."""
+    item = number(name)
+    return Parameter(name, unit(name), item.low, item.high, item.step,
+                     start=item.start if item.shape else 0.0, shape=item.shape)
+
+
+def _form(name: str, *numbers: str) -> Form:
+    return Form(name, tuple(parameter(item) for item in numbers))
+
+
+def _waves(kind: str) -> tuple[Form, ...]:
+    return tuple(replace(_form(f'{cycles} cycles', f'{kind}_cosine@{cycles}',
+                               f'{kind}_sine@{cycles}'), sought=True) for cycles in CYCLES)
+
+
+def catalogue(without: Iterable[str] = ()) -> dict[str, Effect]:
+    """
+    Return the effects by id.
+
+    Parameters
+    ----------
+    without
+        ids that are left out
+
+    Raises
+    ------
+    KeyError : there is no such effect to leave out
+
+    """
+    effects = {effect.id: effect for effect in _EFFECTS}
+    for name in without:
+        del effects[name]
+    return effects
+
+
+def _effect(name: str, cause: str, look: str, *forms: Form) -> Effect:
+    return Effect(name, name.partition('.')[0], cause, look, forms)
+
+
+_EFFECTS: Final = (
+    _effect('motor.saturation',
+            'at a large current the iron saturates or the brushes heat up: less torque per ampere',
+            'the servo stalls under a load that small signals say it would lift',
+            _form('i / (1 + s |i|)', 'saturation')),
+    _effect('motor.winding_temperature',
+            "copper's resistance grows with its temperature",
+            'torque at a duty falls from test to test as the servo warms up',
+            _form('linear', 'winding_temperature')),
+    _effect('motor.torque_ripple',
+            'slots and commutation, or gravity of an eccentric wheel, add a torque by angle',
+            'the same wave at the same angles in either direction',
+            *_waves('ripple')),
+    _effect('bridge.coasting',
+            'while the pulse is off the bridge lets the current die instead of braking',
+            'less damping at a small duty than at a large one',
+            _form('share', 'coasting')),
+    _effect('bridge.dead_zone',
+            'brushes, transistors and dead time take a voltage that turns with the current',
+            'a small duty drives nothing: standing errors larger than friction explains',
+            _form('voltage', 'bridge_drop')),
+    _effect('bridge.braking',
+            'a servo without torque may short its windings instead of opening them',
+            'a pendulum let go swings out faster than friction explains',
+            _form('share', 'braking')),
+    _effect('bridge.current_limit',
+            'the bridge or the firmware cuts the current',
+            'torque stops growing beyond a duty when the shaft is slow',
+            _form('limit, as 1/A', 'current_limit')),
+    _effect('supply.internal_resistance',
+            'supply, cable and plugs have a resistance',
+            'the voltage, and with it speed and torque, sags at a large duty under load',
+            _form('resistance', 'supply_resistance')),
+    _effect('controller.delay',
+            'bus and firmware take time before a goal acts',
+            'the position lags the goal by the same time at any gain and speed',
+            _form('time', 'delay')),
+    _effect('controller.gain',
+            "the firmware's unit of the position gain is another one",
+            'the duty is another multiple of the position error',
+            _form('share', 'gain_error')),
+    _effect('controller.derivative_gain',
+            'the firmware has a derivative gain, or filters the position',
+            'the duty falls with the rate, most at a large position gain',
+            _form('time', 'derivative_gain')),
+    _effect('controller.dead_band',
+            'the firmware takes a small position error for none',
+            'the duty is nought near the goal',
+            _form('width', 'dead_band')),
+    _effect('controller.duty_limit',
+            'the firmware allows less than the full duty',
+            'the duty saturates early',
+            _form('share', 'duty_limit')),
+    _effect('controller.goal_slew',
+            'the firmware leads the goal along a ramp of a greatest rate',
+            'fast goals are followed at a constant rate',
+            _form('time per angle', 'goal_slowness')),
+    _effect('gearbox.stribeck_friction',
+            'a film of grease carries only when the teeth move',
+            'jerks at low rates; the shaft stays where it stopped',
+            _form('Stribeck', 'stribeck_torque', 'stribeck_rate', 'stribeck_shape')),
+    _effect('gearbox.load_dependent_friction',
+            'teeth and bearings rub in proportion to what they carry',
+            'friction grows with the torque; lifting loses, lowering brakes',
+            _form('alike', 'load_friction'),
+            _form('by direction', 'load_friction_motor', 'load_friction_external')),
+    _effect('gearbox.load_dependent_stribeck',
+            'under load the film of grease breaks down when the teeth hardly move',
+            'the loaded shaft sticks at slow rates and lets go suddenly',
+            _form('alike', 'load_stribeck', 'stribeck_rate', 'stribeck_shape'),
+            _form('by direction', 'load_stribeck_motor', 'load_stribeck_external',
+                  'stribeck_rate', 'stribeck_shape')),
+    _effect('gearbox.quadratic_load_friction',
+            'wheels and shafts bend under load and rub where they did not',
+            'friction grows faster than the torque',
+            _form('square', 'load_square'),
+            _form('square, at rest', 'load_square_stribeck', 'stribeck_rate', 'stribeck_shape'),
+            _form('by direction, at rest', 'load_quadratic_motor', 'load_quadratic_external',
+                  'stribeck_rate', 'stribeck_shape')),
+    _effect('gearbox.stiction_ageing',
+            'contacts creep together while they rest',
+            'the longer the shaft has stood, the more it takes to move it',
+            _form('logarithm of time', 'ageing')),
+    _effect('gearbox.friction_asymmetry',
+            'flanks of teeth differ from side to side',
+            'another friction in either direction',
+            _form('share', 'friction_asymmetry')),
+    _effect('gearbox.viscous_nonlinearity',
+            'grease shears thinner, or churns, at rate',
+            'drag is no straight line over the rate',
+            _form('quadratic', 'viscous_quadratic'),
+            _form('thinning', 'viscous_thinning')),
+    _effect('gearbox.friction_temperature',
+            'warm grease is thinner',
+            'friction falls from test to test as the servo warms up',
+            _form('linear', 'friction_temperature')),
+    _effect('gearbox.position_dependent_friction',
+            'wheels run out of true, and teeth mesh better here than there',
+            'the shaft sticks at certain angles',
+            *_waves('friction')),
+    _effect('gearbox.backlash',
+            'there is a gap between the teeth',
+            'the load moves freely for a moment after each reversal',
+            _form('gap', 'backlash')),
+    _effect('gearbox.elasticity',
+            'wheels, shafts and the horn twist',
+            'the load rings when it is let go or stopped',
+            _form('compliance', 'compliance')),
+    _effect('encoder.offset',
+            'the horn sits on the spline beside where the encoder has its zero',
+            'the pendulum hangs beside zero; lifting differs from side to side',
+            _form('angle', 'position_offset')),
+    _effect('encoder.eccentricity',
+            "the encoder's magnet sits beside the axis",
+            'angles are stretched on one side and squeezed on the other',
+            _form('once a turn', 'eccentricity_cosine', 'eccentricity_sine')),
+    _effect('load.moment',
+            'the arm, screws or the horn weigh something too, or the arm is longer',
+            'more torque at the same angle, without more inertia at the motor',
+            _form('share', 'load_moment')),
+)

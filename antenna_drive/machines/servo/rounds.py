@@ -1,0 +1,284 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+What a servo's model lacks, one effect after the other, each judged on withheld tests.
+
+Begun from a motor with Coulomb and viscous friction alone. In each round the numbers so far are
+fitted, the generic search ranks what could be added, and the likeliest are tried out: fitted to
+a part of the tests and judged on the rest, each test withheld once. The best stays if it lowers
+that error by more than its price; what it makes superfluous goes; when nothing is worth its
+price the search is over. Nothing but the given tests takes part in any choice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from antenna_drive.diagnosis import verdict
+from antenna_drive.diagnosis.least_squares import Problem
+from antenna_drive.diagnosis.search import Candidate, Search
+from antenna_drive.machines.servo import refit as servo_refit
+from antenna_drive.machines.servo.catalogue import BASE, catalogue, vector
+from antenna_drive.machines.servo.machine import ServoModel, ServoTest
+from antenna_drive.machines.servo.refit import Fit
+import numpy as np
+
+Progress = Callable[[float, str], None]
+# The effects of a model with the names of their forms, in the order in which they came.
+Structure = tuple[tuple[str, str], ...]
+# Each new number must lower the withheld error by such a share.
+WORTH = 0.01
+ROUNDS = 7
+# What is tried out of the verdict's ranking, pairs among it, and of all single effects.
+TRIED_RANKED, TRIED_SINGLES = 2, 7
+TURNS = 5
+
+
+@dataclass(frozen=True)
+class Effort:
+    """
+    How long is searched.
+
+    Attributes
+    ----------
+    runs : of all tests, for one global fit
+    near_runs : of all tests, for a fit from where a simpler model is
+
+    """
+
+    runs: int = 2400
+    near_runs: int = 500
+
+
+@dataclass(frozen=True)
+class Fold:
+    """A part of the tests that is fitted, and the rest, on which the fit is judged."""
+
+    fitted: tuple[ServoTest, ...]
+    withheld: tuple[ServoTest, ...]
+
+
+@dataclass(frozen=True)
+class Found:
+    """
+    What a model lacked.
+
+    Attributes
+    ----------
+    effects : what was added and stayed
+    names : the numbers of the model that is reached
+    fit : their values
+    rounds : for each round its ranking and what was added, as plain data
+
+    """
+
+    effects: tuple[str, ...]
+    names: tuple[str, ...]
+    fit: Fit
+    rounds: list[dict[str, Any]]
+
+
+def folds(tests: Sequence[ServoTest]) -> list[Fold]:
+    """
+    Return folds that withhold each test once, together with none of its gain or trajectory.
+
+    So every fold is fitted to all gains and all trajectories, where there are two or more of
+    each.
+    """
+    gains = sorted({test.kp for test in tests})
+    trajectories = sorted({test.trajectory for test in tests})
+    count = max(len(gains), len(trajectories), 2)
+    turn = [(gains.index(test.kp) + trajectories.index(test.trajectory)) % count
+            for test in tests]
+    parts = [Fold(tuple(t for t, k in zip(tests, turn, strict=True) if k != i),
+                  tuple(t for t, k in zip(tests, turn, strict=True) if k == i))
+             for i in range(count)]
+    return [part for part in parts if part.fitted and part.withheld]
+
+
+def lacking(tests: Sequence[ServoTest], effort: Effort, without: Sequence[str] = (),
+            progress: Progress = lambda share, doing: None) -> Found:
+    """
+    Find what the model of a motor with Coulomb and viscous friction lacks.
+
+    Parameters
+    ----------
+    tests
+        of one servo, with two gains or trajectories at least
+    effort
+        how long is searched
+    without
+        effects that are not considered
+    progress
+        called with the share that is done, 0 to 1, and what is being done
+
+    """
+    parts = folds(tests)
+    structure: Structure = ()
+    fit = servo_refit.refit(tests, BASE, (), effort.runs)
+    rounds: list[dict[str, Any]] = []
+    for turn in range(ROUNDS):
+        progress(turn / ROUNDS, 'what the model lacks')
+        scale = _scale(tests, fit)
+        judged = _judged(parts, structure, fit.values, scale)
+        problem = Problem(ServoModel(tests, fit.values, numbers(structure), without, scale))
+        candidates = Search(problem, lambda share, doing: None).run()
+        ranked = verdict.rank(candidates, 0.0)
+        likeliest = _likeliest([r.candidate for r in ranked], _singles(problem))
+        trials = [_Trial.of(c, structure, fit.values, parts, scale) for c in likeliest]
+        rounds.append({
+            'withheld_mrad': 1e3 * judged,
+            'ranked': [{'effects': list(r.candidate.effects), 'probability': r.probability}
+                       for r in ranked[:6]],
+            'confusable': verdict.confusable(candidates),
+            'tried': [{'effects': list(c.effects), 'forms': [f.name for f in c.forms],
+                       'withheld_mrad': 1e3 * trial.judged}
+                      for c, trial in zip(likeliest, trials, strict=True)],
+            'added': [], 'dropped': [],
+        })
+        if not trials:
+            break
+        best = min(trials, key=lambda trial: trial.priced)
+        if best.priced > judged:
+            break
+        before, structure = structure, best.structure
+        rounds[-1]['added'] = [effect for effect, _ in structure[len(before):]]
+        fit = servo_refit.nearby(tests, numbers(structure), best.values, effort.near_runs)
+        worth = _judged(parts, structure, fit.values, scale)
+        for piece in structure:
+            shorter = tuple(p for p in structure if p != piece)
+            price = 1.0 + WORTH * (len(numbers(structure)) - len(numbers(shorter)))
+            bare = _judged(parts, shorter, fit.values, scale)
+            if bare <= price * worth:
+                rounds[-1]['dropped'].append(piece[0])
+                structure, worth = shorter, bare
+        if rounds[-1]['dropped']:
+            fit = servo_refit.nearby(tests, numbers(structure), fit.values, effort.near_runs)
+        if set(structure) <= set(before):
+            break
+    progress(1.0, 'what the model lacks')
+    return Found(tuple(effect for effect, _ in structure), numbers(structure), fit, rounds)
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """
+    A model with a candidate's effects, judged on what folds withhold.
+
+    Attributes
+    ----------
+    structure : all its effects
+    values : of its numbers, where a fit may begin
+    judged : mean error on what was withheld [rad]
+    priced : the same with the price of what is new [rad]
+
+    """
+
+    structure: Structure
+    values: dict[str, float]
+    judged: float
+    priced: float
+
+    @classmethod
+    def of(cls, candidate: Candidate, structure: Structure, values: Mapping[str, float],
+           parts: Sequence[Fold], scale: Sequence[float]) -> _Trial:
+        point = candidate.state.point()
+        own = {p.name: point[p.name] for form in candidate.forms for p in form.parameters}
+        wider = (*structure, *zip(candidate.effects, (form.name for form in candidate.forms),
+                                  strict=True))
+        start = {**values, **own}
+        judged = _judged(parts, wider, start, scale)
+        return cls(wider, start, judged, judged * (1.0 + WORTH * len(own)))
+
+
+def numbers(structure: Structure) -> tuple[str, ...]:
+    """Return the numbers of a model with these effects."""
+    effects = catalogue()
+    own = [p.name for effect, form in structure
+           for known in effects[effect].forms if known.name == form for p in known.parameters]
+    return tuple(dict.fromkeys((*BASE, *own)))
+
+
+def _judged(parts: Sequence[Fold], structure: Structure, start: Mapping[str, float],
+            scale: Sequence[float]) -> float:
+    """Return the mean error of the folds on what they withheld [rad]."""
+    names = numbers(structure)
+    return float(np.mean([servo_refit.error(
+        part.withheld, settled(part.fitted, names, start, scale).values) for part in parts]))
+
+
+def _scale(tests: Sequence[ServoTest], fit: Fit) -> list[float]:
+    """Return the scale of what a fit leaves, in each channel a sensor's step at least."""
+    row = vector(fit.values)
+    left = np.concatenate([test.measured - test.readings(row) for test in tests])
+    steps = np.max([test.steps for test in tests], axis=0)
+    scale: list[float] = np.maximum(1.4826 * np.median(np.abs(left), axis=0), steps).tolist()
+    return scale
+
+
+def _singles(problem: Problem) -> list[Candidate]:
+    """Return every single effect in its best form, after a few turns, the best first."""
+    state = problem.fit(problem.start(problem.model.nuisances, {}), TURNS)
+    found = []
+    for effect in problem.model.effects.values():
+        forms = []
+        for form in effect.forms:
+            values = [p.start for p in form.parameters]
+            # what its shape does shows once the effect is there: a little of it
+            point = {**state.point(), **{p.name: p.start if p.shape else 0.0
+                                         for p in form.parameters}}
+            columns = problem.columns(point, form.parameters, state.residual, central=False)
+            wider = problem.widened(state, form.parameters, values, columns)
+            forms.append(Candidate((effect.id,), (form,), problem.fit(wider, TURNS)))
+        found.append(min(forms, key=lambda c: c.cost))
+    return sorted(found, key=lambda c: c.cost)
+
+
+def _likeliest(ranked: Sequence[Candidate], singles: Sequence[Candidate]) -> list[Candidate]:
+    """Return what is tried out: the likeliest of the verdict, and the best single effects."""
+    chosen = [c for c in ranked if c.effects][:TRIED_RANKED]
+    known = {c.effects for c in chosen}
+    return chosen + [c for c in singles if c.effects not in known][:TRIED_SINGLES]
+
+
+def settled(tests: Sequence[ServoTest], names: Sequence[str], start: Mapping[str, float],
+            scale: Sequence[float]) -> Fit:
+    """
+    Fit numbers by robust least squares from where they are.
+
+    Parameters
+    ----------
+    tests
+        that are fitted
+    names
+        what is fitted
+    start
+        values of all of them
+    scale
+        that residuals are measured by, in position, speed and duty
+
+    """
+    model = ServoModel(tests, {name: start[name] for name in names}, names, noise=scale)
+    problem = Problem(model)
+    state = problem.fit(problem.start(model.nuisances, {}), TURNS)
+    state = problem.fit(problem.refreshed(state, central=False), TURNS)
+    values = model.numbers(state.point())
+    return Fit(values, servo_refit.error(tests, values))
+
+
+def plain(values: Mapping[str, float]) -> dict[str, float]:
+    """Return values as plain data, in a stable order."""
+    return {name: float(value) for name, value in sorted(values.items())}

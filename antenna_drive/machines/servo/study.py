@@ -1,0 +1,295 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+A servo's diagnosis beside refits of BAM's friction ladder, on tests that neither has seen.
+
+For each two gains, and each two trajectories: what the model of motor and Coulomb-viscous
+friction lacks is searched for in the tests with these alone; the model that is reached and the
+six models of the ladder are fitted to the same tests with the same number of runs; all of them
+are then run free over the tests with the other gains or trajectories.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from dataclasses import dataclass
+import hashlib
+from itertools import combinations
+import json
+from pathlib import Path
+import time
+from typing import Any
+
+from antenna_drive.errors import UserError
+from antenna_drive.machines.servo import refit as servo_refit
+from antenna_drive.machines.servo.catalogue import catalogue, vector
+from antenna_drive.machines.servo.machine import ServoTest
+from antenna_drive.machines.servo.refit import Fit, LADDER, PARENTS
+from antenna_drive.machines.servo.rounds import Effort, lacking, plain
+import numpy as np
+
+Progress = Callable[[float, str], None]
+DIAGNOSED = 'diagnosed'
+SPLITS = {'gain': 'kp', 'trajectory': 'trajectory'}
+
+
+@dataclass(frozen=True)
+class Direction:
+    """
+    Which tests are fitted and which withheld.
+
+    Attributes
+    ----------
+    split : 'gain' or 'trajectory'
+    fitted : the two gains or trajectories that are fitted
+
+    """
+
+    split: str
+    fitted: tuple[Any, ...]
+
+    def parted(self, tests: Sequence[ServoTest]) -> tuple[list[ServoTest], list[ServoTest]]:
+        """Return the tests that are fitted and those that are withheld."""
+        key = SPLITS[self.split]
+        chosen = [test for test in tests if getattr(test, key) in self.fitted]
+        return chosen, [test for test in tests if getattr(test, key) not in self.fitted]
+
+
+def directions(tests: Sequence[ServoTest], splits: Iterable[str] = tuple(SPLITS),
+               ) -> list[Direction]:
+    """
+    Return every choice of two gains and of two trajectories that leaves something withheld.
+
+    Raises
+    ------
+    UserError : there are fewer than three gains and fewer than three trajectories
+
+    """
+    found = []
+    for split in splits:
+        levels = sorted({getattr(test, SPLITS[split]) for test in tests})
+        if len(levels) > 2:
+            found += [Direction(split, pair) for pair in combinations(levels, 2)]
+    if not found:
+        raise UserError(f'nothing can be withheld: three values of {" or ".join(splits)} '
+                        'at least are needed')
+    return found
+
+
+def compared(tests: Sequence[ServoTest], direction: Direction, effort: Effort,
+             without: Sequence[str] = ()) -> dict[str, Any]:
+    """
+    Return how the models do in one direction, as plain data.
+
+    Parameters
+    ----------
+    tests
+        all logs
+    direction
+        which of them are fitted
+    effort
+        of each fit
+    without
+        effects that the diagnosis does not consider
+
+    """
+    began = time.monotonic()
+    fitted, withheld = direction.parted(tests)
+    found = lacking(fitted, effort, without)
+    diagnosed = servo_refit.refit(fitted, found.names, [found.fit.values], effort.runs)
+    fits: dict[str, Fit] = {}
+    for name, names in LADDER.items():
+        # the ladder may begin where the diagnosis has ended, too
+        begins = [*(fits[parent].values for parent in PARENTS[name]), diagnosed.values]
+        fits[name] = servo_refit.refit(fitted, names, begins, effort.runs)
+    fits[DIAGNOSED] = diagnosed
+    return {
+        'split': direction.split,
+        'fitted': list(direction.fitted),
+        'models': {name: _model(fit, fitted, withheld) for name, fit in fits.items()},
+        'found': list(found.effects),
+        'rounds': found.rounds,
+        'seconds': time.monotonic() - began,
+    }
+
+
+def _model(fit: Fit, fitted: Sequence[ServoTest], withheld: Sequence[ServoTest],
+           ) -> dict[str, Any]:
+    row = vector(fit.values)
+    errors = {test.name: 1e3 * test.error(row) for test in withheld}
+    return {'fitted_mrad': 1e3 * servo_refit.error(fitted, fit.values),
+            'withheld_mrad': float(np.mean(list(errors.values()))),
+            'per_recording_mrad': errors, 'values': plain(fit.values)}
+
+
+def study(tests: Sequence[ServoTest], chosen: Sequence[Direction], effort: Effort,
+          without: Sequence[str] = (), jobs: int = 1, keep: Path | None = None,
+          progress: Progress = lambda share, doing: None) -> dict[str, Any]:
+    """
+    Compare in several directions and sum up, as plain data.
+
+    Parameters
+    ----------
+    tests
+        all logs
+    chosen
+        from `directions`
+    effort
+        of each fit
+    without
+        effects that the diagnosis does not consider
+    jobs
+        how many processes at once
+    keep
+        folder in which each direction's result is kept, and taken from where it is there
+    progress
+        called with the share that is done, 0 to 1, and what is being done
+
+    Raises
+    ------
+    UserError : there is no such effect to leave out
+
+    """
+    for name in without:
+        if name not in catalogue():
+            raise UserError(f'--without: {name}: no such effect; known are '
+                            f'{", ".join(catalogue())}')
+    began = time.monotonic()
+    results: dict[int, dict[str, Any]] = {}
+    shelf = _Shelf(keep, tests, effort, without)
+    with ProcessPoolExecutor(jobs) as pool:
+        running = {}
+        for i, direction in enumerate(chosen):
+            known = shelf.find(direction)
+            if known is None:
+                running[pool.submit(compared, tests, direction, effort, without)] = i
+            else:
+                results[i] = known
+        waiting = set(running)
+        try:
+            while waiting:
+                progress(len(results) / len(chosen), 'directions')
+                done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                for future in done:
+                    i = running[future]
+                    results[i] = future.result()
+                    shelf.put(chosen[i], results[i])
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    progress(1.0, 'directions')
+    ordered = [results[i] for i in range(len(chosen))]
+    return {'recordings': [test.name for test in tests],
+            'runs_per_fit': effort.runs,
+            'without': list(without),
+            'summary': summed(ordered),
+            'directions': ordered,
+            'seconds': time.monotonic() - began}
+
+
+class _Shelf:
+    """Results of directions, each in a file of its own, found again by what they came from."""
+
+    def __init__(self, folder: Path | None, tests: Sequence[ServoTest], effort: Effort,
+                 without: Sequence[str]) -> None:
+        self._folder = folder
+        digest = hashlib.sha256(repr((effort, sorted(without))).encode())
+        for test in tests:
+            for part in (test.time, test.goal, test.measured):
+                digest.update(part.tobytes())
+        for source in sorted(Path(__file__).parent.glob('*.py')):
+            digest.update(source.read_bytes())
+        self._key = digest.hexdigest()
+
+    def _path(self, direction: Direction) -> Path | None:
+        if self._folder is None:
+            return None
+        values = '-'.join(str(value) for value in direction.fitted)
+        return self._folder / f'{direction.split}-{values}.json'
+
+    def find(self, direction: Direction) -> dict[str, Any] | None:
+        path = self._path(direction)
+        try:
+            stored = json.loads(path.read_text()) if path is not None else None
+        except (OSError, ValueError):
+            return None
+        if not isinstance(stored, dict) or stored.get('key') != self._key:
+            return None
+        result: dict[str, Any] = stored['result']
+        return result
+
+    def put(self, direction: Direction, result: dict[str, Any]) -> None:
+        path = self._path(direction)
+        if path is None:
+            return
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            draft = path.with_suffix('.draft')
+            draft.write_text(json.dumps({'key': self._key, 'result': result}))
+            draft.replace(path)
+        except OSError as failed:
+            raise UserError(f'{path}: cannot be written, {failed.strerror}') from failed
+
+
+def summed(results: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return for each split the mean withheld errors and how often each effect was found."""
+    summary: dict[str, Any] = {}
+    for split in SPLITS:
+        part = [r for r in results if r['split'] == split]
+        if not part:
+            continue
+        errors = {name: float(np.mean([r['models'][name]['withheld_mrad'] for r in part]))
+                  for name in part[0]['models']}
+        ladder = {name: value for name, value in errors.items() if name != DIAGNOSED}
+        best = min(ladder, key=lambda name: ladder[name])
+        summary[split] = {
+            'withheld_mrad': errors,
+            'fitted_mrad': {name: float(np.mean([r['models'][name]['fitted_mrad']
+                                                 for r in part])) for name in errors},
+            'best_of_ladder': best,
+            'lower_than_best_of_ladder': errors[DIAGNOSED] < errors[best],
+            'directions_lower_than_all_of_ladder': sum(
+                r['models'][DIAGNOSED]['withheld_mrad']
+                < min(r['models'][name]['withheld_mrad'] for name in ladder) for r in part),
+            'directions': len(part),
+            'found_in': dict(Counter(e for r in part for e in dict.fromkeys(r['found'])
+                                     ).most_common()),
+        }
+    return summary
+
+
+def text(result: dict[str, Any]) -> str:
+    """Return the comparison as a few lines for a terminal."""
+    lines = []
+    for split, part in result['summary'].items():
+        names = list(part['withheld_mrad'])
+        lines.append(f'two values of {split} fitted, the others withheld: '
+                     f'mean absolute position error in free runs [mrad]')
+        lines.append('  ' + ' ' * 34 + ''.join(f'{name:>10}' for name in names))
+        for direction in result['directions']:
+            if direction['split'] == split:
+                label = ' and '.join(f'{v:g}' if isinstance(v, float) else str(v)
+                                     for v in direction['fitted'])
+                lines.append(f'  {label:<34}' + ''.join(
+                    f'{direction["models"][name]["withheld_mrad"]:10.1f}' for name in names))
+        lines.append(f'  {"mean":<34}' + ''.join(
+            f'{part["withheld_mrad"][name]:10.1f}' for name in names))
+        lines.append(f'  {"mean on what was fitted":<34}' + ''.join(
+            f'{part["fitted_mrad"][name]:10.1f}' for name in names))
+        lines.append('  found: ' + ', '.join(
+            f'{effect} ({count} of {part["directions"]})'
+            for effect, count in part['found_in'].items()))
+    return '\n'.join(lines)

@@ -1,0 +1,121 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The digits of a reading, told by the reading itself, and steps short enough for a wave."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+import math
+
+from antenna_drive.diagnosis.machine import FloatArray
+from antenna_drive.machines.antenna.catalogue import QUANTISATION
+from antenna_drive.machines.antenna.excitation import Bias, Longest, schedule, SheetCommand
+from antenna_drive.machines.antenna.field_test import CHANNELS, ENCODER
+from antenna_drive.machines.antenna.machine import DriveModel
+from antenna_drive.machines.antenna.sensors import digit_of
+from antenna_drive.parameters.loading import load
+from antenna_drive.parameters.sets import Drive
+from antenna_drive.recording.recording import Recording
+from antenna_drive.recording.sheet import Square, TestSheet
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+
+
+@settings(max_examples=60, deadline=None)
+@given(digit=st.floats(1e-7, 1e-3), shift=st.floats(-1.0, 1.0), seed=st.integers(0, 999),
+       largest=st.integers(1, 30))
+def test_digit_of_rounded_readings_is_found(digit: float, shift: float, seed: int,
+                                            largest: int) -> None:
+    """Walks in whole digits tell the digit, where single digits are among them."""
+    walk = np.random.default_rng(seed).integers(-largest, largest + 1, 400)
+    readings = digit * np.cumsum(np.r_[0, walk]) + shift
+    readings[::37] = np.nan
+    changes = np.abs(np.diff(np.cumsum(np.r_[0, walk])[np.isfinite(readings)]))
+    least = np.gcd.reduce(changes)
+    if least in changes:
+        assert digit_of(readings) == pytest.approx(least * digit, rel=1e-4)
+
+
+def test_reading_with_noise_behind_its_digits_has_none() -> None:
+    """Noise behind the quantiser leaves no lattice; too few changes tell nothing."""
+    random = np.random.default_rng(5)
+    steps: FloatArray = 1e-4 * np.cumsum(random.integers(-2, 3, 500)).astype(float)
+    assert digit_of(steps) == pytest.approx(1e-4, rel=1e-9)
+    noise: FloatArray = random.normal(0.0, 5e-5, steps.size)
+    assert digit_of(np.asarray(steps + noise)) == 0.0
+    assert digit_of(np.r_[np.zeros(50), np.full(50, 1e-4)]) == 0.0
+
+
+def recorded(drive: Drive, digit: float, rounding: Callable[[FloatArray], FloatArray],
+             ) -> Recording:
+    """Return a square wave as the model itself would show it, through an encoder of digits."""
+    waveform = Square(0.05, 3.0, 0.25)
+    sheet = TestSheet(waveform=waveform, parameter_tolerance=0.02)
+    time = np.arange(601) / 100.0
+    signals = {'test_signal/rate_command': SheetCommand(waveform)(time)}
+    signals.update({name: np.zeros(time.size) for name in CHANNELS})
+    model = DriveModel({'a': Recording.from_arrays(time, signals, sheet=sheet)}, drive, 1)
+    shown, when = readings_of(model, {}), model.experiments[0].time
+    signals.update({name: np.interp(time, when, shown[:, c])
+                    for c, name in enumerate(CHANNELS)})
+    signals['plant/encoder'] = digit * rounding(signals['plant/encoder'] / digit)
+    return Recording.from_arrays(time, signals, sheet=sheet)
+
+
+def readings_of(model: DriveModel, point: Mapping[str, float]) -> FloatArray:
+    """Return what the sensors of the one test would have shown."""
+    shown = model.simulate([point])[0][0]
+    assert shown is not None
+    return shown
+
+
+@pytest.mark.parametrize(('rounding', 'turn'), [(np.floor, 0.5), (np.round, 0.0),
+                                                (np.ceil, -0.5)])
+def test_angle_within_the_digit_that_was_read_is_no_residual(
+        rounding: Callable[[FloatArray], FloatArray], turn: float) -> None:
+    """An encoder of coarse digits is no gap once they are known, wherever it rounds."""
+    drive, digit = load(), 2e-4
+    model = DriveModel({'a': recorded(drive, digit, rounding)}, drive, 1)
+    step, edge = model.effects[QUANTISATION].forms[0].parameters
+    assert step.high == pytest.approx(digit, rel=1e-6)
+    measured = model.experiments[0].measured[:, ENCODER]
+    plain = readings_of(model, {})[:, ENCODER]
+    assert np.abs(measured - plain).max() > 0.4 * digit
+    known = readings_of(model, {step.name: digit, edge.name: turn})[:, ENCODER]
+    assert np.abs(measured - known).max() < 1e-9
+
+
+def test_fine_encoder_has_the_digits_of_its_sheet() -> None:
+    """Digits that the sheet gives are no effect."""
+    drive = load()
+    model = DriveModel({'a': recorded(drive, 2.0 * math.pi / 2 ** 21, np.floor)}, drive, 1)
+    assert [p.name for p in model.effects[QUANTISATION].forms[0].parameters] == [
+        f'{QUANTISATION}.step']
+    assert model.effects[QUANTISATION].forms[0].parameters[0].high > 1e-3
+
+
+def test_steps_are_short_where_a_wave_turns_fast() -> None:
+    """No step lets a wave turn further than it may, and slow motion keeps its long steps."""
+    command = SheetCommand(Square(0.5, 4.0, 0.0))
+    time = np.linspace(0.0, 4.0, 401)
+    longest = Longest(2.5e-3, 1e-4, 0.7, 200000.0)
+    fine = schedule(command, Bias(), time, longest)
+    rate = math.radians(0.5)
+    assert fine.steps[:, 0].max() * rate * 200000.0 <= 0.7 * 1.0001
+    assert schedule(command, Bias(), time, Longest(2.5e-3)).steps.shape[0] == 1600
+    assert schedule(command, Bias(), time, replace(longest, turns=100.0)).steps.shape[0] == 1600
+    assert fine.steps[:, 0].sum() == pytest.approx(4.0)

@@ -1,0 +1,74 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A recording made ready for a diagnosis: where its time begins, and what cannot serve."""
+
+from __future__ import annotations
+
+from antenna_drive.diagnosis.confusability import BUILT_IN, planned
+from antenna_drive.errors import UserError
+from antenna_drive.machines.antenna.field_test import FieldTest, prepared
+from antenna_drive.parameters import load
+from antenna_drive.recording.recording import Recording
+from antenna_drive.recording.sheet import TestSheet
+import numpy as np
+import pytest
+
+NAME = 'field'
+
+
+def field(test: str = 'square') -> Recording:
+    """Return 20 s of a test at 200 Hz."""
+    return planned(BUILT_IN[test], 20.0, 200.0)
+
+
+def ready(recording: Recording) -> tuple[FieldTest, list[str]]:
+    """Return a recording made ready, and what was noted."""
+    notes: list[str] = []
+    return prepared(NAME, recording, load(), notes.append), notes
+
+
+@pytest.mark.parametrize('test', ['square', 'multisine'])
+@pytest.mark.parametrize('clock_s', [1_795_262_948.25, 1763.25, -40.5])
+def test_a_clock_that_began_elsewhere_changes_nothing(test: str, clock_s: float) -> None:
+    plain, _ = ready(field(test))
+    other, notes = ready(field(test).shift(clock_s))
+    np.testing.assert_allclose(other.time, plain.time, rtol=0.0, atol=1e-9)
+    np.testing.assert_array_equal(other.measured, plain.measured)
+    np.testing.assert_allclose(other.command(plain.time), plain.command(plain.time))
+    assert f'{NAME}: begins at {clock_s:.3f} s, time is counted from there' in notes
+
+
+def test_a_recorder_that_joined_late_keeps_the_time_of_the_waveform() -> None:
+    joined, notes = ready(field().between(7.0))
+    assert not any('begins at' in note for note in notes)
+    assert joined.time[0] == pytest.approx(7.0)
+    np.testing.assert_array_equal(joined.command(joined.time), ready(field())[0].command(
+        joined.time))
+    # as much of it is looked at as of any other
+    assert joined.until(5.0).time[-1] == pytest.approx(12.0, abs=0.02)
+
+
+def test_without_a_waveform_time_begins_with_the_recording() -> None:
+    late = field().between(7.0)
+    bare = Recording(late.channels, sheet=TestSheet())
+    assert ready(bare)[0].time[0] == 0.0
+
+
+def test_too_few_samples_are_refused_in_one_line() -> None:
+    whole = field()
+    reading = whole.between(end_s=0.03).channels['motor_1/ammeter']
+    command = whole.channels['test_signal/rate_command']
+    few = Recording({'test_signal/rate_command': command, 'motor_1/ammeter': reading})
+    with pytest.raises(UserError, match='field: 6 samples to compare'):
+        ready(few)

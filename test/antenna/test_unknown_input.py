@@ -1,0 +1,101 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Where something that no effect names has entered, told from what it does to the readings."""
+
+from __future__ import annotations
+
+from antenna_drive.diagnosis.confusability import BUILT_IN, planned
+from antenna_drive.diagnosis.least_squares import Problem
+from antenna_drive.diagnosis.machine import FloatArray
+from antenna_drive.diagnosis.unknown_input import _Inputs, components, places
+from antenna_drive.machines.antenna.catalogue import ENTRIES
+from antenna_drive.machines.antenna.field_test import CHANNELS
+from antenna_drive.machines.antenna.machine import DriveModel
+from antenna_drive.parameters import load
+from antenna_drive.recording.recording import Recording
+import numpy as np
+import pytest
+from scipy import optimize, stats
+
+NOISE = np.array([0.01, 0.01, 0.0035, 0.0035, 1.5e-6, 0.01])
+
+
+def disturbed(entry_name: str, strength: float, seed: int) -> DriveModel:
+    """Return a model against a drive that something of a wild course has entered."""
+    test = planned(BUILT_IN['square'], 12.0, 70.0)
+    model = DriveModel({'square': test}, load(), threads=1)
+    random = np.random.default_rng(seed)
+    frequencies, phases = random.uniform(0.2, 1.5, 5), random.uniform(0.0, 6.3, 5)
+
+    def course(time: FloatArray) -> FloatArray:
+        waves = np.sin(2.0 * np.pi * np.multiply.outer(time, frequencies) + phases)
+        return np.asarray(strength * waves.sum(axis=-1))
+
+    entry = next(e for e in ENTRIES if e.name == entry_name)
+    readings = model.pushed({}, entry, course)[0]
+    readings = readings + NOISE * random.normal(size=readings.shape)
+    time = model.experiments[0].time
+    command = test['test_signal/rate_command']
+    signals = {'test_signal/rate_command': np.interp(time, command.time_s, command.values)}
+    signals.update({name: readings[:, c] for c, name in enumerate(CHANNELS)})
+    return DriveModel({'square': Recording.from_arrays(time, signals, sheet=test.sheet)}, load(),
+                      threads=1)
+
+
+@pytest.mark.parametrize(('name', 'strength', 'component'), [
+    ('torque on the axis', 0.4, 'axis'), ('friction of motor 2', 0.4, 'motor_2'),
+    ('voltage in amplifier 1', 0.4, 'motor_1'), ('reading of tachometer 2', 3.0, 'tach_2'),
+    ('displacement in gearbox 1', 3.0, 'gearbox_1'),
+])
+def test_part_that_something_unknown_enters_is_told(name: str, strength: float,
+                                                    component: str) -> None:
+    """The input is no pulse, and its answer is not linear: the part is found all the same."""
+    found = places(Problem(disturbed(name, strength, seed=3)), {})
+    shares = components(found)
+    assert max(shares, key=shares.__getitem__) == component
+    assert sum(shares.values()) == pytest.approx(1.0)
+    assert found[0].evidence > 100.0 and 0.3 < found[0].explained <= 1.0
+
+
+def test_noise_alone_enters_nowhere() -> None:
+    """Where nothing has entered, no place has evidence worth the name."""
+    found = places(Problem(disturbed('torque on the axis', 0.0, seed=4)), {})
+    assert found[0].evidence < 20.0
+
+
+def test_evidence_is_that_of_a_normal_distribution() -> None:
+    """The marginal likelihood agrees with scipy's density of the whole vector."""
+    random = np.random.default_rng(1)
+    columns = random.normal(size=(40, 6))
+    residual = columns @ random.normal(size=6) * 1.5 + random.normal(size=40)
+    inputs = _Inputs(residual, np.ones(40), np.zeros((40, 1)), np.ones(1))
+
+    class One:
+        """A problem of one experiment."""
+
+        @staticmethod
+        def rows(k: int) -> slice:
+            """Return all rows."""
+            return slice(0, 40)
+
+    evidence, _ = inputs.judged([columns], One())  # type: ignore[arg-type]
+
+    def worst(size: FloatArray) -> float:
+        spread = np.exp(size[0]) * (np.eye(40) + np.exp(size[1]) * columns @ columns.T)
+        return -float(stats.multivariate_normal.logpdf(residual, np.zeros(40), spread))
+
+    best = -float(optimize.minimize(worst, [0.0, 0.0], method='Nelder-Mead').fun)
+    plain = float(np.sum(stats.norm.logpdf(residual, 0.0, np.sqrt(np.mean(residual ** 2)))))
+    # the strength is tried on a grid, whose steps are worth little
+    assert evidence == pytest.approx(best - plain, abs=0.3)

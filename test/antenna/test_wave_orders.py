@@ -1,0 +1,63 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Which waves a residual holds, and how the noise is set while something strong is missing."""
+
+from __future__ import annotations
+
+from antenna_drive.diagnosis.machine import Experiment
+from antenna_drive.machines.antenna.catalogue import catalogue, Wave
+from antenna_drive.machines.antenna.field_test import CHANNELS, CURRENT_1, TACH_1, TACH_2, UNITS
+from antenna_drive.machines.antenna.wave_orders import likely_orders
+from antenna_drive.physics.harmonics import wave
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+
+
+def experiment(seed: int) -> Experiment:
+    """Return a test in which the motors turn to and fro at up to three turns a second."""
+    time = np.arange(0.0, 20.0, 0.015)
+    random = np.random.default_rng(seed)
+    measured = np.zeros((time.size, len(CHANNELS)))
+    for c in (TACH_1, TACH_2):
+        measured[:, c] = 18.0 * np.sin(0.9 * time) + 1e-3 * random.normal(size=time.size)
+    return Experiment('a', time, tuple(CHANNELS.values()), UNITS, measured,
+                      np.ones_like(measured))
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(2, 30), st.integers(0, 10 ** 6))
+def test_planted_wave_is_found_beneath_a_slow_misfit_that_is_louder(order: int,
+                                                                    seed: int) -> None:
+    test = experiment(seed)
+    form = catalogue()['motor_1.torque_ripple'].forms[0]
+    assert isinstance(form, Wave)
+    rate = test.measured[:, TACH_1]
+    angle = np.r_[0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(test.time))]
+    residual = np.random.default_rng(seed).normal(size=test.measured.shape)
+    residual[:, CURRENT_1] += 2.0 * np.sin(order * angle + 0.3) + 6.0 * np.sign(rate)
+    assert float(order) in likely_orders(form, [test], [residual], 3)
+
+
+@given(st.lists(st.floats(-1e-3, 1e-3), min_size=7, max_size=7), st.floats(-0.5, 0.5))
+def test_wave_of_readings_is_that_of_the_physics(parts: list[float], angle: float) -> None:
+    """Sine and cosine parts on readings say what the settings of the record say to the physics."""
+    form = catalogue()['encoder.cyclic_error'].forms[0]
+    assert isinstance(form, Wave)
+    form = form.at(700.0)
+    value = {path.rpartition('cyclic_error')[2]: v for path, _, v in form.settings(*parts)}
+    assert form.along(np.array([angle]), parts)[0] == pytest.approx(wave(
+        angle, value[''], value['_second'], value['_third'], value['_cycles'], value['_phase'],
+        value['_second_phase'], value['_third_phase']), abs=1e-12)

@@ -1,0 +1,133 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A diagnosis works on any machine that is modelled: here a body that cools, in closed form."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import math
+from typing import Any
+
+from antenna_drive.diagnosis.diagnosis import diagnosed
+from antenna_drive.diagnosis.machine import Effect, Experiment, Form, Motion, Parameter, Point
+import numpy as np
+import pytest
+
+TIME = np.arange(0.0, 10.0, 0.02)
+NOISE = 0.01
+STARTS = (3.0, -2.0)
+
+
+def effect(key: str, unit: str, low: float, high: float) -> Effect:
+    """Return an effect of one number."""
+    number = Parameter(f'{key}.size', unit, low, high, 1e-3)
+    return Effect(key, key.partition('.')[0], 'a cause', 'a look', (Form('', (number,)),))
+
+
+class Body:
+    """
+    A body that cools as start * exp(-rate t), with a thermometer beside it and one behind it.
+
+    It may lack the thermometer's gain, a heater that comes on at 4 s, and a draught at 7 s.
+    """
+
+    effects: Mapping[str, Effect] = {item.id: item for item in (
+        effect('thermometer.gain', '1', -0.5, 0.5), effect('heater.step', 'K', -1.0, 1.0),
+        effect('air.draught', '1/s', 0.0, 1.0))}
+    nuisances = (Parameter('offset:rate', '1', -0.02, 0.02, 1e-3, 0.01),)
+
+    def __init__(self, truth: Mapping[str, float], odd: float = 0.0) -> None:
+        random = np.random.default_rng(5)
+        self.experiments: tuple[Experiment, ...] = ()
+        made = [self.reading(k, truth) + NOISE * random.normal(size=(TIME.size, 2))
+                for k in range(len(STARTS))]
+        for k, measured in enumerate(made):
+            measured[:, 1] += odd * np.sin(2.0 * TIME + k)
+            self.experiments += (Experiment(
+                f'from {STARTS[k]:g} K', TIME, ('near', 'behind'), ('K', 'K'), measured,
+                np.full_like(measured, NOISE)),)
+
+    @staticmethod
+    def reading(k: int, point: Mapping[str, float]) -> Any:
+        """Return what both thermometers say."""
+        rate = 0.4 * (1.0 + point.get('offset:rate', 0.0))
+        cooled = rate * TIME + point.get('air.draught.size', 0.0) * np.maximum(TIME - 7.0, 0.0)
+        heated = point.get('heater.step.size', 0.0) * (TIME >= 4.0)
+        body = STARTS[k] * np.exp(-cooled) + heated
+        return np.column_stack([body * (1.0 + point.get('thermometer.gain.size', 0.0)), body])
+
+    def rough(self) -> Body:
+        """Return the model itself."""
+        return self
+
+    def heard_at(self, point: Point) -> Body:
+        """Return the model itself."""
+        return self
+
+    def brief(self) -> Body:
+        """Return the model: it is brief."""
+        return self
+
+    def forms(self, item: Effect, residuals: Any) -> Sequence[Form]:
+        """Return all forms."""
+        return item.forms
+
+    def motion(self, experiment: int) -> Motion:
+        """Return its cooling."""
+        body = self.reading(experiment, {})[:, 1]
+        return Motion(np.gradient(body, TIME), body, TIME, math.inf)
+
+    entries = ()
+
+    def pushed(self, point: Any, entry: Any, course: Any) -> Any:
+        """Return nothing: there are no entries."""
+        return []
+
+    def counterpart(self, form: Any, effect: Any, part: Any) -> Any:
+        """Return the form itself: there is one mass."""
+        return form
+
+    def absorbed(self, point: Mapping[str, float], gone: Any) -> dict[str, float]:
+        """Return the offsets as they are."""
+        return dict(point)
+
+    def simulate(self, points: Any, only: Any = None, until: float = math.inf) -> Any:
+        """Return the readings of each variant."""
+        return [[self.reading(k, point) if one in (None, k) else None
+                 for k in range(len(STARTS))]
+                for point, one in zip(points, only or [None] * len(points))]
+
+
+@pytest.mark.parametrize('name, size', [
+    ('thermometer.gain', 0.1), ('heater.step', -0.3), ('air.draught', 0.4)])
+def test_what_a_machine_has_and_its_model_lacks_is_named(name: str, size: float) -> None:
+    result = diagnosed(Body({f'{name}.size': size, 'offset:rate': 0.01})).result
+    assert result['verdict'] == 'explained'
+    top = result['which'][0]
+    assert top['effects'] == [name] and top['probability'] > 0.9
+    assert top['parameters'][f'{name}.size']['value'] == pytest.approx(size, rel=0.05)
+    assert result['how_far']['explained_fraction']['value'] > 0.95
+
+
+def test_a_machine_within_its_tolerance_has_no_gap() -> None:
+    assert diagnosed(Body({'offset:rate': -0.015})).result['verdict'] == 'no_gap'
+
+
+def test_what_no_effect_does_is_unknown() -> None:
+    assert diagnosed(Body({}, odd=0.2)).result['verdict'] == 'unknown_effect'
+
+
+def test_two_effects_at_once_are_both_named() -> None:
+    result = diagnosed(Body({'thermometer.gain.size': 0.2, 'heater.step.size': 0.5})).result
+    assert set(result['which'][0]['effects']) == {'thermometer.gain', 'heater.step'}
