@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyse the tests and say what they can tell."""
-    from antenna_drive.diagnosis.confusability import BUILT_IN, confusability, planned
+    from antenna_drive.machines.antenna.planned_tests import BUILT_IN, confusability_of, planned
     from antenna_drive.parameters.loading import load
     from antenna_drive.recording.sheet import load_sheet
 
@@ -84,7 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
             def advance(share: float, i: int = i) -> None:
                 progress.update(i + share)
 
-            found[name] = confusability(chosen, drive, advance)
+            found[name] = confusability_of(chosen, drive, advance)
     if arguments.json:
         write_json({name: {
             'effects': [{'effect': effect, 'detectable': size if np.isfinite(size) else None,
@@ -96,10 +96,8 @@ def run(arguments: argparse.Namespace) -> int:
     whole = next(iter(found.values()))
     print('least size that shows, and what passes for it', file=out)
     for i, effect in enumerate(whole.effects):
-        others = [whole.effects[j] for j in np.argsort(-whole.alike[i])
-                  if j != i and whole.alike[i, j] > 0.95][:3]
         print(f'  {effect:36s} {whole.detectable[i]:10.3g} {whole.units[i]:12s} '
-              + ', '.join(others), file=out)
+              + ', '.join(whole.passing_for(i, 3)), file=out)
     for name, item in found.items():
         print(f'{name}: {100.0 * item.separated():.1f} % of all pairs of effects told apart, '
               f'{len(item.groups())} groups are not', file=out)

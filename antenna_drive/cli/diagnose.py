@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose, and write what was asked for; 0 whatever the verdict."""
     # the compiled physics takes a while to load: not before it is needed
-    from antenna_drive.diagnosis.diagnosis import diagnose
+    from antenna_drive.machines.antenna.diagnose import diagnose_recordings
     from antenna_drive.parameters.loading import load
 
     if arguments.jobs < 1:
@@ -69,8 +69,8 @@ def run(arguments: argparse.Namespace) -> int:
                 name += '_'
             recordings[name] = read_recording(path)
     with Progress('diagnosis', 1.0) as progress:
-        diagnosis = diagnose(recordings, drive, lambda share, doing: progress.update(share),
-                             arguments.jobs)
+        diagnosis = diagnose_recordings(
+            recordings, drive, lambda share, doing: progress.update(share), arguments.jobs)
     if arguments.json:
         write_json(diagnosis.result, arguments.json)
     if arguments.report:

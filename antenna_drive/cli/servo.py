@@ -59,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Compare; 0 if the diagnosis has the lower withheld error in every split, else 1."""
     # the compiled physics takes a while to load: not before it is needed
-    from antenna_drive.machines.servo.machine import ServoTest
+    from antenna_drive.machines.servo.log import ServoLog
     from antenna_drive.machines.servo.rounds import Effort
     from antenna_drive.machines.servo.study import directions, SPLITS, study, text
 
@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
     paths = sorted(folder.glob('*.json'))
     if not paths:
         raise UserError(f'{folder}: holds no *.json logs')
-    tests = [ServoTest.of(path.stem, read_bam(path)) for path in paths]
+    tests = [ServoLog.of(path.stem, read_bam(path)) for path in paths]
     splits = tuple(SPLITS) if arguments.split == 'both' else (arguments.split,)
     chosen = directions(tests, splits)
     effort = Effort(arguments.runs, max(20, arguments.runs // 5))

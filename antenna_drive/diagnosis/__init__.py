@@ -11,4 +11,28 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The sim-to-real gap: where it lies, which effect causes it, how far it shrinks."""
+"""
+The engine of the diagnosis: where a machine and its model part, why, and how far it can be mended.
+
+This is its public face; machines import nothing else of it.
+"""
+
+from antenna_drive.diagnosis.check import check_machine, idle_effects, MachineError
+from antenna_drive.diagnosis.confusability import Confusability, confusability
+from antenna_drive.diagnosis.diagnosis import diagnose, Diagnosis, Progress
+from antenna_drive.diagnosis.hypothesis import Hypothesis
+from antenna_drive.diagnosis.least_squares import LeastSquares
+from antenna_drive.diagnosis.machine import (
+    Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point,
+    Regimes, TimeScales,
+)
+from antenna_drive.diagnosis.motion import Motion
+from antenna_drive.diagnosis.ranking import rank_hypotheses, Ranking
+from antenna_drive.diagnosis.settings import DEFAULT, Settings
+
+__all__ = [
+    'check_machine', 'Confusability', 'confusability', 'Course', 'DEFAULT', 'diagnose',
+    'Diagnosis', 'DisturbanceInput', 'Effect', 'Experiment', 'FloatArray', 'Form', 'Hypothesis',
+    'idle_effects', 'LeastSquares', 'Machine', 'MachineError', 'Motion', 'Parameter', 'Point',
+    'Progress', 'rank_hypotheses', 'Ranking', 'Regimes', 'Settings', 'TimeScales',
+]

@@ -14,46 +14,44 @@
 """
 The diagnosis of a gap between a machine and its model: where, which effect, how far it shrinks.
 
-Examples
---------
->>> from antenna_drive.diagnosis.diagnosis import diagnose          # doctest: +SKIP
->>> from antenna_drive.parameters import load                 # doctest: +SKIP
->>> from antenna_drive.recording.files import read_recording  # doctest: +SKIP
->>> recording = read_recording('field.csv')                   # doctest: +SKIP
->>> diagnose({'field': recording}, load()).summary()          # doctest: +SKIP
-
+It works on any `Machine`; the antenna's is in `machines.antenna`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import time
 from typing import Any
 
-from antenna_drive.diagnosis import localisation as where, unknown_input, verdict
-from antenna_drive.diagnosis.elimination import doubted
-from antenna_drive.diagnosis.held_out import how_far
-from antenna_drive.diagnosis.lack_of_fit import remains, tests
-from antenna_drive.diagnosis.least_squares import Problem, pull_of
-from antenna_drive.diagnosis.machine import Model
-from antenna_drive.diagnosis.search import Candidate, parameters_of, Search
-from antenna_drive.machines.antenna.machine import DriveModel
-from antenna_drive.parameters.sets import Drive
-from antenna_drive.recording.recording import Recording
+from antenna_drive.diagnosis import localisation, unknown_input, verdict
+from antenna_drive.diagnosis.check import check_machine
+from antenna_drive.diagnosis.elimination import backward_elimination
+from antenna_drive.diagnosis.held_out import held_out
+from antenna_drive.diagnosis.hypothesis import Hypothesis
+from antenna_drive.diagnosis.lack_of_fit import lack_of_fit, residual_tests
+from antenna_drive.diagnosis.least_squares import LeastSquares, prior_precision
+from antenna_drive.diagnosis.machine import Machine
+from antenna_drive.diagnosis.search import Search
+from antenna_drive.diagnosis.settings import DEFAULT, Settings, VerdictSettings
+from antenna_drive.diagnosis.verdict import Decision, LackOfFit
 import numpy as np
 try:
     from threadpoolctl import threadpool_limits
-except ImportError:  # no ROS distribution names it: slower without, and not otherwise
+except ImportError:  # no ROS distribution names it: the results are the same, only slower
     threadpool_limits = None
 
 Progress = Callable[[float, str], None]
-# How many entries of `which` are given beside 'unknown' and 'none', and what is left out below.
-_ENTRIES = 12
-_LEAST = 1e-4
-# More numbers than these are not told one by one.
-_TOLD = 12
+# An effect of more parameters than this is summed up instead of listed.
+_LISTED = 12
+
+_HEADLINES = {
+    'no_gap': 'no gap: machine and model agree within tolerance and noise',
+    'explained': 'explained: one of the known effects closes the gap',
+    'partly_explained': 'partly explained: a known effect closes some of the gap',
+    'unknown_effect': 'unknown effect: nothing in the catalogue closes the gap',
+}
 
 
 @dataclass(frozen=True)
@@ -64,19 +62,27 @@ class Diagnosis:
     Attributes
     ----------
     result : the JSON of docs/diagnosis.md, as plain data
-    model : that was compared
-    none, best : the fits without and with the likeliest effects
-    candidates : everything that was fitted
-    notes : what was inferred or is missing
+    machine : that was compared, with the noise of the motion that was found
+    none, best : the hypotheses without and with the likeliest effects
+    hypotheses : everything that was fitted to the whole tests
+    lack : what the best hypothesis leaves
+    settings : the thresholds
 
     """
 
     result: dict[str, Any]
-    model: Model
-    none: Candidate
-    best: Candidate
-    candidates: Sequence[Candidate] = field(default_factory=tuple)
-    notes: Sequence[str] = ()
+    machine: Machine
+    none: Hypothesis
+    best: Hypothesis
+    hypotheses: Sequence[Hypothesis]
+    lack: LackOfFit
+    settings: Settings
+
+    def __repr__(self) -> str:
+        """Return the verdict and its first answer, in a line."""
+        first = self.result['which'][0]
+        return (f'<Diagnosis: {self.result["verdict"]}, {" + ".join(first["effects"])} '
+                f'{100.0 * first["probability"]:.0f} %>')
 
     def summary(self) -> str:
         """Return the verdict in a few lines."""
@@ -86,7 +92,7 @@ class Diagnosis:
             if entry['probability'] >= 0.01:
                 names = ' and '.join(entry['effects'])
                 lines.append(f'  {100.0 * entry["probability"]:5.1f} %  {names}')
-                lines += [f'           {line}' for line in told(entry['parameters'])]
+                lines += [f'           {line}' for line in value_lines(entry['parameters'])]
         for group in result['confusable']:
             lines.append('  these data cannot tell apart: ' + ', '.join(group))
         if result['may_enter_at']:
@@ -99,22 +105,13 @@ class Diagnosis:
             lines.append(f'  explains {100.0 * fraction["value"]:.0f} % of the gap '
                          f'({100.0 * low:.0f} to {100.0 * high:.0f}), judged on '
                          f'{result["how_far"]["held_out"]}')
-        lines += [f'  note: {note}' for note in self.notes]
+        lines += [f'  note: {note}' for note in result['notes']]
         return '\n'.join(lines)
 
 
-_HEADLINES = {
-    'no_gap': 'no gap: machine and model agree within tolerance and noise',
-    'explained': 'explained: one of the known effects closes the gap',
-    'partly_explained': 'partly explained: a known effect closes some of the gap',
-    'unknown_effect': 'unknown effect: nothing in the catalogue closes the gap',
-}
-
-
-def told(parameters: Mapping[str, Any]) -> list[str]:
-    """Return the values of an entry's parameters as people read them, a line each."""
-    if len(parameters) > _TOLD:
-        # a gust: a course over time, which no one reads number by number
+def value_lines(parameters: Mapping[str, Any]) -> list[str]:
+    """Return the values of an answer's parameters as people read them, a line each."""
+    if len(parameters) > _LISTED:
         return [f'{len(parameters)} numbers over time, see the JSON']
     return [f'{name.split(".", 2)[-1]} = {item["value"]:.4g} '
             + ('' if item['unit'] == '1' else f'{item["unit"]} ')
@@ -122,136 +119,101 @@ def told(parameters: Mapping[str, Any]) -> list[str]:
             for name, item in parameters.items()]
 
 
-def diagnose(recordings: Mapping[str, Recording], drive: Drive,
-             progress: Progress = lambda share, doing: None, threads: int = 2) -> Diagnosis:
+def diagnose(machine: Machine, progress: Progress = lambda share, doing: None, threads: int = 2,
+             settings: Settings = DEFAULT) -> Diagnosis:
     """
-    Say where a real drive and its model part, which effect is behind it, and how far it goes.
+    Diagnose a machine in its experiments.
 
     Parameters
     ----------
-    recordings
-        of one machine, by name, with their test sheets
-    drive
-        the configuration of the model
+    machine
+        see `Machine`
     progress
         called with the share that is done, 0 to 1, and what is being done
     threads
-        how many simulations at once
+        how many hypotheses are fitted at once
+    settings
+        thresholds
 
     Raises
     ------
-    UserError : a recording cannot be used; the message says which and why
+    MachineError : the machine breaks its contract; the message says where
 
     """
-    began = time.monotonic()
-    model = DriveModel(recordings, drive, threads)
-    found = diagnosed(model, progress, threads, model.notes)
-    found.result['seconds'] = time.monotonic() - began
-    return found
-
-
-def diagnosed(model: Model, progress: Progress = lambda share, doing: None, threads: int = 2,
-              notes: Sequence[str] = ()) -> Diagnosis:
-    """
-    Diagnose any machine that is modelled, in the experiments that its model holds.
-
-    Parameters
-    ----------
-    model
-        see `Model`
-    progress
-        called with the share that is done, 0 to 1, and what is being done
-    threads
-        how many candidates are fitted at once
-    notes
-        what was inferred or is missing
-
-    """
-    # whole fits are made side by side: matrices within a fit need no threads of their own
+    check_machine(machine)
+    # whole fits run side by side: their matrices need no threads of their own
     with threadpool_limits(1, 'blas') if threadpool_limits else nullcontext():
-        return _diagnosed(model, progress, threads, notes)
+        return _diagnose(machine, progress, threads, settings)
 
 
-def _diagnosed(model: Model, progress: Progress, threads: int,
-               notes: Sequence[str]) -> Diagnosis:
+def _diagnose(machine: Machine, progress: Progress, threads: int,
+              settings: Settings) -> Diagnosis:
     began = time.monotonic()
-    search = Search(Problem(model), lambda share, doing: progress(0.9 * share, doing), threads)
-    # what is left is judged after a fit that has converged; the ranking compares like with like
-    candidates, best = doubted(search, search.run())
-    # the noise is that of the motion which was found
-    problem, model = search.whole, search.whole.model
-    none = candidates[0]
-    progress(0.9, 'how far it goes')
-    reach = how_far(problem, none, best)
-    left = remains(problem, best, reach['explained_fraction']['ci95'][1])
-    unknown = verdict.unknown_probability(left)
-    ranked = verdict.rank(candidates, unknown)
-    entries = _entries(ranked, unknown)
-    word = _word(entries[0]['effects'], unknown)
-    motions = [model.motion(k) for k in range(len(model.experiments))]
+    search = Search(LeastSquares(machine, settings=settings),
+                    lambda share, doing: progress(0.9 * share, doing), threads)
+    hypotheses, best = backward_elimination(search, search.run(), settings)
+    # the noise is that of the motion that was found
+    problem = search.whole
+    none = hypotheses[0]
+    progress(0.9, 'withheld data')
+    reach = held_out(problem, none, best)
+    lack = lack_of_fit(problem, best, reach['explained_fraction']['ci95'][1])
+    decision = verdict.decide(hypotheses, lack, settings)
     places: Sequence[unknown_input.Place] = ()
-    if word in ('unknown_effect', 'partly_explained'):
-        progress(0.95, 'where something unknown may have entered')
-        lies, places = where.of_the_unknown(problem, none.state, left.loudest, left.fast)
-    if word != 'unknown_effect':
-        lies = where.of_effects(problem, ranked, none.state, best.state)
+    if decision.word in ('unknown_effect', 'partly_explained'):
+        progress(0.95, 'where an unknown input may act')
+        located, places = localisation.of_the_unknown(problem, none.state, lack)
+    if decision.word != 'unknown_effect':
+        located = localisation.of_effects(problem, decision.answers, none.state, best.state)
     result = {
-        'verdict': word,
-        'where': lies,
-        'which': entries,
-        'confusable': verdict.confusable(candidates) if best.effects else [],
+        'verdict': decision.word,
+        'where': located,
+        'which': _which(decision, settings.verdict),
+        'confusable': decision.confusable,
         'how_far': reach,
-        'residual_tests': tests(problem, best.state, left, motions),
+        'residual_tests': residual_tests(problem, best.state, lack),
         'may_enter_at': [vars(place) for place in places if place.evidence > 0.0],
         'seconds': time.monotonic() - began,
-        'notes': list(notes),
+        'notes': list(machine.notes),
     }
     progress(1.0, 'done')
-    return Diagnosis(result, model, none, best, candidates, notes)
+    return Diagnosis(result, problem.machine, none, best, hypotheses, lack, settings)
 
 
-def _entries(ranked: Sequence[verdict.Ranked], unknown: float) -> list[dict[str, Any]]:
-    """Return the likeliest hypotheses for the JSON, 'none' and 'unknown' among them."""
+def _which(decision: Decision, settings: VerdictSettings) -> list[dict[str, Any]]:
+    """Return the likeliest answers for the JSON, 'none' and 'unknown' among them."""
     entries: list[dict[str, Any]] = []
-    likeliest = set(ranked[0].candidate.effects)
-    for item in ranked[:_ENTRIES]:
-        # a pair's members alone, and nothing, are told however improbable they are
-        if item.probability >= _LEAST or set(item.candidate.effects) <= likeliest:
-            entries.append({'effects': list(item.candidate.effects) or ['none'],
-                            'probability': item.probability,
-                            'parameters': _parameters(item.candidate)})
+    likeliest = set(decision.answers[0].hypothesis.effects)
+    for answer in decision.answers[:settings.entries]:
+        effects = answer.hypothesis.effects
+        # the members of the likeliest pair, and 'none', are listed however improbable they are
+        if answer.probability >= settings.least_probability or set(effects) <= likeliest:
+            entries.append({'effects': list(effects) or ['none'],
+                            'probability': answer.probability,
+                            'parameters': _values(answer.hypothesis)})
     if ['none'] not in [entry['effects'] for entry in entries]:
-        share = next(r.probability for r in ranked if not r.candidate.effects)
+        share = next(a.probability for a in decision.answers if not a.hypothesis.effects)
         entries.append({'effects': ['none'], 'probability': share, 'parameters': {}})
-    entries.append({'effects': ['unknown'], 'probability': unknown, 'parameters': {}})
+    entries.append({'effects': ['unknown'], 'probability': decision.unknown, 'parameters': {}})
     total = sum(entry['probability'] for entry in entries)
     for entry in entries:
         entry['probability'] /= total
     return sorted(entries, key=lambda entry: -entry['probability'])
 
 
-def _word(top: list[str], unknown: float) -> str:
-    if top == ['none']:
-        return 'no_gap'
-    if top == ['unknown']:
-        return 'unknown_effect'
-    return 'explained' if unknown < 0.3 else 'partly_explained'
-
-
-def _parameters(candidate: Candidate) -> dict[str, Any]:
-    """Return the values of a candidate's effects with intervals of 95 percent."""
-    state = candidate.state
-    pull = pull_of(state.parameters)
-    curvature = state.hessian + np.diag(pull)
-    scale = np.sqrt(np.maximum(np.diag(curvature), 1e-30))
-    covariance = np.linalg.pinv(curvature / np.outer(scale, scale)) / np.outer(scale, scale)
-    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+def _values(hypothesis: Hypothesis) -> dict[str, Any]:
+    """Return the values of a hypothesis' effects with 95 percent intervals (Laplace)."""
+    state = hypothesis.state
+    hessian = state.hessian + np.diag(prior_precision(state.parameters))
+    scale = np.sqrt(np.maximum(np.diag(hessian), 1e-30))
+    covariance = np.linalg.pinv(hessian / np.outer(scale, scale)) / np.outer(scale, scale)
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     names = [p.name for p in state.parameters]
     found = {}
-    for parameter, value in parameters_of(candidate):
-        wide = 1.96 * float(spread[names.index(parameter.name)])
+    for parameter, value in hypothesis.values:
+        half_width = 1.96 * float(sigma[names.index(parameter.name)])
         found[parameter.name] = {
-            'value': value, 'ci95': [max(value - wide, parameter.low),
-                                     min(value + wide, parameter.high)],
+            'value': value, 'ci95': [max(value - half_width, parameter.low),
+                                     min(value + half_width, parameter.high)],
             'unit': parameter.unit}
     return found

@@ -12,11 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Whether each effect of a verdict is needed: the fits without it are taken to their end.
+Backward elimination: whether each effect of a hypothesis is needed.
 
-What keeps a fit of a hundred offsets from its end looks like a weak effect: in a trial, an antenna
-without any was named one whose fit had merely come further, and a single effect was given a
-partner of size nought.
+A fit of a hundred nuisances may stop before it has converged, and that looks like a weak effect.
+Where an effect gains little, the fit without it is therefore run until it has converged.
 """
 
 from __future__ import annotations
@@ -26,56 +25,58 @@ from dataclasses import replace
 from typing import Protocol
 
 from antenna_drive.diagnosis import verdict
-from antenna_drive.diagnosis.search import Candidate
-
-# An effect that gains less than this share of the cost is doubted.
-DOUBTFUL = 0.25
+from antenna_drive.diagnosis.hypothesis import Hypothesis
+from antenna_drive.diagnosis.settings import Settings
 
 
 class Fits(Protocol):
-    """What takes fits to their end, see `Search`."""
+    """What runs fits until they have converged, see `search.Search`."""
 
-    def polished(self, candidate: Candidate) -> Candidate:
+    def converged(self, hypothesis: Hypothesis) -> Hypothesis:
         """Go on with a fit."""
 
-    def without(self, candidate: Candidate, effect: str) -> Candidate:
-        """Return a candidate without one of its effects, fitted to its end."""
+    def without(self, hypothesis: Hypothesis, effect: str) -> Hypothesis:
+        """Return a hypothesis without one of its effects, fitted until it has converged."""
 
 
-def doubted(fits: Fits, candidates: Sequence[Candidate]) -> tuple[list[Candidate], Candidate]:
+def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings: Settings,
+                         ) -> tuple[list[Hypothesis], Hypothesis]:
     """
-    Doubt each effect of the best candidate, until the best has none that is in doubt.
+    Test each doubtful effect of the best hypothesis, until the best has none.
 
     Parameters
     ----------
     fits
-        the search that the candidates come from
-    candidates
-        fitted ones, the offsets alone first
+        the search that the hypotheses come from
+    hypotheses
+        fitted ones, the nuisances alone first
+    settings
+        thresholds
 
     Returns
     -------
-    the candidates in their order, and the best of them, fitted to its end
+    the hypotheses in their order, and the best of them with a fit that has converged
 
     """
-    found = {frozenset(c.effects): c for c in candidates}
+    found = {frozenset(h.effects): h for h in hypotheses}
     tried: set[frozenset[str]] = set()
-    best = verdict.best(candidates)
-    polished = fits.polished(best)
+    best = verdict.best(hypotheses, settings)
+    converged = fits.converged(best)
+    ratio = 1.0 + settings.search.doubtful
     while True:
         rests = {effect: frozenset(best.effects) - {effect} for effect in best.effects}
-        # what is not among the candidates any more was far behind
-        doubts = {effect: rest for effect, rest in rests.items() if rest in found
-                  and rest not in tried and found[rest].cost < (1.0 + DOUBTFUL) * best.cost}
-        if not doubts:
-            return list(found.values()), polished
-        for effect, rest in doubts.items():
+        # a hypothesis that is no longer among those found was far behind
+        doubtful = {effect: rest for effect, rest in rests.items() if rest in found
+                    and rest not in tried and found[rest].cost < ratio * best.cost}
+        if not doubtful:
+            return list(found.values()), converged
+        for effect, rest in doubtful.items():
             tried.add(rest)
-            simpler = fits.without(polished, effect)
-            # all others are as far from their ends as the best was
-            behind = simpler.cost + best.cost - polished.cost
+            simpler = fits.without(converged, effect)
+            # all other fits are taken to be as far from convergence as that of the best was
+            behind = simpler.cost + best.cost - converged.cost
             if behind < found[rest].cost:
                 found[rest] = replace(simpler, state=replace(simpler.state, cost=behind))
-        leading = verdict.best(list(found.values()))
+        leading = verdict.best(list(found.values()), settings)
         if leading is not best:
-            best, polished = leading, fits.polished(leading)
+            best, converged = leading, fits.converged(leading)

@@ -11,93 +11,99 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""What a candidate leaves: how far that is from noise, in which signal, and what it depends on."""
+"""What a hypothesis leaves: how far that is from noise, in which signal, what it depends on."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
-from antenna_drive.diagnosis import residual_statistics as residuals
-from antenna_drive.diagnosis.least_squares import Problem, State
-from antenna_drive.diagnosis.machine import FloatArray, Motion
-from antenna_drive.diagnosis.search import Candidate
-from antenna_drive.diagnosis.verdict import Remains
+from antenna_drive.diagnosis import residual_statistics as statistics
+from antenna_drive.diagnosis.hypothesis import Hypothesis
+from antenna_drive.diagnosis.least_squares import FitState, LeastSquares
+from antenna_drive.diagnosis.machine import FloatArray
+from antenna_drive.diagnosis.verdict import LackOfFit
 import numpy as np
 
 
-def remains(problem: Problem, best: Candidate, explained: float | None) -> Remains:
+def lack_of_fit(problem: LeastSquares, best: Hypothesis, explained: float | None) -> LackOfFit:
     """
-    Return what the best candidate leaves, after a fit that has converged.
+    Return what the best hypothesis leaves, after a fit that has converged.
 
     Parameters
     ----------
     problem
         the whole tests
     best
-        candidate
+        hypothesis
     explained
-        upper end of the interval of what it explains of withheld tests, None without effects
+        upper end of the interval of what it explains of withheld data, None without effects
 
     """
-    raw = problem.residuals([{}])[0]
+    raw = problem.residuals({})
     loudest, fast, fast_left = _fast(problem, raw, best)
     point = best.state.point()
-    strangeness = max((form.strangeness(point) for form in best.forms), default=0.0)
-    return Remains(_excess(problem, best.state), _left(problem, raw, best), fast, fast_left,
-                   strangeness, explained, loudest)
+    implausibility = max((form.implausibility(point) for form in best.forms), default=0.0)
+    return LackOfFit(_slow_excess(problem, best.state), _left(problem, raw, best), fast,
+                     fast_left, implausibility, explained, loudest)
 
 
-def _excess(problem: Problem, state: State) -> float:
+def _slow_excess(problem: LeastSquares, state: FitState) -> float:
     """
-    Return how much of the residual is no noise: the mean over tests and signals.
+    Return the slow excess of the residual, averaged over tests and signals.
 
-    Beyond what white noise of the same fast part would give, so that a sensor noisier than its
-    sheet says raises no alarm; outliers are clipped.
+    It is relative to white noise with the same fast part, so that a sensor that is noisier than
+    its sheet says raises no alarm.
     """
+    settings = problem.settings.lack_of_fit
     found = []
     for k, experiment in enumerate(problem.experiments):
-        z = np.clip(problem.shaped(state, k), -6.0, 6.0)
-        # at rest the encoder's residual is a fraction of one step, and no noise at all
-        found += [residuals.structure(z[:, c]) for c, channel in enumerate(experiment.channels)
-                  if channel not in experiment.coarse and np.isfinite(z[:, c]).sum() > 50]
-    return float(np.mean(np.maximum(found, -0.5))) if found else 0.0
+        z = np.clip(problem.residuals_of(state, k), -settings.clip, settings.clip)
+        # at rest the residual of a quantised reading is a fraction of a digit, and not noise
+        found += [statistics.slow_excess(z[:, c], settings)
+                  for c, channel in enumerate(experiment.channels)
+                  if channel not in experiment.quantised
+                  and np.isfinite(z[:, c]).sum() > settings.least_samples]
+    return float(np.mean(np.maximum(found, settings.least_excess))) if found else 0.0
 
 
-def _left(problem: Problem, raw: FloatArray, best: Candidate) -> float:
-    """Return the share of the raw gap above the noise that the best candidate leaves."""
+def _left(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> float:
+    """Return the share of the raw gap above the noise that the best hypothesis leaves."""
+    settings = problem.settings.lack_of_fit
     noise = 0.0
     energy = np.zeros(2)
     for k, experiment in enumerate(problem.experiments):
-        z = problem.shaped(best.state, k)
+        z = problem.residuals_of(best.state, k)
         first = raw[problem.rows(k)].reshape(experiment.measured.shape)
-        for c in range(len(experiment.channels)):
-            if experiment.channels[c] in experiment.coarse or not np.isfinite(z[:, c]).any():
+        for c, channel in enumerate(experiment.channels):
+            if channel in experiment.quantised or not np.isfinite(z[:, c]).any():
                 continue
             white = 0.5 * float(np.nanmean(np.diff(z[:, c]) ** 2))
-            energy += [min(float(np.nanmean(z[:, c] ** 2)), 1e6) - white,
-                       min(float(np.mean(first[:, c] ** 2)), 1e6) - white]
+            greatest = settings.greatest_energy
+            energy += [min(float(np.nanmean(z[:, c] ** 2)), greatest) - white,
+                       min(float(np.mean(first[:, c] ** 2)), greatest) - white]
             noise += white
-    return float(np.clip(energy[0] / max(energy[1], 0.05 * noise), 0.0, 1.0))
+    return float(np.clip(energy[0] / max(energy[1], settings.least_gap * noise), 0.0, 1.0))
 
 
-def _fast(problem: Problem, raw: FloatArray, best: Candidate) -> tuple[str, float, float]:
+def _fast(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> tuple[str, float, float]:
     """
-    Return the signal whose fast part is the loudest, how loud, and what share was there before.
+    Return the signal with the loudest fast part, how loud it is, and the share that was there.
 
-    In the variance of its sensor's noise, the mean over the tests.
+    Loudness is a variance over that of the sensor's noise, averaged over the tests.
     """
+    settings = problem.settings.lack_of_fit
     signal, loudest, share = '', 0.0, 1.0
     for c, channel in enumerate(problem.experiments[0].channels):
         pairs = []
         for k, experiment in enumerate(problem.experiments):
-            z = problem.shaped(best.state, k)[:, c]
-            if np.isfinite(z).sum() < 50:
+            z = problem.residuals_of(best.state, k)[:, c]
+            if np.isfinite(z).sum() < settings.least_samples:
                 continue
             first = raw[problem.rows(k)].reshape(experiment.measured.shape)[:, c]
-            # a coarse reading at rest is a fraction of a step off, slow or fast, and never more
-            loud = residuals.power if channel in experiment.coarse else residuals.fast
-            pairs.append([loud(z), loud(first)])
+            # a quantised reading at rest is off by a fraction of a digit, slow or fast
+            loud = (statistics.power if channel in experiment.quantised
+                    else statistics.fast_power)
+            pairs.append([loud(z, settings), loud(first, settings)])
         if pairs:
             now, before = np.mean(pairs, axis=0)
             if now > loudest:
@@ -106,18 +112,23 @@ def _fast(problem: Problem, raw: FloatArray, best: Candidate) -> tuple[str, floa
     return signal, loudest, share
 
 
-def tests(problem: Problem, state: State, left: Remains,
-          motions: Sequence[Motion]) -> dict[str, Any]:
-    """Return what is left in every signal and what it depends on, for the JSON."""
+def residual_tests(problem: LeastSquares, state: FitState, lack: LackOfFit) -> dict[str, Any]:
+    """Return the residual of every signal and what it depends on, for the JSON."""
+    settings = problem.settings.lack_of_fit
     signals: dict[str, Any] = {}
-    zs = [problem.shaped(state, k) for k in range(len(problem.experiments))]
-    for c, channel in enumerate(problem.experiments[0].channels):
+    count = len(problem.experiments)
+    zs = [problem.residuals_of(state, k) for k in range(count)]
+    channels = problem.experiments[0].channels
+    for c, channel in enumerate(channels):
         z = np.concatenate([part[:, c] for part in zs])
         if np.isfinite(z).any():
             signals[channel] = {
                 'rms': float(np.sqrt(np.nanmean(z ** 2))),
-                'slow_excess': float(np.mean([residuals.structure(part[:, c]) for part in zs])),
-                'greatest_correlation': max(residuals.correlation(part[:, c]) for part in zs),
+                'slow_excess': float(np.mean([
+                    statistics.slow_excess(part[:, c], settings) for part in zs])),
+                'greatest_correlation': max(
+                    statistics.autocorrelation(part[:, c], settings) for part in zs),
             }
-    return {'excess_over_noise': left.excess, 'share_left': left.left, 'signals': signals,
-            'depends_on': residuals.dependences(problem.experiments, motions, zs)}
+    covariates = [problem.machine.covariates(k) for k in range(count)]
+    return {'excess_over_noise': lack.slow_excess, 'share_left': lack.left, 'signals': signals,
+            'depends_on': statistics.dependences(channels, covariates, zs, settings)}

@@ -15,7 +15,7 @@
 Where a gap lies: the parts of the machine, the signals it shows in, and the regimes of motion.
 
 With a verdict that names effects, the parts are theirs, and a signal's share is what the effects
-explain of it. Without one, the parts are those by which something unknown may have entered.
+explain of it. Without one, the parts are those where an unknown input may act.
 """
 
 from __future__ import annotations
@@ -23,90 +23,90 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from antenna_drive.diagnosis import residual_statistics as residuals, unknown_input
-from antenna_drive.diagnosis.least_squares import Problem, State
+from antenna_drive.diagnosis import unknown_input
+from antenna_drive.diagnosis.least_squares import FitState, LeastSquares
 from antenna_drive.diagnosis.machine import FloatArray
-from antenna_drive.diagnosis.verdict import NOISIER, Ranked
+from antenna_drive.diagnosis.verdict import Answer, LackOfFit
 import numpy as np
 
-# How many entries are given, and what is left out below.
-_ENTRIES = 12
-_LEAST = 0.01
-# Evidence below this is none at all.
-_EVIDENCE = 20.0
-
-Entry = dict[str, Any]
+Located = dict[str, Any]
 
 
-def of_effects(problem: Problem, ranked: Sequence[Ranked], none: State,
-               best: State) -> list[Entry]:
+def of_effects(problem: LeastSquares, answers: Sequence[Answer], none: FitState,
+               best: FitState) -> list[Located]:
     """
     Return where the effects of a verdict lie, the largest share first.
 
     Parameters
     ----------
     problem
-        the model against its experiments
-    ranked
-        the candidates with their probabilities
+        the machine in its experiments
+    answers
+        the hypotheses with their probabilities
     none, best
         where the fits ended without and with the likeliest effects
 
     """
     parts: dict[str, float] = {}
-    for item in ranked:
-        for effect in item.candidate.effects:
-            part = problem.model.effects[effect].component
-            parts[part] = parts.get(part, 0.0) + item.probability / len(item.candidate.effects)
-    return _entries(problem, parts, lambda k: problem.shaped(none, k) ** 2
-                    - problem.shaped(best, k) ** 2)
+    for answer in answers:
+        for effect in answer.hypothesis.effects:
+            part = problem.machine.effects[effect].component
+            share = answer.probability / len(answer.hypothesis.effects)
+            parts[part] = parts.get(part, 0.0) + share
+    return _located(problem, parts, lambda k: problem.residuals_of(none, k) ** 2
+                    - problem.residuals_of(best, k) ** 2)
 
 
-def of_the_unknown(problem: Problem, none: State, loudest: str,
-                   loudness: float) -> tuple[list[Entry], list[unknown_input.Place]]:
+def of_the_unknown(problem: LeastSquares, none: FitState,
+                   lack: LackOfFit) -> tuple[list[Located], list[unknown_input.Place]]:
     """
-    Return where something lies that no effect names, and where it may have entered.
+    Return where something lies that no effect names, and where it may act.
 
     Parameters
     ----------
     problem
-        the model against its experiments
+        the machine in its experiments
     none
         where the fit ended without any effect
-    loudest, loudness
-        the signal whose fast part is the loudest, and its variance in that of its noise: what is
-        too fast for a pulse shows in one reading, and lies there
+    lack
+        what the best hypothesis leaves: what is too fast for a pulse shows in one reading, and
+        is put there
 
     """
-    found = unknown_input.places(Problem(problem.model.brief()), none.point())
-    if found[0].evidence > _EVIDENCE:
-        parts = unknown_input.components(found)
-    elif loudness > NOISIER:
-        parts = {loudest: 1.0}
+    settings = problem.settings
+    truncated = LeastSquares(problem.machine.truncated(), settings=settings)
+    found = unknown_input.places(truncated, none.point())
+    if found[0].evidence > settings.localisation.least_evidence:
+        parts = unknown_input.components(found, settings.localisation.caution)
+    elif lack.fast > settings.verdict.fast:
+        parts = {lack.loudest: 1.0}
     else:
         return [], found
-    return _entries(problem, parts, lambda k: problem.shaped(none, k) ** 2 - 1.0), found
+    return _located(problem, parts, lambda k: problem.residuals_of(none, k) ** 2 - 1.0), found
 
 
-def _entries(problem: Problem, parts: Mapping[str, float],
-             energy: Callable[[int], FloatArray]) -> list[Entry]:
+def _located(problem: LeastSquares, parts: Mapping[str, float],
+             energy: Callable[[int], FloatArray]) -> list[Located]:
     """Return the shares of parts, signals and regimes, given the energy of each sample."""
     total = sum(parts.values())
     if not total:
         return []
+    settings = problem.settings.localisation
     shares: dict[tuple[str, str], float] = {}
     for k, experiment in enumerate(problem.experiments):
-        regime = residuals.regimes(experiment, problem.model.motion(k))
+        regimes = problem.machine.regimes(k)
         sample = np.nan_to_num(energy(k))
         for c, channel in enumerate(experiment.channels):
-            for r, name in enumerate(residuals.REGIMES):
+            for r, name in enumerate(regimes.names):
                 key = (channel, name)
-                shares[key] = shares.get(key, 0.0) + float(sample[regime == r, c].sum())
+                shares[key] = (shares.get(key, 0.0)
+                               + float(sample[regimes.labels == r, c].sum()))
     positive = {key: max(value, 0.0) for key, value in shares.items()}
     whole = sum(positive.values()) or 1.0
-    found: list[Entry] = [
+    found: list[Located] = [
         {'component': part, 'signal': signal, 'regime': regime,
          'share': weight / total * share / whole}
         for part, weight in parts.items() for (signal, regime), share in positive.items()]
-    found.sort(key=lambda entry: -float(entry['share']))
-    return [entry for entry in found[:_ENTRIES] if float(entry['share']) > _LEAST]
+    found.sort(key=lambda item: -float(item['share']))
+    return [item for item in found[:settings.entries]
+            if float(item['share']) > settings.least_share]

@@ -12,18 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-What a diagnosis needs of a machine: parameters, a simulation, and effects it may lack.
+The seam between the diagnosis and the machine: what a diagnosis asks of a machine.
 
-The fitting, the ranking and the verdict know nothing of antennas. They ask a `Model` what its
-machine would have shown, had its parameters been other ones.
+A machine of your own needs two things: a simulation (`Machine.predict`) and the numbers that may
+differ from your model (`nuisances` and `effects`). Everything else has a default that you may
+override, for speed or because you know your machine better.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 import math
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,26 +32,26 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 Point = Mapping[str, float]
 # An input over time: from times [s] to values, shape (n,) each.
-Input = Callable[[FloatArray], FloatArray]
+Course = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True)
 class Parameter:
     """
-    One number that may be other than the configuration says.
+    A number in which the machine may differ from its model; zero is the model as configured.
 
     Attributes
     ----------
-    name : unique in its model
+    name : unique in its machine
     unit : of the value
-    low, high : hard bounds; between them lies the neutral value, zero
-    step : change for difference quotients, in the unit of the value
-    spread : standard deviation expected beforehand, 0 if nothing is
-    experiment : the one experiment that it acts on, None for all
-    reading : True if it acts on readings alone, so that nothing need be simulated anew
+    low, high : hard bounds, with zero between them
+    step : of the difference quotient, in the unit of the value
+    prior_sigma : standard deviation of a Gaussian prior about zero; 0 for no prior
+    experiment : index of the one experiment that it acts on; None for all
+    on_readings : True if it changes the readings alone, so that no new simulation is needed
     start : where a fit begins
-    shape : True for a number that means nothing while its effect is absent
-    tolerance : by how much the configuration may be off in this very number without being wrong
+    is_shape : True for a shape parameter, which has no meaning while its effect is absent
+    tolerance : size up to which the model's number may be off without being wrong
 
     """
 
@@ -59,40 +60,52 @@ class Parameter:
     low: float
     high: float
     step: float
-    spread: float = 0.0
+    prior_sigma: float = 0.0
     experiment: int | None = None
-    reading: bool = False
+    on_readings: bool = False
     start: float = 0.0
-    shape: bool = False
+    is_shape: bool = False
     tolerance: float = 0.0
 
 
 @dataclass(frozen=True)
 class Form:
     """
-    One mathematical form of an effect; its first parameters vanish with the effect.
+    One mathematical form of an effect.
 
     Attributes
     ----------
     name : for people
-    parameters : of the form
-    sought : True if the form itself was looked for among many
+    parameters : those that are no shape parameters are zero where the effect is absent
+    scanned : True if the form was chosen by a scan of many, such as the orders of a ripple
+    is_course : True for a course over time that is free at every moment, such as a gust
 
     """
 
     name: str
     parameters: tuple[Parameter, ...]
-    sought: bool = field(default=False, kw_only=True)
+    scanned: bool = field(default=False, kw_only=True)
+    is_course: bool = field(default=False, kw_only=True)
 
-    def strangeness(self, point: Point) -> float:
-        """Return how far these values are from what the form stands for; above 1 is strange."""
+    @property
+    def sizes(self) -> list[Parameter]:
+        """Return the parameters that vanish with the effect."""
+        return [p for p in self.parameters if not p.is_shape]
+
+    @property
+    def start(self) -> dict[str, float]:
+        """Return the point at which a fit of this form begins."""
+        return {p.name: p.start for p in self.parameters}
+
+    def implausibility(self, point: Point) -> float:
+        """Return how little these values look like the effect; above 1 is implausible."""
         return 0.0
 
 
 @dataclass(frozen=True)
 class Effect:
     """
-    Something that a model may lack.
+    Something that the model may lack.
 
     Attributes
     ----------
@@ -100,8 +113,8 @@ class Effect:
     component : the part of the machine that it sits in
     cause : its physical cause, one sentence
     look : what it looks like in the signals, one sentence
-    forms : alternatives, of which the best counts
-    parts : ids of the effects that do the same together, each in its own place and of its own size
+    forms : alternatives; the best one counts
+    parts : ids of the effects that act together in it, each in its own place
 
     """
 
@@ -114,14 +127,14 @@ class Effect:
 
 
 @dataclass(frozen=True)
-class Entry:
+class DisturbanceInput:
     """
-    A place where something unknown may enter the machine.
+    A place where an unknown input may act on the machine.
 
     Attributes
     ----------
-    name : unique in its model, for people
-    component : the part of the machine that it enters by
+    name : unique in its machine, for people
+    component : the part of the machine that it acts on
 
     """
 
@@ -141,8 +154,8 @@ class Experiment:
     channels : names of the c signals
     units : of the signals
     measured : shape (n, c); NaN where there is no sample
-    noise : standard deviation expected of a perfect model's residuals, shape (n, c)
-    coarse : names of signals whose residual at rest is a fraction of one step, and no noise
+    noise : standard deviation of the residuals of a perfect model, shape (n, c)
+    quantised : names of signals whose residual at rest is a fraction of a digit, not noise
 
     """
 
@@ -152,78 +165,222 @@ class Experiment:
     units: tuple[str, ...]
     measured: FloatArray
     noise: FloatArray
-    coarse: tuple[str, ...] = ()
+    quantised: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
-class Motion:
-    """How the machine moves in an experiment: arrays of shape (n,), from any source."""
+class Regimes:
+    """The regime of motion of each sample: `labels`, shape (n,), are indices into `names`."""
 
-    rate: FloatArray
-    load: FloatArray
-    angle: FloatArray
-    limit: float
+    names: tuple[str, ...]
+    labels: NDArray[np.int64]
 
 
-class Model(Protocol):
-    """A machine that can be simulated; see `Parameter`, `Effect` and `Experiment`."""
+@dataclass(frozen=True)
+class TimeScales:
+    """
+    How fast the machine is, which the search and the localisation need to know.
+
+    Attributes
+    ----------
+    start_s : time within which the effect of the initial conditions shows [s]
+    scan_s : length of the part of a test that a scan of parameter values looks at [s]
+    pulse_s : rise time of the pulses of an unknown input [s]
+    response_s : time after which the response to such a pulse has ended [s]
+    block_s : time beyond which residuals are independent, for the bootstrap [s]
+
+    """
+
+    start_s: float
+    scan_s: float
+    pulse_s: float
+    response_s: float
+    block_s: float
+
+    @classmethod
+    def of_duration(cls, duration_s: float) -> TimeScales:
+        """Return usual scales for tests of a duration [s]."""
+        return cls(start_s=0.05 * duration_s, scan_s=0.27 * duration_s,
+                   pulse_s=0.005 * duration_s, response_s=0.05 * duration_s,
+                   block_s=0.03 * duration_s)
+
+
+class Machine(ABC):
+    """
+    A machine that can be simulated, and the experiments that were made with it.
+
+    Parameters
+    ----------
+    experiments
+        what was measured
+    nuisances
+        numbers that are known only within a tolerance; they are fitted beside any effect
+    effects
+        the catalogue of what the model may lack
+
+    Attributes
+    ----------
+    experiments, nuisances, effects : as given; the effects by id
+    disturbance_inputs : where an unknown input may act; readings need not be listed
+    notes : what the machine inferred or missed, for people
+
+    """
+
+    experiments: Sequence[Experiment]
+    nuisances: Sequence[Parameter]
+    effects: Mapping[str, Effect]
+    disturbance_inputs: Sequence[DisturbanceInput] = ()
+    notes: Sequence[str] = ()
+
+    def __init__(self, experiments: Iterable[Experiment], nuisances: Iterable[Parameter] = (),
+                 effects: Iterable[Effect] = ()) -> None:
+        """Keep what was measured and what may differ."""
+        self.experiments = tuple(experiments)
+        self.nuisances = tuple(nuisances)
+        self.effects = {effect.id: effect for effect in effects}
+
+    # -- what a machine must give --------------------------------------------------------------
+
+    @abstractmethod
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """
+        Return the readings of one experiment, had the machine these parameter values.
+
+        Parameters
+        ----------
+        point
+            parameter values by name; a parameter that is not named is zero, a shape parameter
+            that is not named has no effect
+        experiment
+            its index
+
+        Returns
+        -------
+        array of shape (n, c), as `Experiment.measured`; NaN or infinite where the run diverged
+
+        """
+
+    # -- what it may override for speed --------------------------------------------------------
+
+    def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
+                 until: float = math.inf) -> list[list[FloatArray | None]]:
+        """
+        Return the readings of several variants.
+
+        Parameters
+        ----------
+        points
+            parameter values by name, one mapping for each variant
+        only
+            for each variant the index of the one experiment that is wanted, None for all
+        until
+            end of the simulation after an experiment's first sample [s]; later readings are NaN
+
+        Returns
+        -------
+        for each variant and experiment an array of shape (n, c), or None where not wanted
+
+        """
+        results: list[list[FloatArray | None]] = []
+        for point, one in zip(points, only or [None] * len(points), strict=True):
+            row: list[FloatArray | None] = [None] * len(self.experiments)
+            for k in range(len(row)) if one is None else (one,):
+                readings = self.predict(point, k)
+                if math.isfinite(until):
+                    time = self.experiments[k].time
+                    readings = np.where((time - time[0] > until)[:, np.newaxis], np.nan, readings)
+                row[k] = readings
+            results.append(row)
+        return results
+
+    def truncated(self) -> Machine:
+        """Return the machine with as much of each test as a search needs."""
+        return self
+
+    def low_fidelity(self) -> Machine:
+        """Return a faster machine with nearly the same readings, for derivatives."""
+        return self
+
+    # -- what it may know better ---------------------------------------------------------------
 
     @property
-    def experiments(self) -> Sequence[Experiment]:
-        """Return the tests."""
+    def time_scales(self) -> TimeScales:
+        """Return how fast the machine is; by default in proportion to the longest test."""
+        return TimeScales.of_duration(max(
+            float(e.time[-1] - e.time[0]) for e in self.experiments))
 
-    @property
-    def nuisances(self) -> Sequence[Parameter]:
-        """Return what is known only within a tolerance and must be fitted beside any effect."""
-
-    @property
-    def effects(self) -> Mapping[str, Effect]:
-        """Return the catalogue, by id."""
-
-    def brief(self) -> Model:
-        """Return the model with as much of its tests as a search needs, or the model itself."""
-
-    def rough(self) -> Model:
+    def with_noise_at(self, point: Point) -> Machine:
         """
-        Return the model as it is simulated for derivatives, or the model itself.
+        Return the machine with the noise that its sensors have where it moves as at `point`.
 
-        It takes the same points and gives nearly the same readings for less.
+        A jitter of the time stamps makes a fast reading noisier than a slow one.
         """
+        return self
 
-    def heard_at(self, point: Point) -> Model:
+    def initial_conditions(self, experiment: int) -> Sequence[Point]:
         """
-        Return the model with the noise that its sensors have at a point, or the model itself.
+        Return initial conditions that are tried out before a fit, for one experiment.
 
-        A time stamp that is off makes a fast reading noisier than a slow one.
+        Gradients do not lead from one side of a gap to the other.
         """
+        return ()
 
     def forms(self, effect: Effect, residuals: Sequence[FloatArray]) -> Sequence[Form]:
         """
-        Return the forms of an effect that are worth a trial.
+        Return the forms of an effect that are worth a fit.
 
         Parameters
         ----------
         effect
             of the catalogue
         residuals
-            of each experiment: measured less predicted without the effect, shape (n, c)
+            of each experiment, measured minus predicted without the effect, shape (n, c)
 
         """
+        return effect.forms
 
-    @property
-    def entries(self) -> Sequence[Entry]:
-        """Return where something unknown may enter, apart from the readings themselves."""
+    def typical_form(self, effect: Effect) -> Form:
+        """Return the form of an effect by which planned tests are judged."""
+        return effect.forms[0]
 
-    def pushed(self, point: Point, entry: Entry, course: Input) -> list[FloatArray]:
+    def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
+        """Return the form of an effect's part that corresponds to a form of the effect."""
+        return part.forms[effect.forms.index(form)]
+
+    def absorb(self, point: Point, removed: Point) -> dict[str, float]:
         """
-        Return what the sensors would have shown, had an input of any course entered.
+        Return the nuisances that take over what they can of an effect that is removed.
+
+        Parameters
+        ----------
+        point
+            the nuisances
+        removed
+            the values of the effect's parameters
+
+        """
+        return dict(point)
+
+    def regimes(self, experiment: int) -> Regimes:
+        """Return the regime of motion of each sample; by default there is one regime."""
+        return Regimes(('whole test',),
+                       np.zeros(self.experiments[experiment].time.size, np.int64))
+
+    def covariates(self, experiment: int) -> Mapping[str, FloatArray]:
+        """Return quantities that a residual may depend on, shape (n,) each; by default time."""
+        return {'time': self.experiments[experiment].time}
+
+    def simulate_disturbed(self, point: Point, place: DisturbanceInput,
+                           course: Course) -> list[FloatArray]:
+        """
+        Return the readings with an unknown input.
 
         Parameters
         ----------
         point
             parameter values by name
-        entry
-            where it enters
+        place
+            where it acts, one of `disturbance_inputs`
         course
             the input over time, in a unit that moves the machine a little
 
@@ -232,44 +389,5 @@ class Model(Protocol):
         for each experiment an array of shape (n, c)
 
         """
-
-    def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
-        """Return the form of an effect's part that is like a form of the effect."""
-
-    def motion(self, experiment: int) -> Motion:
-        """Return how the machine moved in an experiment: it says when a gap shows."""
-
-    def absorbed(self, point: Point, gone: Point) -> dict[str, float]:
-        """
-        Return the offsets that do as much as they can of what an effect did.
-
-        Parameters
-        ----------
-        point
-            the offsets
-        gone
-            values of the effect's parameters
-
-        """
-
-    def simulate(self, points: Sequence[Point],
-                 only: Sequence[int | None] | None = None,
-                 until: float = math.inf) -> list[list[FloatArray | None]]:
-        """
-        Return what the sensors would have shown.
-
-        Parameters
-        ----------
-        points
-            parameter values by name, one mapping for each variant; the rest is neutral
-        only
-            for each variant the one experiment that is wanted, None for all
-        until
-            end of the simulation after an experiment's first sample [s]; what would come later is
-            NaN
-
-        Returns
-        -------
-        for each variant and experiment an array of shape (n, c), or None where not wanted
-
-        """
+        raise NotImplementedError(f'{type(self).__name__} names disturbance_inputs '
+                                  'and lacks simulate_disturbed')

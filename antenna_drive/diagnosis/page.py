@@ -20,7 +20,7 @@ from html import escape
 import math
 from typing import Any
 
-from antenna_drive.diagnosis.diagnosis import Diagnosis, told
+from antenna_drive.diagnosis.diagnosis import Diagnosis, value_lines
 from antenna_drive.diagnosis.machine import Experiment, FloatArray
 from antenna_drive.machines.antenna.catalogue import catalogue
 import numpy as np
@@ -122,7 +122,7 @@ def _which(result: dict[str, Any]) -> str:
         names = ' + '.join(escape(name) for name in entry['effects'])
         causes = '; '.join(known[name].cause for name in entry['effects'] if name in known)
         values = ''.join(f'<div class="small">{escape(line)}</div>'
-                         for line in told(entry['parameters']))
+                         for line in value_lines(entry['parameters']))
         rows.append(f'<tr><td class="n">{100.0 * share:.1f} %</td>'
                     f'<td><span class="bar" style="width:{120.0 * share:.0f}px"></span></td>'
                     f'<td><b>{names}</b><div class="small">{escape(causes)}</div>'
@@ -177,7 +177,7 @@ def _places(result: dict[str, Any]) -> str:
 
 
 def _curves(diagnosis: Diagnosis) -> str:
-    model = diagnosis.model
+    model = diagnosis.machine
     points = [diagnosis.none.state.point(), diagnosis.best.state.point()]
     before, after = model.simulate(points)
     parts = ['<h2>Measured and simulated</h2><p class="key small">'

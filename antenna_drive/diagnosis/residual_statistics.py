@@ -11,103 +11,75 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""
-The regimes a drive runs through, and what a residual depends on: a look without any model.
-
-A residual that no effect explains is not nothing: that it grows with the rate, changes sign with
-the direction, or repeats with an angle says what kind of effect is missing.
-"""
+"""Statistics of a residual that need no model: its power, its slow part, what it depends on."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antenna_drive.diagnosis.machine import Experiment, FloatArray, Motion
+from antenna_drive.diagnosis.machine import FloatArray
+from antenna_drive.diagnosis.settings import DEFAULT, LackOfFitSettings
 import numpy as np
-from numpy.typing import NDArray
-
-REGIMES = ('reversal', 'stick', 'saturation', 'high load', 'constant rate')
-_AFTER_REVERSAL_S = 0.4
-_BINS = 12
-_LAGS = 20
-_BLOCK = 10
-# A sample that is read beside the edge it should be on is off by any amount.
-_OUTLIER = 10.0
 
 
-def regimes(experiment: Experiment, motion: Motion) -> NDArray[np.int64]:
-    """Return the regime of each sample, as its number in REGIMES, shape (n,)."""
-    time, rate = experiment.time, motion.rate
-    large = np.abs(rate).max() + 1e-30
-    moving = np.abs(rate) > 0.02 * large
-    direction = np.where(moving, np.sign(rate), 0.0)
-    last = np.arange(time.size)
-    last[direction == 0.0] = 0
-    held = direction[np.maximum.accumulate(last)]
-    turns = time[np.flatnonzero(np.diff(held) != 0.0) + 1]
-    since = np.full(time.size, np.inf)
-    if turns.size:
-        k = np.searchsorted(turns, time, side='right') - 1
-        since = np.where(k >= 0, time - turns[np.maximum(k, 0)], np.inf)
-    result = np.full(time.size, 4)
-    result[np.abs(motion.load) > np.quantile(np.abs(motion.load), 0.85)] = 3
-    result[np.abs(motion.load) > 0.97 * 2.0 * motion.limit] = 2
-    result[since < _AFTER_REVERSAL_S] = 0
-    result[~moving] = 1
-    return result
+def _clipped(z: FloatArray, settings: LackOfFitSettings) -> FloatArray:
+    # a sample that was read on the other side of an edge is off by any amount
+    bound = settings.clip_fast
+    return np.asarray(np.clip(z[np.isfinite(z)], -bound, bound))
 
 
-def _clipped(z: FloatArray) -> FloatArray:
-    return np.asarray(np.clip(z[np.isfinite(z)], -_OUTLIER, _OUTLIER))
-
-
-def fast(z: FloatArray) -> float:
+def fast_power(z: FloatArray, settings: LackOfFitSettings = DEFAULT.lack_of_fit) -> float:
     """Return the variance of the fast part of a residual at even times, shape (n,), clipped."""
-    z = _clipped(z)
+    z = _clipped(z, settings)
     return 0.5 * float(np.mean(np.diff(z) ** 2)) if z.size > 1 else 0.0
 
 
-def power(z: FloatArray) -> float:
+def power(z: FloatArray, settings: LackOfFitSettings = DEFAULT.lack_of_fit) -> float:
     """Return the mean square of a residual, shape (n,), clipped."""
-    z = _clipped(z)
+    z = _clipped(z, settings)
     return float(np.mean(z ** 2)) if z.size else 0.0
 
 
-def structure(z: FloatArray) -> float:
+def slow_excess(z: FloatArray, settings: LackOfFitSettings = DEFAULT.lack_of_fit) -> float:
     """
-    Return how much louder the slow part of a residual is than white noise would be, less one.
+    Return the power of the slow part of a residual over that of white noise, less one.
 
     Parameters
     ----------
     z
         residual at even times, shape (n,)
+    settings
+        thresholds
 
     """
-    z = _clipped(z)
-    count = z.size // _BLOCK
-    if count < 4 or not np.any(z):
+    z = _clipped(z, settings)
+    length = settings.block
+    count = z.size // length
+    if count < settings.least_blocks or not np.any(z):
         return 0.0
-    blocks = z[:count * _BLOCK].reshape(count, _BLOCK).mean(axis=1)
-    return float(_BLOCK * np.mean(blocks ** 2) / max(fast(z), 1e-12) - 1.0)
+    blocks = z[:count * length].reshape(count, length).mean(axis=1)
+    return float(length * np.mean(blocks ** 2) / max(fast_power(z, settings), 1e-12) - 1.0)
 
 
-def correlation(z: FloatArray) -> float:
+def autocorrelation(z: FloatArray, settings: LackOfFitSettings = DEFAULT.lack_of_fit) -> float:
     """Return the greatest autocorrelation of a residual at the first lags."""
     z = z[np.isfinite(z)] - np.nanmean(z)
     power = float(z @ z)
-    if z.size < 3 * _LAGS or power == 0.0:
+    if z.size < 3 * settings.lags or power == 0.0:
         return 0.0
-    return float(max(abs(z[lag:] @ z[:-lag]) / power for lag in range(1, _LAGS)))
+    return float(max(abs(z[lag:] @ z[:-lag]) / power for lag in range(1, settings.lags)))
 
 
-def dependence(z: FloatArray, by: FloatArray) -> float:
-    """Return the share of a residual's variance that depends on another quantity."""
+def dependence(z: FloatArray, by: FloatArray,
+               settings: LackOfFitSettings = DEFAULT.lack_of_fit) -> float:
+    """Return the share of a residual's variance that a covariate explains, chance subtracted."""
     good = np.isfinite(z) & np.isfinite(by)
     z, by = z[good], by[good]
-    if z.size < 10 * _BINS or np.ptp(by) == 0.0:
+    bins = settings.bins
+    if z.size < 10 * bins or np.ptp(by) == 0.0:
         return 0.0
-    edges = np.unique(np.quantile(by, np.linspace(0.0, 1.0, _BINS + 1)))
+    edges = np.unique(np.quantile(by, np.linspace(0.0, 1.0, bins + 1)))
     if edges.size < 3:
         return 0.0
     which = np.clip(np.searchsorted(edges, by, side='right') - 1, 0, edges.size - 2)
@@ -119,35 +91,29 @@ def dependence(z: FloatArray, by: FloatArray) -> float:
     return max(0.0, between / max(total, 1e-30) - chance)
 
 
-def dependences(experiments: Sequence[Experiment], motions: Sequence[Motion],
-                residuals: Sequence[FloatArray]) -> list[dict[str, Any]]:
+def dependences(channels: Sequence[str], covariates: Sequence[Mapping[str, FloatArray]],
+                residuals: Sequence[FloatArray],
+                settings: LackOfFitSettings = DEFAULT.lack_of_fit) -> list[dict[str, Any]]:
     """
     Return what the residuals depend on, the strongest first.
 
     Parameters
     ----------
-    experiments, motions
-        of each test
+    channels
+        names of the c signals
+    covariates
+        of each experiment by name, shape (n,) each
     residuals
-        in standard deviations, shape (n, c) for each test
+        in standard deviations, shape (n, c) for each experiment
+    settings
+        thresholds
 
     """
     found = []
-    channels = experiments[0].channels
-    looks = {
-        'rate': [m.rate for m in motions],
-        'direction': [np.sign(m.rate) * (np.abs(m.rate) > 0.02 * np.abs(m.rate).max())
-                      for m in motions],
-        'load': [m.load for m in motions],
-        'angle': [m.angle for m in motions],
-        'time': [e.time for e in experiments],
-        'acceleration': [np.gradient(m.rate, e.time)
-                         for m, e in zip(motions, experiments, strict=True)],
-    }
     for c, channel in enumerate(channels):
         z = np.concatenate([r[:, c] for r in residuals])
-        for name, values in looks.items():
-            share = dependence(z, np.concatenate(values))
-            if share > 0.02:
+        for name in covariates[0]:
+            share = dependence(z, np.concatenate([each[name] for each in covariates]), settings)
+            if share > settings.least_dependence:
                 found.append({'signal': channel, 'depends_on': name, 'share': share})
-    return sorted(found, key=lambda item: -float(str(item['share'])))[:8]
+    return sorted(found, key=lambda item: -float(str(item['share'])))[:settings.dependences]

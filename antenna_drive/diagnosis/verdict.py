@@ -12,13 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-From fitted candidates to probabilities: every parameter has its price, and 'unknown' is an answer.
+From fitted hypotheses to probabilities, with 'unknown' and 'none' among the answers.
 
-A candidate is as probable as exp(-(cost + price) / TEMPERATURE), the cost being half a
-chi-square. Probabilities of this kind are right only if the models are; TEMPERATURE is therefore
-not one, and it and the other constants here were chosen on trials with an independent machine
-(docs/diagnosis.md says on which). 'Unknown' is an absolute test: how much of the best
-candidate's residual is still no noise, and how much of the gap is left.
+A hypothesis is as probable as exp(-score / temperature). Its score is half a chi-square with
+penalties. Such probabilities are right only as far as the models are, so the temperature is not
+one: it and the other thresholds were set on trials with an independent machine
+(`settings.VerdictSettings`). 'Unknown' is an absolute test of the residual that the best
+hypothesis leaves.
 """
 
 from __future__ import annotations
@@ -27,178 +27,190 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
-from antenna_drive.diagnosis.search import Candidate
+from antenna_drive.diagnosis.hypothesis import Hypothesis
+from antenna_drive.diagnosis.settings import Settings, VerdictSettings
 import numpy as np
-
-TEMPERATURE = 8.0
-# No model has quite the machine's form: what an effect gains is no gap while it is less than such
-# a share of the noise.
-DETECTABLE = 0.02
-# No form of an effect is quite the machine's: a second effect must do more than mend the first,
-# and pays so much, and such a share of what the first explains.
-SECOND_PRICE = 60.0
-SECOND_SHARE = 0.015
-# The same effect in two places has one form: the second place mends no form, only the size.
-TWIN_SHARE = 0.005
-# The unknown: how far the slow residual is above noise, and the share of the gap that is left,
-# each as a logarithm against the value that tips the scales.
-EXCESS, LEFT = 1.0, 0.06
-EXCESS_WEIGHT, LEFT_WEIGHT = 1.6, 1.6
-# A sensor may be noisier than its sheet says, but not so many times in variance; what is louder
-# and was as loud before any effect was added is no noise. Each again as a logarithm.
-NOISIER, NOISIER_WEIGHT = 5.0, 4.0
-REMAINS, REMAINS_WEIGHT = 0.3, 3.0
-# An effect of values that are strange for it is another one that only looks like it.
-STRANGE_WEIGHT = 6.0
-# An effect that explains less than this where it was not fitted is none.
-EXPLAINED, EXPLAINED_WEIGHT = 0.4, 12.0
-# But what leaves nothing but noise in every test has not failed: without one of the tests its
-# values may not be determined.
-NOISE, NOISE_WEIGHT = 0.3, 4.0
-# No diagnosis is surer than trials have shown this one to be: so often something outside the
-# catalogue was at work where every test was passed, and only so often where one failed.
-LEAST, MOST = 0.05, 0.88
-# Candidates within so much of the best cannot be told from it.
-ALIKE = 14.0
-LARGEST_GROUP = 5
 
 
 @dataclass(frozen=True)
-class Ranked:
-    """A candidate with what it costs in all and its probability."""
+class LackOfFit:
+    """
+    What a hypothesis leaves unexplained.
 
-    candidate: Candidate
+    Attributes
+    ----------
+    slow_excess : power of the slow residual over that of white noise, less one; 0 for noise
+    left : share of the gap, 0 to 1
+    fast : variance of the fast part of the loudest signal, over that of its sensor's noise
+    fast_left : share of that signal's fast part that was there without any effect
+    implausibility : of the effects' values, see `Form.implausibility`
+    explained : upper end of the interval of what its effects explain of withheld data; None
+        without effects
+    loudest : signal whose fast part is the loudest
+
+    """
+
+    slow_excess: float
+    left: float
+    fast: float = 1.0
+    fast_left: float = 1.0
+    implausibility: float = 0.0
+    explained: float | None = None
+    loudest: str = ''
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A hypothesis with its score and probability."""
+
+    hypothesis: Hypothesis
     score: float
     probability: float
 
 
 @dataclass(frozen=True)
-class Prices:
+class Decision:
     """
-    What effects cost beside the prices of their numbers.
+    What a diagnosis concludes.
 
     Attributes
     ----------
-    gap : what the best single effect gains over the offsets alone
-    noise : the least cost that any candidate reaches
+    word : no_gap, explained, partly_explained or unknown_effect
+    answers : the hypotheses by score, with probabilities that leave room for `unknown`
+    unknown : probability of something outside the catalogue
+    confusable : groups of effects that the data cannot tell apart
 
     """
 
-    gap: float
-    noise: float
+    word: str
+    answers: Sequence[Answer]
+    unknown: float
+    confusable: Sequence[Sequence[str]]
 
-    @classmethod
-    def among(cls, candidates: Sequence[Candidate]) -> Prices:
-        """Return the prices among these candidates, the offsets alone being one of them."""
-        none = min(c.cost for c in candidates if not c.effects)
-        single = min((c.cost for c in candidates if len(c.effects) == 1), default=none)
-        return cls(max(none - single, 0.0), min(c.cost for c in candidates))
 
-    def score(self, candidate: Candidate) -> float:
-        """Return the cost of a candidate with all prices."""
-        count = len(candidate.effects)
-        total = candidate.priced
+def decide(hypotheses: Sequence[Hypothesis], lack: LackOfFit, settings: Settings) -> Decision:
+    """
+    Conclude from fits.
+
+    Parameters
+    ----------
+    hypotheses
+        fitted ones, the nuisances alone among them
+    lack
+        what the best of them leaves
+    settings
+        thresholds
+
+    """
+    unknown = unknown_probability(lack, settings.verdict)
+    answers = rank(hypotheses, unknown, settings)
+    named = best(hypotheses, settings).effects
+    top = max(answers, key=lambda answer: answer.probability)
+    if unknown > top.probability:
+        word = 'unknown_effect'
+    elif not top.hypothesis.effects:
+        word = 'no_gap'
+    else:
+        word = 'explained' if unknown < settings.verdict.partly else 'partly_explained'
+    return Decision(word, answers, unknown, confusable(hypotheses, settings) if named else [])
+
+
+class _Scores:
+    """The scores of hypotheses, which depend on what the others gain."""
+
+    def __init__(self, hypotheses: Sequence[Hypothesis], settings: Settings) -> None:
+        none = min(h.cost for h in hypotheses if not h.effects)
+        single = min((h.cost for h in hypotheses if len(h.effects) == 1), default=none)
+        self._first_gain = max(none - single, 0.0)
+        self._noise = min(h.cost for h in hypotheses)
+        self._settings = settings
+
+    def __call__(self, hypothesis: Hypothesis) -> float:
+        """Return the cost of a hypothesis with all penalties."""
+        settings = self._settings.verdict
+        count = len(hypothesis.effects)
+        total = hypothesis.penalised(self._settings.penalty)
         if count:
-            total += DETECTABLE * self.noise
+            # no model has quite its machine's form
+            total += settings.form_error * self._noise
         if count > 1:
-            twins = len({effect.partition('.')[2] for effect in candidate.effects}) < count
-            total += (count - 1) * (
-                SECOND_PRICE + (TWIN_SHARE if twins else SECOND_SHARE) * self.gap)
+            # a second effect must do more than mend the form of the first; the same effect in
+            # a second place has the same form and mends nothing
+            twins = len({effect.partition('.')[2] for effect in hypothesis.effects}) < count
+            share = settings.twin_share if twins else settings.second_share
+            total += (count - 1) * (settings.second_effect + share * self._first_gain)
         return total
 
 
-@dataclass(frozen=True)
-class Remains:
-    """
-    What the best candidate leaves.
+def unknown_probability(lack: LackOfFit, settings: VerdictSettings) -> float:
+    """Return the probability that something outside the catalogue is at work."""
+    def logit(value: float, tipping: float, slope: float) -> float:
+        return slope * math.log(max(value / tipping, 1e-3))
 
-    Attributes
-    ----------
-    excess : slow residual, over white noise, 0 if it is noise
-    left : share of the gap, 0 to 1
-    fast : variance of the fast part of the loudest signal, in that of its sensor's noise
-    fast_left : share of that signal's fast part that was there before any effect was added
-    strangeness : of the effects' values, see `Form.strangeness`
-    explained : upper end of the interval of what its effects explain of a test that they were not
-        fitted to; None without effects
-    loudest : signal whose fast part is the loudest
-
-    """
-
-    excess: float
-    left: float
-    fast: float = 1.0
-    fast_left: float = 1.0
-    strangeness: float = 0.0
-    explained: float | None = None
-    loudest: str = ''
-
-
-def unknown_probability(remains: Remains) -> float:
-    """Return how probable it is that something outside the catalogue is at work."""
-    slow = _logistic(EXCESS_WEIGHT * _log(remains.excess / EXCESS)
-                     + LEFT_WEIGHT * _log(remains.left / LEFT))
-    fast = (_logistic(NOISIER_WEIGHT * _log(remains.fast / NOISIER))
-            * _logistic(REMAINS_WEIGHT * _log(remains.fast_left / REMAINS)))
-    strange = _logistic(STRANGE_WEIGHT * _log(remains.strangeness))
-    fails = 0.0 if remains.explained is None else _logistic(
-        EXPLAINED_WEIGHT * (EXPLAINED - remains.explained)) * _logistic(
-        NOISE_WEIGHT * _log(remains.excess / NOISE))
-    passed = (1.0 - slow) * (1.0 - fast) * (1.0 - strange) * (1.0 - fails)
-    return MOST - (MOST - LEAST) * passed
-
-
-def _log(ratio: float) -> float:
-    return math.log(max(ratio, 1e-3))
+    slow = _logistic(logit(lack.slow_excess, settings.slow, settings.slow_slope)
+                     + logit(lack.left, settings.left, settings.left_slope))
+    # a sensor may be noisier than its sheet says; but noise does not shrink with an effect
+    fast = (_logistic(logit(lack.fast, settings.fast, settings.fast_slope))
+            * _logistic(logit(lack.fast_left, settings.fast_left, settings.fast_left_slope)))
+    implausible = _logistic(logit(lack.implausibility, 1.0, settings.implausible_slope))
+    # an effect that leaves only noise has not failed on withheld data: the training data may
+    # not have determined its values
+    failed = 0.0 if lack.explained is None else _logistic(
+        settings.held_out_slope * (settings.held_out - lack.explained)) * _logistic(
+        logit(lack.slow_excess, settings.noise_only, settings.noise_only_slope))
+    passed = (1.0 - slow) * (1.0 - fast) * (1.0 - implausible) * (1.0 - failed)
+    return settings.most_unknown - (settings.most_unknown - settings.least_unknown) * passed
 
 
 def _logistic(logit: float) -> float:
     return 1.0 / (1.0 + math.exp(-min(max(logit, -8.0), 8.0)))
 
 
-def rank(candidates: Sequence[Candidate], unknown: float) -> list[Ranked]:
+def rank(hypotheses: Sequence[Hypothesis], unknown: float, settings: Settings) -> list[Answer]:
     """
-    Return the candidates by probability.
+    Return the hypotheses by score, with their probabilities.
 
     Parameters
     ----------
-    candidates
-        fitted ones, the offsets alone among them
+    hypotheses
+        fitted ones, the nuisances alone among them
     unknown
         probability of something else, from `unknown_probability`
+    settings
+        thresholds
 
     """
-    prices = Prices.among(candidates)
-    scores = np.array([prices.score(c) for c in candidates])
-    weight = np.exp(-(scores - scores.min()) / TEMPERATURE)
+    score = _Scores(hypotheses, settings)
+    scores = np.array([score(h) for h in hypotheses])
+    weight = np.exp(-(scores - scores.min()) / settings.verdict.temperature)
     weight /= weight.sum()
-    ranked = [Ranked(c, float(s), float(w) * (1.0 - unknown))
-              for c, s, w in zip(candidates, scores, weight, strict=True)]
-    return sorted(ranked, key=lambda r: r.score)
+    answers = [Answer(h, float(s), float(w) * (1.0 - unknown))
+               for h, s, w in zip(hypotheses, scores, weight, strict=True)]
+    return sorted(answers, key=lambda answer: answer.score)
 
 
-def best(candidates: Sequence[Candidate]) -> Candidate:
-    """Return the candidate with the least score."""
-    return min(candidates, key=Prices.among(candidates).score)
+def best(hypotheses: Sequence[Hypothesis], settings: Settings) -> Hypothesis:
+    """Return the hypothesis with the least score."""
+    return min(hypotheses, key=_Scores(hypotheses, settings))
 
 
-def confusable(candidates: Sequence[Candidate]) -> list[list[str]]:
+def confusable(hypotheses: Sequence[Hypothesis], settings: Settings) -> list[list[str]]:
     """
-    Return groups of effects that these data cannot tell apart.
+    Return groups of effects that the data cannot tell apart, the likeliest of each first.
 
-    Effects belong together if one in the other's place costs hardly more. A group holds at
-    most LARGEST_GROUP, the likeliest of them.
+    Effects are in a group if one in the other's place costs hardly more.
     """
-    top, score = best(candidates), Prices.among(candidates).score
-    limit = score(top) + ALIKE
+    top, score = best(hypotheses, settings), _Scores(hypotheses, settings)
+    limit = score(top) + settings.verdict.confusable
     groups: list[list[str]] = []
     for effect in top.effects:
         rest = set(top.effects) - {effect}
-        others = sorted((score(c), next(iter(set(c.effects) - rest)))
-                        for c in candidates
-                        if len(c.effects) == len(top.effects) and rest < set(c.effects)
-                        and effect not in c.effects and score(c) < limit)
-        names = list(dict.fromkeys(name for _, name in others))[:LARGEST_GROUP - 1]
+        others = sorted((score(h), next(iter(set(h.effects) - rest)))
+                        for h in hypotheses
+                        if len(h.effects) == len(top.effects) and rest < set(h.effects)
+                        and effect not in h.effects and score(h) < limit)
+        names = list(dict.fromkeys(name for _, name in others))
+        names = names[:settings.verdict.largest_group - 1]
         if names:
             groups.append([effect, *names])
     return groups

@@ -25,12 +25,14 @@ import math
 from typing import Any
 
 from antenna_drive.cli import main
-from antenna_drive.diagnosis.confusability import BUILT_IN, confusability, planned
-from antenna_drive.diagnosis.diagnosis import diagnose, told
+from antenna_drive.diagnosis.diagnosis import value_lines
 from antenna_drive.diagnosis.page import page
 from antenna_drive.errors import UserError
+from antenna_drive.machines.antenna.diagnose import diagnose_recordings
 from antenna_drive.machines.antenna.field_test import CHANNELS
-from antenna_drive.machines.antenna.machine import DriveModel
+from antenna_drive.machines.antenna.machine import AntennaMachine
+from antenna_drive.machines.antenna.planned_tests import BUILT_IN, confusability_of, planned
+from antenna_drive.machines.antenna.waves import Wave
 from antenna_drive.parameters import load
 from antenna_drive.recording.csv_format import write_csv
 from antenna_drive.recording.recording import Recording
@@ -49,11 +51,11 @@ def made(point: Any, seconds: float, names: tuple[str, ...] = ('square', 'triang
          keep: tuple[str, ...] = tuple(CHANNELS), seed: int = 0) -> dict[str, Recording]:
     """Return recordings of a drive with these parameter values."""
     tests = {name: planned(BUILT_IN[name], seconds, 100.0) for name in names}
-    model = DriveModel(tests, load(), threads=1)
+    model = AntennaMachine(tests, load(), threads=1)
     for effect in model.effects.values():
         for form in effect.forms:
-            if hasattr(form, 'at'):
-                model.register(form.at(12.0))
+            if isinstance(form, Wave):
+                model._wave_at(form, 12.0)
     values: Any = model.simulate([point])[0]
     random = np.random.default_rng(seed)
     recordings = {}
@@ -92,7 +94,7 @@ def check_schema(result: Any) -> Any:
     ('tach_2.gain.change', 0.02), ('loop.delay.time', 0.02),
 ])
 def test_known_effect_is_named(effect: Any, value: Any) -> None:
-    diagnosis = diagnose(made({**OFFSETS, effect: value}, 12.0), load())
+    diagnosis = diagnose_recordings(made({**OFFSETS, effect: value}, 12.0), load())
     check_schema(diagnosis.result)
     top = diagnosis.result['which'][0]
     assert top['effects'] == [effect.rpartition('.')[0]]
@@ -104,7 +106,7 @@ def test_known_effect_is_named(effect: Any, value: Any) -> None:
 
 @pytest.mark.trial
 def test_offsets_within_the_tolerance_are_no_gap() -> None:
-    diagnosis = diagnose(made(OFFSETS, 12.0), load())
+    diagnosis = diagnose_recordings(made(OFFSETS, 12.0), load())
     check_schema(diagnosis.result)
     assert diagnosis.result['verdict'] == 'no_gap'
     text = page(diagnosis)
@@ -123,7 +125,7 @@ def test_what_no_effect_can_do_is_unknown() -> None:
         signals['motor_1/tach_rate'] = signals['motor_1/tach_rate'] + 1.5 * np.exp(
             -np.mod(time, 0.5) / 0.05)
         odd[name] = Recording.from_arrays(time, signals, sheet=recording.sheet)
-    diagnosis = diagnose(odd, load())
+    diagnosis = diagnose_recordings(odd, load())
     check_schema(diagnosis.result)
     assert diagnosis.result['verdict'] == 'unknown_effect'
     # but where it lies is told
@@ -149,19 +151,19 @@ def test_one_current_alone_still_gives_an_answer(tmp_path: Any) -> None:
 def test_recording_without_a_command_is_refused() -> None:
     recording = Recording.from_arrays([0.0, 0.01], {'motor_1/current': [0.0, 1.0]})
     with pytest.raises(UserError, match='rate command'):
-        DriveModel({'field': recording}, load())
+        AntennaMachine({'field': recording}, load())
 
 
 def test_recording_of_a_command_alone_is_refused() -> None:
     time = np.arange(100) * 0.01
     recording = Recording.from_arrays(time, {'test_signal/rate_command': np.sin(time)})
     with pytest.raises(UserError, match='at least one current'):
-        DriveModel({'field': recording}, load())
+        AntennaMachine({'field': recording}, load())
 
 
 def test_confusability_knows_what_one_elevation_cannot_tell() -> None:
     tests = {name: planned(BUILT_IN['triangle'], 6.0, 100.0) for name in ('a',)}
-    found = confusability(tests, load(), threads=1)
+    found = confusability_of(tests, load(), threads=1)
     at = {effect: i for i, effect in enumerate(found.effects)}
     assert found.alike[at['axis.gravity_imbalance'], at['axis.wind_steady']] > 0.99
     assert found.alike[at['motor_1.torque_constant'], at['encoder.cyclic_error']] < 0.5
@@ -172,8 +174,10 @@ def test_confusability_knows_what_one_elevation_cannot_tell() -> None:
 
 def test_values_are_told_as_people_read_them() -> None:
     item = {'value': 0.25, 'ci95': [0.2, 0.3], 'unit': 'N m'}
-    assert told({'motor_1.stribeck_friction.torque': item}) == ['torque = 0.25 N m (0.2 to 0.3)']
-    assert told({'axis.inertia.change': {**item, 'unit': '1'}}) == ['change = 0.25 (0.2 to 0.3)']
+    assert value_lines({'motor_1.stribeck_friction.torque': item}) == [
+                       'torque = 0.25 N m (0.2 to 0.3)']
+    assert value_lines({'axis.inertia.change': {**item, 'unit': '1'}}
+                       ) == ['change = 0.25 (0.2 to 0.3)']
     # a gust is a course of many numbers
-    (line,) = told({f'axis.wind_gust.torque:0:{i}': item for i in range(60)})
+    (line,) = value_lines({f'axis.wind_gust.torque:0:{i}': item for i in range(60)})
     assert line.startswith('60 numbers')

@@ -17,11 +17,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from antenna_drive.diagnosis.confusability import BUILT_IN, planned
-from antenna_drive.diagnosis.least_squares import Problem
-from antenna_drive.diagnosis.search import starts
+from antenna_drive.diagnosis import LeastSquares
 from antenna_drive.machines.antenna.field_test import BIAS
-from antenna_drive.machines.antenna.machine import DriveModel
+from antenna_drive.machines.antenna.machine import AntennaMachine
+from antenna_drive.machines.antenna.planned_tests import BUILT_IN, planned
 from antenna_drive.parameters import load
 from antenna_drive.recording.sheet import FixedStepBias
 import numpy as np
@@ -31,10 +30,10 @@ LENGTH_S = 8.0
 
 
 @pytest.fixture(scope='module')
-def model() -> DriveModel:
+def model() -> AntennaMachine:
     """Return the drive in two tests whose readings are those of the model itself."""
-    drive = DriveModel({name: planned(BUILT_IN[name], LENGTH_S, 200.0)
-                        for name in ('square', 'multisine')}, load(), threads=1)
+    drive = AntennaMachine({name: planned(BUILT_IN[name], LENGTH_S, 200.0)
+                            for name in ('square', 'multisine')}, load(), threads=1)
     shown = drive.simulate([{}])[0]
     drive.experiments = tuple(replace(e, measured=values) for e, values in zip(
         drive.experiments, shown, strict=True) if values is not None)
@@ -44,14 +43,14 @@ def model() -> DriveModel:
 @pytest.mark.parametrize('effect', ['motor_1.viscous_friction', 'gearbox_2.stiffness',
                                     'gearbox_1.hysteresis', 'axis.inertia', 'tach_1.gain'])
 def test_a_derivative_of_rough_runs_is_nearly_that_of_fine_ones(
-        model: DriveModel, effect: str) -> None:
+        model: AntennaMachine, effect: str) -> None:
     """Two runs of 2.5 ms, taken here by hand, against the column that a fit is given."""
     form = model.effects[effect].forms[0]
-    size, point = form.parameters[0], starts(form)
-    problem = Problem(model)
-    residual = problem.residuals([point])[0]
-    column = problem.columns(point, [size], residual, central=False)[:, 0]
-    moved = problem.residuals([{**point, size.name: size.step}])[0]
+    size, point = form.parameters[0], form.start
+    problem = LeastSquares(model)
+    residual = problem.residuals(point)
+    column = problem.jacobian(point, [size], residual, central=False)[:, 0]
+    moved = problem.residuals({**point, size.name: size.step})
     fine = (residual - moved) / size.step
     assert np.linalg.norm(column - fine) < 0.15 * np.linalg.norm(fine)
 
@@ -61,30 +60,31 @@ def test_a_derivative_of_rough_runs_is_nearly_that_of_fine_ones(
     ('axis.inertia.change', 0.3), ('motors.armature_resistance.trimmed_change', 1.0),
     ('torque_share.filter_1_pole.change', 0.5)])
 def test_rough_runs_stay_within_the_noise_of_fine_ones(
-        model: DriveModel, name: str, value: float) -> None:
-    point = {**starts(next(form for effect in model.effects.values() for form in effect.forms
-                           if form.parameters[0].name == name)), name: value}
-    fine, rough = (of.simulate([point])[0] for of in (model, model.rough()))
+        model: AntennaMachine, name: str, value: float) -> None:
+    form = next(form for effect in model.effects.values() for form in effect.forms
+                if form.parameters[0].name == name)
+    point = {**form.start, name: value}
+    fine, rough = (of.simulate([point])[0] for of in (model, model.low_fidelity()))
     for experiment, a, b in zip(model.experiments, fine, rough, strict=True):
         assert a is not None
         assert b is not None
         assert np.sqrt(np.mean(((a - b) / experiment.noise) ** 2)) < 0.5
 
 
-def test_the_rough_model_is_rough_once(model: DriveModel) -> None:
-    assert model.rough() is model.rough()
-    assert model.rough() is not model
-    assert model.rough().rough() is model.rough()
-    brief = model.brief()
-    assert brief.rough() is brief
+def test_the_rough_model_is_rough_once(model: AntennaMachine) -> None:
+    assert model.low_fidelity() is model.low_fidelity()
+    assert model.low_fidelity() is not model
+    assert model.low_fidelity().low_fidelity() is model.low_fidelity()
+    brief = model.truncated()
+    assert brief.low_fidelity() is brief
 
 
 def test_a_source_of_bias_that_is_off_gives_as_much_more() -> None:
     """Tables of steps are kept for each voltage, and none passes for another."""
     sheet = replace(BUILT_IN['square'], bias=FixedStepBias(voltage_V=6.0, at_s=1.0))
-    drive = DriveModel({'stepped': planned(sheet, 2.0, 200.0)}, load(), threads=1)
+    drive = AntennaMachine({'stepped': planned(sheet, 2.0, 200.0)}, load(), threads=1)
     for share in (0.0, 0.01, -0.02, 0.01):
-        drive._cache.clear()
+        drive._runs.clear()
         shown = drive.simulate([{'supply:stepped': share}])[0][0]
         assert shown is not None
         expected = np.where(drive.experiments[0].time < 1.0, 0.0, 6.0 * (1.0 + share))

@@ -17,14 +17,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from antenna_drive.diagnosis.confusability import BUILT_IN, planned
-from antenna_drive.diagnosis.search import starts
 from antenna_drive.emulator import batch
 from antenna_drive.emulator.run import simulate
-from antenna_drive.machines.antenna.catalogue import catalogue, DriveParameter, Wave
+from antenna_drive.machines.antenna.catalogue import catalogue
 from antenna_drive.machines.antenna.excitation import Bias, Longest, schedule, SheetCommand
 from antenna_drive.machines.antenna.field_test import TACH_1
-from antenna_drive.machines.antenna.machine import DriveModel
+from antenna_drive.machines.antenna.machine import AntennaMachine
+from antenna_drive.machines.antenna.modifiers import AntennaParameter
+from antenna_drive.machines.antenna.planned_tests import BUILT_IN, planned
+from antenna_drive.machines.antenna.waves import Wave
 from antenna_drive.parameters import load
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed
@@ -56,16 +57,15 @@ REQUIRED = {
 @pytest.fixture(scope='module')
 def model() -> Any:
     """Return the drive in two short tests of which nothing was read."""
-    return DriveModel({name: planned(BUILT_IN[name], 4.0, 200.0)
-                       for name in ('square', 'triangle')}, load(), threads=1)
+    return AntennaMachine({name: planned(BUILT_IN[name], 4.0, 200.0)
+                           for name in ('square', 'triangle')}, load(), threads=1)
 
 
 def forms_of(model: Any, effect: Any) -> Any:
     """Return all forms of an effect, a wave at its first order."""
     for form in model.effects[effect.id].forms:
         if isinstance(form, Wave):
-            form = form.at(form.orders[3])
-            model.register(form)
+            form = model._wave_at(form, form.orders[3])
         yield form
 
 
@@ -78,7 +78,7 @@ def test_effect_is_neutral_until_it_has_a_size(model: Any, effect: Any) -> None:
     reference = model.simulate([{}])[0]
     for form in forms_of(model, effect):
         assert form.parameters[0].low <= 0.0 <= form.parameters[0].high
-        for with_effect, without in zip(model.simulate([starts(form)])[0], reference,
+        for with_effect, without in zip(model.simulate([form.start])[0], reference,
                                         strict=True):
             assert with_effect.tobytes() == without.tobytes()
 
@@ -89,7 +89,7 @@ def test_effect_changes_some_reading(model: Any, effect: Any) -> None:
     changed_one = False
     for form in forms_of(model, effect):
         first = form.parameters[0]
-        points = [{**starts(form), first.name: 0.6 * bound} for bound in (first.low, first.high)]
+        points = [{**form.start, first.name: 0.6 * bound} for bound in (first.low, first.high)]
         changed_one |= any(not np.array_equal(a, b) for a, b in zip(
             sum(model.simulate(points), []), 2 * reference, strict=True))
     # this short test does not saturate, a limit set higher does not show
@@ -110,10 +110,9 @@ def test_effect_knows_by_how_much_its_number_may_be_off_anyway(model: Any, name:
 
 def test_time_stamps_err_more_on_what_is_faster(model: Any) -> None:
     """The noise of a reading that ripples is the sheet's and the ripple's slope times jitter."""
-    form = model.effects['tach_1.ripple'].forms[0].at(3.0)
-    model.register(form)
-    point = {**starts(form), form.parameters[0].name: 0.2}
-    quiet, loud = model.experiments, model.heard_at(point).experiments
+    form = model._wave_at(model.effects['tach_1.ripple'].forms[0], 3.0)
+    point = {**form.start, form.parameters[0].name: 0.2}
+    quiet, loud = model.experiments, model.with_noise_at(point).experiments
     late = 1e-6
     for k, (test, before, after) in enumerate(zip(model._tests, quiet, loud, strict=True)):
         shifted = model.simulate([point, {**point, f'clock:{test.name}': late}])
@@ -132,8 +131,8 @@ def test_every_field_of_the_catalogue_is_one_of_the_record() -> None:
     for effect in catalogue().values():
         for form in effect.forms:
             for parameter in form.parameters:
-                assert isinstance(parameter, DriveParameter)
-                for path in parameter.fields:
+                assert isinstance(parameter, AntennaParameter)
+                for path in parameter.modifier.fields:
                     place = record
                     for part in path.split('.'):
                         if not part.isdigit():

@@ -19,11 +19,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 import math
 
-from antenna_drive.diagnosis.machine import FloatArray
+from antenna_drive.diagnosis import FloatArray
 from antenna_drive.machines.antenna.catalogue import QUANTISATION
 from antenna_drive.machines.antenna.excitation import Bias, Longest, schedule, SheetCommand
 from antenna_drive.machines.antenna.field_test import CHANNELS, ENCODER
-from antenna_drive.machines.antenna.machine import DriveModel
+from antenna_drive.machines.antenna.machine import AntennaMachine
 from antenna_drive.machines.antenna.sensors import digit_of
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.sets import Drive
@@ -68,7 +68,7 @@ def recorded(drive: Drive, digit: float, rounding: Callable[[FloatArray], FloatA
     time = np.arange(601) / 100.0
     signals = {'test_signal/rate_command': SheetCommand(waveform)(time)}
     signals.update({name: np.zeros(time.size) for name in CHANNELS})
-    model = DriveModel({'a': Recording.from_arrays(time, signals, sheet=sheet)}, drive, 1)
+    model = AntennaMachine({'a': Recording.from_arrays(time, signals, sheet=sheet)}, drive, 1)
     shown, when = readings_of(model, {}), model.experiments[0].time
     signals.update({name: np.interp(time, when, shown[:, c])
                     for c, name in enumerate(CHANNELS)})
@@ -76,7 +76,7 @@ def recorded(drive: Drive, digit: float, rounding: Callable[[FloatArray], FloatA
     return Recording.from_arrays(time, signals, sheet=sheet)
 
 
-def readings_of(model: DriveModel, point: Mapping[str, float]) -> FloatArray:
+def readings_of(model: AntennaMachine, point: Mapping[str, float]) -> FloatArray:
     """Return what the sensors of the one test would have shown."""
     shown = model.simulate([point])[0][0]
     assert shown is not None
@@ -89,7 +89,7 @@ def test_angle_within_the_digit_that_was_read_is_no_residual(
         rounding: Callable[[FloatArray], FloatArray], turn: float) -> None:
     """An encoder of coarse digits is no gap once they are known, wherever it rounds."""
     drive, digit = load(), 2e-4
-    model = DriveModel({'a': recorded(drive, digit, rounding)}, drive, 1)
+    model = AntennaMachine({'a': recorded(drive, digit, rounding)}, drive, 1)
     step, edge = model.effects[QUANTISATION].forms[0].parameters
     assert step.high == pytest.approx(digit, rel=1e-6)
     measured = model.experiments[0].measured[:, ENCODER]
@@ -102,7 +102,7 @@ def test_angle_within_the_digit_that_was_read_is_no_residual(
 def test_fine_encoder_has_the_digits_of_its_sheet() -> None:
     """Digits that the sheet gives are no effect."""
     drive = load()
-    model = DriveModel({'a': recorded(drive, 2.0 * math.pi / 2 ** 21, np.floor)}, drive, 1)
+    model = AntennaMachine({'a': recorded(drive, 2.0 * math.pi / 2 ** 21, np.floor)}, drive, 1)
     assert [p.name for p in model.effects[QUANTISATION].forms[0].parameters] == [
         f'{QUANTISATION}.step']
     assert model.effects[QUANTISATION].forms[0].parameters[0].high > 1e-3

@@ -15,9 +15,9 @@
 
 from __future__ import annotations
 
-from antenna_drive.diagnosis.confusability import BUILT_IN, planned
 from antenna_drive.errors import UserError
 from antenna_drive.machines.antenna.field_test import FieldTest, prepared
+from antenna_drive.machines.antenna.planned_tests import BUILT_IN, planned
 from antenna_drive.parameters import load
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import TestSheet

@@ -15,13 +15,12 @@
 
 from __future__ import annotations
 
-from antenna_drive.diagnosis.confusability import BUILT_IN, planned
-from antenna_drive.diagnosis.least_squares import Problem
-from antenna_drive.diagnosis.machine import FloatArray
-from antenna_drive.diagnosis.unknown_input import _Inputs, components, places
-from antenna_drive.machines.antenna.catalogue import ENTRIES
+from antenna_drive.diagnosis import DEFAULT, FloatArray, LeastSquares
+from antenna_drive.diagnosis.unknown_input import _Evidence, components, places
+from antenna_drive.machines.antenna.disturbances import DISTURBANCES
 from antenna_drive.machines.antenna.field_test import CHANNELS
-from antenna_drive.machines.antenna.machine import DriveModel
+from antenna_drive.machines.antenna.machine import AntennaMachine
+from antenna_drive.machines.antenna.planned_tests import BUILT_IN, planned
 from antenna_drive.parameters import load
 from antenna_drive.recording.recording import Recording
 import numpy as np
@@ -31,10 +30,10 @@ from scipy import optimize, stats
 NOISE = np.array([0.01, 0.01, 0.0035, 0.0035, 1.5e-6, 0.01])
 
 
-def disturbed(entry_name: str, strength: float, seed: int) -> DriveModel:
+def disturbed(place_name: str, strength: float, seed: int) -> AntennaMachine:
     """Return a model against a drive that something of a wild course has entered."""
     test = planned(BUILT_IN['square'], 12.0, 70.0)
-    model = DriveModel({'square': test}, load(), threads=1)
+    model = AntennaMachine({'square': test}, load(), threads=1)
     random = np.random.default_rng(seed)
     frequencies, phases = random.uniform(0.2, 1.5, 5), random.uniform(0.0, 6.3, 5)
 
@@ -42,15 +41,15 @@ def disturbed(entry_name: str, strength: float, seed: int) -> DriveModel:
         waves = np.sin(2.0 * np.pi * np.multiply.outer(time, frequencies) + phases)
         return np.asarray(strength * waves.sum(axis=-1))
 
-    entry = next(e for e in ENTRIES if e.name == entry_name)
-    readings = model.pushed({}, entry, course)[0]
+    place = next(e for e in DISTURBANCES if e.name == place_name)
+    readings = model.simulate_disturbed({}, place, course)[0]
     readings = readings + NOISE * random.normal(size=readings.shape)
     time = model.experiments[0].time
     command = test['test_signal/rate_command']
     signals = {'test_signal/rate_command': np.interp(time, command.time_s, command.values)}
     signals.update({name: readings[:, c] for c, name in enumerate(CHANNELS)})
-    return DriveModel({'square': Recording.from_arrays(time, signals, sheet=test.sheet)}, load(),
-                      threads=1)
+    recording = Recording.from_arrays(time, signals, sheet=test.sheet)
+    return AntennaMachine({'square': recording}, load(), threads=1)
 
 
 @pytest.mark.parametrize(('name', 'strength', 'component'), [
@@ -61,8 +60,8 @@ def disturbed(entry_name: str, strength: float, seed: int) -> DriveModel:
 def test_part_that_something_unknown_enters_is_told(name: str, strength: float,
                                                     component: str) -> None:
     """The input is no pulse, and its answer is not linear: the part is found all the same."""
-    found = places(Problem(disturbed(name, strength, seed=3)), {})
-    shares = components(found)
+    found = places(LeastSquares(disturbed(name, strength, seed=3)), {})
+    shares = components(found, DEFAULT.localisation.caution)
     assert max(shares, key=shares.__getitem__) == component
     assert sum(shares.values()) == pytest.approx(1.0)
     assert found[0].evidence > 100.0 and 0.3 < found[0].explained <= 1.0
@@ -70,7 +69,7 @@ def test_part_that_something_unknown_enters_is_told(name: str, strength: float,
 
 def test_noise_alone_enters_nowhere() -> None:
     """Where nothing has entered, no place has evidence worth the name."""
-    found = places(Problem(disturbed('torque on the axis', 0.0, seed=4)), {})
+    found = places(LeastSquares(disturbed('torque on the axis', 0.0, seed=4)), {})
     assert found[0].evidence < 20.0
 
 
@@ -79,7 +78,7 @@ def test_evidence_is_that_of_a_normal_distribution() -> None:
     random = np.random.default_rng(1)
     columns = random.normal(size=(40, 6))
     residual = columns @ random.normal(size=6) * 1.5 + random.normal(size=40)
-    inputs = _Inputs(residual, np.ones(40), np.zeros((40, 1)), np.ones(1))
+    inputs = _Evidence(residual, np.ones(40), np.zeros((40, 1)), np.ones(1))
 
     class One:
         """A problem of one experiment."""

@@ -15,10 +15,11 @@
 
 from __future__ import annotations
 
-from antenna_drive.diagnosis.machine import Experiment
-from antenna_drive.machines.antenna.catalogue import catalogue, Wave
+from antenna_drive.diagnosis import Experiment
+from antenna_drive.machines.antenna.catalogue import catalogue
 from antenna_drive.machines.antenna.field_test import CHANNELS, CURRENT_1, TACH_1, TACH_2, UNITS
 from antenna_drive.machines.antenna.wave_orders import likely_orders
+from antenna_drive.machines.antenna.waves import Wave
 from antenna_drive.physics.harmonics import wave
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -53,11 +54,11 @@ def test_planted_wave_is_found_beneath_a_slow_misfit_that_is_louder(order: int,
 
 @given(st.lists(st.floats(-1e-3, 1e-3), min_size=7, max_size=7), st.floats(-0.5, 0.5))
 def test_wave_of_readings_is_that_of_the_physics(parts: list[float], angle: float) -> None:
-    """Sine and cosine parts on readings say what the settings of the record say to the physics."""
+    """Sine and cosine parts on readings say what the fields of the record say to the physics."""
     form = catalogue()['encoder.cyclic_error'].forms[0]
     assert isinstance(form, Wave)
     form = form.at(700.0)
-    value = {path.rpartition('cyclic_error')[2]: v for path, _, v in form.settings(*parts)}
-    assert form.along(np.array([angle]), parts)[0] == pytest.approx(wave(
+    value = form.shape.fields(parts)
+    assert form.shape.along(np.array([angle]), parts)[0] == pytest.approx(wave(
         angle, value[''], value['_second'], value['_third'], value['_cycles'], value['_phase'],
         value['_second_phase'], value['_third_phase']), abs=1e-12)

@@ -15,12 +15,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-import math
-from typing import Any
+from collections.abc import Mapping
 
-from antenna_drive.diagnosis.diagnosis import diagnosed
-from antenna_drive.diagnosis.machine import Effect, Experiment, Form, Motion, Parameter, Point
+from antenna_drive.diagnosis import (
+    diagnose, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point,
+)
 import numpy as np
 import pytest
 
@@ -35,84 +34,45 @@ def effect(key: str, unit: str, low: float, high: float) -> Effect:
     return Effect(key, key.partition('.')[0], 'a cause', 'a look', (Form('', (number,)),))
 
 
-class Body:
+class Body(Machine):
     """
     A body that cools as start * exp(-rate t), with a thermometer beside it and one behind it.
 
     It may lack the thermometer's gain, a heater that comes on at 4 s, and a draught at 7 s.
     """
 
-    effects: Mapping[str, Effect] = {item.id: item for item in (
-        effect('thermometer.gain', '1', -0.5, 0.5), effect('heater.step', 'K', -1.0, 1.0),
-        effect('air.draught', '1/s', 0.0, 1.0))}
-    nuisances = (Parameter('offset:rate', '1', -0.02, 0.02, 1e-3, 0.01),)
-
     def __init__(self, truth: Mapping[str, float], odd: float = 0.0) -> None:
         random = np.random.default_rng(5)
-        self.experiments: tuple[Experiment, ...] = ()
-        made = [self.reading(k, truth) + NOISE * random.normal(size=(TIME.size, 2))
+        experiments = []
+        made = [reading(k, truth) + NOISE * random.normal(size=(TIME.size, 2))
                 for k in range(len(STARTS))]
         for k, measured in enumerate(made):
             measured[:, 1] += odd * np.sin(2.0 * TIME + k)
-            self.experiments += (Experiment(
+            experiments.append(Experiment(
                 f'from {STARTS[k]:g} K', TIME, ('near', 'behind'), ('K', 'K'), measured,
-                np.full_like(measured, NOISE)),)
+                np.full_like(measured, NOISE)))
+        super().__init__(experiments, [Parameter('offset:rate', '1', -0.02, 0.02, 1e-3, 0.01)], [
+            effect('thermometer.gain', '1', -0.5, 0.5), effect('heater.step', 'K', -1.0, 1.0),
+            effect('air.draught', '1/s', 0.0, 1.0)])
 
-    @staticmethod
-    def reading(k: int, point: Mapping[str, float]) -> Any:
+    def predict(self, point: Point, experiment: int) -> FloatArray:
         """Return what both thermometers say."""
-        rate = 0.4 * (1.0 + point.get('offset:rate', 0.0))
-        cooled = rate * TIME + point.get('air.draught.size', 0.0) * np.maximum(TIME - 7.0, 0.0)
-        heated = point.get('heater.step.size', 0.0) * (TIME >= 4.0)
-        body = STARTS[k] * np.exp(-cooled) + heated
-        return np.column_stack([body * (1.0 + point.get('thermometer.gain.size', 0.0)), body])
+        return reading(experiment, point)
 
-    def rough(self) -> Body:
-        """Return the model itself."""
-        return self
 
-    def heard_at(self, point: Point) -> Body:
-        """Return the model itself."""
-        return self
-
-    def brief(self) -> Body:
-        """Return the model: it is brief."""
-        return self
-
-    def forms(self, item: Effect, residuals: Any) -> Sequence[Form]:
-        """Return all forms."""
-        return item.forms
-
-    def motion(self, experiment: int) -> Motion:
-        """Return its cooling."""
-        body = self.reading(experiment, {})[:, 1]
-        return Motion(np.gradient(body, TIME), body, TIME, math.inf)
-
-    entries = ()
-
-    def pushed(self, point: Any, entry: Any, course: Any) -> Any:
-        """Return nothing: there are no entries."""
-        return []
-
-    def counterpart(self, form: Any, effect: Any, part: Any) -> Any:
-        """Return the form itself: there is one mass."""
-        return form
-
-    def absorbed(self, point: Mapping[str, float], gone: Any) -> dict[str, float]:
-        """Return the offsets as they are."""
-        return dict(point)
-
-    def simulate(self, points: Any, only: Any = None, until: float = math.inf) -> Any:
-        """Return the readings of each variant."""
-        return [[self.reading(k, point) if one in (None, k) else None
-                 for k in range(len(STARTS))]
-                for point, one in zip(points, only or [None] * len(points))]
+def reading(k: int, point: Point) -> FloatArray:
+    """Return what both thermometers say."""
+    rate = 0.4 * (1.0 + point.get('offset:rate', 0.0))
+    cooled = rate * TIME + point.get('air.draught.size', 0.0) * np.maximum(TIME - 7.0, 0.0)
+    heated = point.get('heater.step.size', 0.0) * (TIME >= 4.0)
+    body = STARTS[k] * np.exp(-cooled) + heated
+    return np.column_stack([body * (1.0 + point.get('thermometer.gain.size', 0.0)), body])
 
 
 @pytest.mark.parametrize('name, size', [
     ('thermometer.gain', 0.1), ('heater.step', -0.3), ('air.draught', 0.4)])
 def test_what_a_machine_has_and_its_model_lacks_is_named(name: str, size: float) -> None:
-    result = diagnosed(Body({f'{name}.size': size, 'offset:rate': 0.01})).result
+    result = diagnose(Body({f'{name}.size': size, 'offset:rate': 0.01})).result
     assert result['verdict'] == 'explained'
     top = result['which'][0]
     assert top['effects'] == [name] and top['probability'] > 0.9
@@ -121,13 +81,18 @@ def test_what_a_machine_has_and_its_model_lacks_is_named(name: str, size: float)
 
 
 def test_a_machine_within_its_tolerance_has_no_gap() -> None:
-    assert diagnosed(Body({'offset:rate': -0.015})).result['verdict'] == 'no_gap'
+    assert diagnose(Body({'offset:rate': -0.015})).result['verdict'] == 'no_gap'
 
 
 def test_what_no_effect_does_is_unknown() -> None:
-    assert diagnosed(Body({}, odd=0.2)).result['verdict'] == 'unknown_effect'
+    assert diagnose(Body({}, odd=0.2)).result['verdict'] == 'unknown_effect'
 
 
 def test_two_effects_at_once_are_both_named() -> None:
-    result = diagnosed(Body({'thermometer.gain.size': 0.2, 'heater.step.size': 0.5})).result
+    result = diagnose(Body({'thermometer.gain.size': 0.2, 'heater.step.size': 0.5})).result
     assert set(result['which'][0]['effects']) == {'thermometer.gain', 'heater.step'}
+
+
+def test_a_diagnosis_says_itself_in_one_line() -> None:
+    said = repr(diagnose(Body({'heater.step.size': -0.3})))
+    assert said.startswith('<Diagnosis: explained, heater.step 9') and len(said) < 80

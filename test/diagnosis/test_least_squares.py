@@ -18,8 +18,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from antenna_drive.diagnosis.least_squares import bounded_step, Problem, robust_loss, robust_weight
-from antenna_drive.diagnosis.machine import Effect, Experiment, Form, Motion, Parameter, Point
+from antenna_drive.diagnosis import (
+    Effect, Experiment, FloatArray, Form, LeastSquares, Machine, Parameter, Point,
+)
+from antenna_drive.diagnosis.box_qp import box_constrained_step
+from antenna_drive.diagnosis.least_squares import robust_loss, robust_weight
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -30,62 +33,28 @@ OFFSET = Parameter('offset', '1', -1.0, 1.0, 1e-3, 0.5)
 RATE = Parameter('rate', '1', 0.0, 3.0, 1e-3)
 
 
-class Decay:
+class Decay(Machine):
     """A toy: y = exp(-rate t) + offset."""
-
-    nuisances = (OFFSET,)
-    entries = ()
-    effects = {'toy.rate': Effect('toy.rate', 'toy', '', '', (Form('', (RATE,)),))}
 
     def __init__(self, rate: float, noise: float) -> None:
         """Measure with known noise."""
         time = np.linspace(0.0, 3.0, 400)
-        random = np.random.default_rng(1)
-        clean = np.exp(-rate * time)
-        self.experiments = (Experiment(
-            'toy', time, ('y',), ('1',), (clean + noise * random.normal(size=400))[:, np.newaxis],
-            np.full((400, 1), noise)),)
+        clean = np.exp(-rate * time) + noise * np.random.default_rng(1).normal(size=400)
+        super().__init__(
+            [Experiment('toy', time, ('y',), ('1',), clean[:, np.newaxis],
+                        np.full((400, 1), noise))],
+            [OFFSET], [Effect('toy.rate', 'toy', '', '', (Form('', (RATE,)),))])
 
-    def rough(self) -> Decay:
-        return self
-
-    def heard_at(self, point: Point) -> Decay:
-        """Return the model itself."""
-        return self
-
-    def brief(self) -> Decay:
-        return self
-
-    def motion(self, experiment: int) -> Motion:
-        time = self.experiments[experiment].time
-        return Motion(np.ones_like(time), np.ones_like(time), time, 1.0)
-
-    def forms(self, effect: Any, residuals: Any) -> Any:
-        """Return the one form."""
-        return effect.forms
-
-    def pushed(self, point: Any, entry: Any, course: Any) -> Any:
-        """Return nothing: there are no entries."""
-        return []
-
-    def counterpart(self, form: Any, effect: Any, part: Any) -> Any:
-        """Return the form itself: there is one place."""
-        return form
-
-    def absorbed(self, point: Any, gone: Any) -> Any:
-        """Return the offsets as they are."""
-        return dict(point)
-
-    def simulate(self, points: Any, only: Any = None, until: Any = math.inf) -> Any:
+    def predict(self, point: Point, experiment: int) -> FloatArray:
         """Return the closed form."""
-        time = self.experiments[0].time
-        return [[(np.exp(-p.get('rate', 0.0) * time) + p.get('offset', 0.0))[:, np.newaxis]]
-                for p in points]
+        time = self.experiments[experiment].time
+        return np.asarray(np.exp(-point.get('rate', 0.0) * time)
+                          + point.get('offset', 0.0))[:, np.newaxis]
 
 
 def test_fit_finds_the_known_answer() -> None:
     model = Decay(0.7, 0.01)
-    problem = Problem(model)
+    problem = LeastSquares(model)
     state = problem.fit(problem.start((OFFSET, RATE), {}), 20)
     assert state.value('rate') == pytest.approx(0.7, abs=0.01)
     assert state.value('offset') == pytest.approx(0.0, abs=0.01)
@@ -93,16 +62,16 @@ def test_fit_finds_the_known_answer() -> None:
 
 def test_fit_never_leaves_the_bounds() -> None:
     model = Decay(5.0, 0.01)
-    problem = Problem(model)
+    problem = LeastSquares(model)
     state = problem.fit(problem.start((OFFSET, RATE), {}), 20)
     assert 0.0 <= state.value('rate') <= 3.0 and -1.0 <= state.value('offset') <= 1.0
 
 
 def test_central_differences_are_the_derivative() -> None:
-    problem = Problem(Decay(0.7, 0.01))
+    problem = LeastSquares(Decay(0.7, 0.01))
     point = {'rate': 0.5, 'offset': 0.1}
-    residual = problem.residuals([point])[0]
-    columns = problem.columns(point, (OFFSET, RATE), residual, central=True)
+    residual = problem.residuals(point)
+    columns = problem.jacobian(point, (OFFSET, RATE), residual, central=True)
     time = problem.experiments[0].time
     assert columns[:, 0] == pytest.approx(np.full(400, 100.0), rel=1e-4)
     assert columns[:, 1] == pytest.approx(-100.0 * time * np.exp(-0.5 * time), abs=1e-2)
@@ -111,27 +80,27 @@ def test_central_differences_are_the_derivative() -> None:
 def test_what_was_not_measured_counts_for_nothing() -> None:
     model = Decay(0.7, 0.01)
     model.experiments[0].measured[100:] = np.nan
-    problem = Problem(model)
+    problem = LeastSquares(model)
     assert problem.samples == 100
-    assert not problem.residuals([{'rate': 2.0}])[0][100:].any()
+    assert not problem.residuals({'rate': 2.0})[100:].any()
 
 
 def test_an_outlier_does_not_pull() -> None:
     model = Decay(0.7, 0.01)
     model.experiments[0].measured[50] += 100.0
-    problem = Problem(model)
+    problem = LeastSquares(model)
     state = problem.fit(problem.start((OFFSET, RATE), {}), 20)
     assert state.value('rate') == pytest.approx(0.7, abs=0.02)
 
 
 @given(st.integers(1, 12), st.integers(0, 10_000))
 @settings(max_examples=60, deadline=None)
-def test_bounded_step_agrees_with_an_independent_solver(m: Any, seed: Any) -> None:
+def test_box_constrained_step_agrees_with_an_independent_solver(m: Any, seed: Any) -> None:
     random = np.random.default_rng(seed)
     matrix = random.normal(size=(3 * m, m))
     target = random.normal(size=3 * m) * 3.0
     low, high = -random.uniform(0.0, 1.0, m), random.uniform(0.01, 1.0, m)
-    step = bounded_step(matrix.T @ matrix, matrix.T @ target, low, high)
+    step = box_constrained_step(matrix.T @ matrix, matrix.T @ target, low, high)
     best = lsq_linear(matrix, target, (low, high), method='bvls', tol=1e-12)
 
     def cost(x: Any) -> Any:
@@ -142,12 +111,12 @@ def test_bounded_step_agrees_with_an_independent_solver(m: Any, seed: Any) -> No
 
 
 def test_robust_loss_is_the_square_within_and_logarithmic_beyond() -> None:
-    assert robust_loss(np.array([2.0])) == 2.0
-    assert robust_loss(np.array([20.0])) - robust_loss(np.array([10.0])) == pytest.approx(
-        9.0 * math.log(2.0))
+    assert robust_loss(np.array([2.0]), 3.0) == 2.0
+    ten, twenty = (robust_loss(np.array([z]), 3.0) for z in (10.0, 20.0))
+    assert twenty - ten == pytest.approx(9.0 * math.log(2.0))
     # where one becomes the other neither the loss nor its slope jumps
-    around = [robust_loss(np.array([3.0 + d])) for d in (-1e-4, 0.0, 1e-4)]
+    around = [robust_loss(np.array([3.0 + d]), 3.0) for d in (-1e-4, 0.0, 1e-4)]
     assert around[2] - around[1] == pytest.approx(around[1] - around[0], rel=1e-3)
     # the weight is the slope over the residual
-    weight = robust_weight(np.array([2.0, 10.0]), np.array([True, True]))
+    weight = robust_weight(np.array([2.0, 10.0]), np.array([True, True]), 3.0)
     np.testing.assert_allclose(weight, [1.0, 9.0 / 100.0])

@@ -17,82 +17,88 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from antenna_drive.diagnosis.elimination import doubted
-from antenna_drive.diagnosis.least_squares import State
+from antenna_drive.diagnosis.elimination import backward_elimination
+from antenna_drive.diagnosis.hypothesis import Hypothesis, penalty
+from antenna_drive.diagnosis.least_squares import FitState
 from antenna_drive.diagnosis.machine import FloatArray, Form, Parameter
-from antenna_drive.diagnosis.penalty import price, TOLERATED
-from antenna_drive.diagnosis.residual_statistics import fast, power, structure
-from antenna_drive.diagnosis.search import Candidate
-from antenna_drive.diagnosis.verdict import (
-    best, DETECTABLE, LEAST, MOST, rank, Remains, unknown_probability,
-)
-from antenna_drive.machines.antenna.catalogue import gust_form, GUST_KNOT_S, gust_knots
+from antenna_drive.diagnosis.residual_statistics import fast_power, power, slow_excess
+from antenna_drive.diagnosis.settings import DEFAULT
+from antenna_drive.diagnosis.verdict import best, LackOfFit, rank, unknown_probability
+from antenna_drive.machines.antenna.gust import gust_form, KNOT_S, knots
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
 
+SETTINGS = DEFAULT.verdict
 NUMBER = Parameter('motor.gain', '1', -1.0, 1.0, 0.01, tolerance=0.02)
 shares = st.floats(0.0, 1.0)
 
 
-def fitted(effects: tuple[str, ...], cost: float) -> Candidate:
+def unknown(lack: LackOfFit) -> float:
+    return unknown_probability(lack, SETTINGS)
+
+
+def fitted(effects: tuple[str, ...], cost: float) -> Hypothesis:
     """Return a candidate of this cost."""
     parameters = tuple(replace(NUMBER, name=f'{effect}.size', tolerance=0.0) for effect in effects)
     forms = tuple(Form('', (p,)) for p in parameters)
     blank = np.zeros(0)
-    return Candidate(effects, forms, State(
+    return Hypothesis(effects, forms, FitState(
         parameters, np.ones(len(effects)), blank, np.zeros((0, 0), np.float32), blank, cost))
 
 
 @given(st.floats(-1.0, 1.0))
 def test_effect_within_a_tolerance_is_dear(value: float) -> None:
     """The price falls to that of any effect as a value outgrows its tolerance."""
-    dear = price([Form('', (NUMBER,))], {NUMBER.name: value})
-    plain = price([Form('', (replace(NUMBER, tolerance=0.0),))], {NUMBER.name: value})
-    assert dear - plain == pytest.approx(TOLERATED * max(0.0, 1.0 - abs(value) / 0.02))
+    dear = penalty([Form('', (NUMBER,))], {NUMBER.name: value}, DEFAULT.penalty)
+    plain = penalty([Form('', (replace(NUMBER, tolerance=0.0),))],
+                    {NUMBER.name: value}, DEFAULT.penalty)
+    assert dear - plain == pytest.approx(
+        DEFAULT.penalty.tolerated * max(0.0, 1.0 - abs(value) / 0.02))
 
 
 @settings(max_examples=200)
 @given(st.floats(0.0, 100.0), shares, st.floats(0.5, 100.0), shares, st.floats(0.0, 5.0),
-       st.floats(-5.0, 1.0), st.sampled_from(['excess', 'left', 'fast', 'fast_left',
-                                              'strangeness']), st.floats(1.0, 5.0))
+       st.floats(-5.0, 1.0), st.sampled_from(['slow_excess', 'left', 'fast', 'fast_left',
+                                              'implausibility']), st.floats(1.0, 5.0))
 def test_more_of_anything_left_is_never_less_unknown(
         excess: float, left: float, loud: float, loud_left: float, strange: float,
         explained: float, which: str, times: float) -> None:
     """The probability of the unknown is one, and rises with all that speaks for it."""
-    remains = Remains(excess, left, loud, loud_left, strange, explained)
+    remains = LackOfFit(excess, left, loud, loud_left, strange, explained)
     more = replace(remains, **{which: times * getattr(remains, which)})
-    assert 0.0 <= unknown_probability(remains) <= unknown_probability(more) + 1e-12 <= 1.0 + 1e-9
+    assert 0.0 <= unknown(remains) <= unknown(more) + 1e-12 <= 1.0 + 1e-9
 
 
 def test_noise_is_not_unknown_and_hum_is() -> None:
     """White noise of the sheet's size raises nothing; four times as loud a signal does."""
-    assert unknown_probability(Remains(0.0, 0.0)) == pytest.approx(LEAST, abs=0.01)
-    assert unknown_probability(
-        Remains(0.0, 0.0, fast=16.0, fast_left=1.0)) == pytest.approx(MOST, abs=0.05)
-    # a wave that was fifty times as loud before is explained, but for its finer form
-    assert unknown_probability(Remains(0.0, 0.0, fast=16.0, fast_left=0.02)) < LEAST + 0.05
+    assert unknown(LackOfFit(0.0, 0.0)) == pytest.approx(SETTINGS.least_unknown, abs=0.01)
+    assert unknown(LackOfFit(0.0, 0.0, fast=16.0, fast_left=1.0)) == pytest.approx(
+        SETTINGS.most_unknown, abs=0.05)
+    # a wave that was fifty times as loud without the effect is explained, except its finer form
+    assert unknown(LackOfFit(
+        0.0, 0.0, fast=16.0, fast_left=0.02)) < SETTINGS.least_unknown + 0.05
 
 
 def test_one_sample_beside_its_edge_is_no_noise() -> None:
     """A single sample that is off by any amount makes a signal neither loud nor slow."""
     z: FloatArray = np.random.default_rng(0).normal(size=2000)
     z[700] = 500.0
-    assert fast(z) < 1.2 and power(z) < 1.2 and abs(structure(z)) < 0.3
+    assert fast_power(z) < 1.2 and power(z) < 1.2 and abs(slow_excess(z)) < 0.3
 
 
 def test_wind_has_no_jumps() -> None:
     """A smooth random course is a gust; a load that shifts once is none."""
     form = gust_form([30.0])
-    time = GUST_KNOT_S * np.arange(gust_knots(30.0))
+    time = KNOT_S * np.arange(knots(30.0))
     random = np.random.default_rng(2)
     frequencies, phases = np.geomspace(0.02, 1.0, 24), random.uniform(0.0, 6.3, 24)
     wind = 1e4 * np.sin(2.0 * np.pi * np.multiply.outer(time, frequencies) + phases).sum(axis=1)
     ballast = np.where(time > 11.0, 8e4, 0.0) + 300.0 * random.normal(size=time.size)
     names = [p.name for p in form.parameters]
-    assert form.strangeness(dict(zip(names, wind.tolist()))) < 0.7
-    assert form.strangeness(dict(zip(names, ballast.tolist()))) > 2.0
+    assert form.implausibility(dict(zip(names, wind.tolist()))) < 0.7
+    assert form.implausibility(dict(zip(names, ballast.tolist()))) > 2.0
 
 
 def test_one_effect_in_two_places_needs_less_proof_than_two_effects() -> None:
@@ -100,17 +106,17 @@ def test_one_effect_in_two_places_needs_less_proof_than_two_effects() -> None:
     none, single = fitted((), 100000.0), fitted(('motors.gain',), 2000.0)
     twins = fitted(('motor_1.gain', 'motor_2.gain'), 1000.0)
     pair = fitted(('motors.gain', 'axis.inertia'), 1000.0)
-    assert rank([none, single, twins], 0.0)[0].candidate is twins
-    assert rank([none, single, pair], 0.0)[0].candidate is single
+    assert rank([none, single, twins], 0.0, DEFAULT)[0].hypothesis is twins
+    assert rank([none, single, pair], 0.0, DEFAULT)[0].hypothesis is single
 
 
 def test_what_is_far_below_the_noise_is_no_gap() -> None:
     """A machine whose form differs from the model's by little raises no alarm."""
     none = fitted((), 16000.0)
-    within = fitted(('motor.gain',), 16000.0 * (1.0 - 0.8 * DETECTABLE))
-    beyond = fitted(('motor.gain',), 16000.0 * (1.0 - 3.0 * DETECTABLE))
-    assert rank([none, within], 0.0)[0].candidate is none
-    assert rank([none, beyond], 0.0)[0].candidate is beyond
+    within = fitted(('motor.gain',), 16000.0 * (1.0 - 0.8 * SETTINGS.form_error))
+    beyond = fitted(('motor.gain',), 16000.0 * (1.0 - 3.0 * SETTINGS.form_error))
+    assert rank([none, within], 0.0, DEFAULT)[0].hypothesis is none
+    assert rank([none, beyond], 0.0, DEFAULT)[0].hypothesis is beyond
 
 
 class Ends:
@@ -120,39 +126,41 @@ class Ends:
         self.ends = ends
         self.asked: list[tuple[str, ...]] = []
 
-    def polished(self, candidate: Candidate) -> Candidate:
-        return fitted(candidate.effects, min(self.ends[candidate.effects], candidate.cost))
+    def converged(self, hypothesis: Hypothesis) -> Hypothesis:
+        return fitted(hypothesis.effects, min(self.ends[hypothesis.effects], hypothesis.cost))
 
-    def without(self, candidate: Candidate, effect: str) -> Candidate:
-        rest = tuple(e for e in candidate.effects if e != effect)
+    def without(self, hypothesis: Hypothesis, effect: str) -> Hypothesis:
+        rest = tuple(e for e in hypothesis.effects if e != effect)
         self.asked.append(rest)
         return fitted(rest, self.ends[rest])
 
 
 def test_a_fit_of_the_offsets_that_got_stuck_raises_no_alarm() -> None:
     fits = Ends({(): 15990.0, ('a',): 16000.0})
-    candidates, end = doubted(fits, [fitted((), 16470.0), fitted(('a',), 16002.0)])
-    assert end.effects == best(candidates).effects == ()
+    hypotheses, end = backward_elimination(
+        fits, [fitted((), 16470.0), fitted(('a',), 16002.0)], DEFAULT)
+    assert end.effects == best(hypotheses, DEFAULT).effects == ()
     # others are as far from their ends as the best was: two
-    assert [c.cost for c in candidates] == [15992.0, 16002.0]
+    assert [c.cost for c in hypotheses] == [15992.0, 16002.0]
 
 
 def test_a_partner_that_only_helped_a_fit_along_is_let_go() -> None:
     fits = Ends({(): 90000.0, ('a',): 16030.0, ('b',): 89000.0, ('a', 'b'): 16030.0})
-    candidates, end = doubted(fits, [
-        fitted((), 106000.0), fitted(('a', 'b'), 16140.0), fitted(('a',), 19100.0)])
+    hypotheses, end = backward_elimination(fits, [
+        fitted((), 106000.0), fitted(('a', 'b'), 16140.0), fitted(('a',), 19100.0)], DEFAULT)
     assert end.effects == ('a',)
-    assert [c.effects for c in candidates] == [(), ('a', 'b'), ('a',)]
+    assert [c.effects for c in hypotheses] == [(), ('a', 'b'), ('a',)]
 
 
 def test_a_weak_effect_that_is_there_stays() -> None:
     fits = Ends({(): 17400.0, ('a',): 16000.0})
-    candidates, end = doubted(fits, [fitted((), 17500.0), fitted(('a',), 16000.0)])
+    hypotheses, end = backward_elimination(
+        fits, [fitted((), 17500.0), fitted(('a',), 16000.0)], DEFAULT)
     assert fits.asked == [()]
-    assert end.effects == best(candidates).effects == ('a',)
+    assert end.effects == best(hypotheses, DEFAULT).effects == ('a',)
 
 
 def test_a_strong_effect_is_not_doubted() -> None:
     fits = Ends({('a',): 16000.0})
-    doubted(fits, [fitted((), 160000.0), fitted(('a',), 16000.0)])
+    backward_elimination(fits, [fitted((), 160000.0), fitted(('a',), 16000.0)], DEFAULT)
     assert not fits.asked

@@ -26,13 +26,12 @@ import math
 from pathlib import Path
 
 from antenna_drive import cli
-from antenna_drive.diagnosis import verdict
-from antenna_drive.diagnosis.least_squares import Problem
-from antenna_drive.diagnosis.search import Search
+from antenna_drive.diagnosis import rank_hypotheses
 from antenna_drive.machines.servo import refit as servo_refit
 from antenna_drive.machines.servo.bam import read_bam
 from antenna_drive.machines.servo.catalogue import BASE, catalogue, number, NUMBERS, TIED, vector
-from antenna_drive.machines.servo.machine import FIRMWARE, ServoModel, ServoTest
+from antenna_drive.machines.servo.log import FIRMWARE, ServoLog
+from antenna_drive.machines.servo.machine import ServoMachine
 from antenna_drive.machines.servo.physics import GRAVITY, ORDER
 from antenna_drive.machines.servo.rounds import Effort, folds, lacking, numbers
 from antenna_drive.machines.servo.study import compared, Direction, directions, summed
@@ -56,7 +55,7 @@ def goal_of(name: str, time: FloatArray) -> FloatArray:
 
 
 def made(kp: float, name: str, seconds: float = 3.0, *, delay: float = 0.0,
-         load_friction: float = 0.0, sag: float = 0.0, offset: float = 0.0) -> ServoTest:
+         load_friction: float = 0.0, sag: float = 0.0, offset: float = 0.0) -> ServoLog:
     """Return the log of a servo with known numbers and perhaps one effect."""
     firmware = FIRMWARE['xl330']
     gain = kp * firmware.error_gain
@@ -109,17 +108,17 @@ def made(kp: float, name: str, seconds: float = 3.0, *, delay: float = 0.0,
         np.round((position - past) / 0.04 / firmware.rate_step) * firmware.rate_step,
         np.round(np.clip(gain * (late - position), -1.0, 1.0) * firmware.duty_count)
         / firmware.duty_count])
-    return ServoTest(f'{name} {kp:g}', kp, name, MASS, LENGTH, gain, SUPPLY, firmware, time,
-                     goal, np.ones(time.size), np.full(time.size, 25.0), measured)
+    return ServoLog(f'{name} {kp:g}', kp, name, MASS, LENGTH, gain, SUPPLY, firmware, time,
+                    goal, np.ones(time.size), np.full(time.size, 25.0), measured)
 
 
 @pytest.fixture(scope='module')
-def plain_tests() -> list[ServoTest]:
+def plain_tests() -> list[ServoLog]:
     """Return logs of a servo that is as the base model has it."""
     return [made(200.0, 'sweep'), made(600.0, 'mixed')]
 
 
-def log_of(test: ServoTest, path: Path) -> None:
+def log_of(test: ServoLog, path: Path) -> None:
     """Write a log as the BAM project does."""
     entries = [{'timestamp': t, 'position': p, 'speed': s, 'load': int(round(d * 885.0)) % 65536,
                 'input_volts': SUPPLY, 'temp': 25, 'goal_position': g, 'torque_enable': True}
@@ -131,7 +130,7 @@ def log_of(test: ServoTest, path: Path) -> None:
 
 
 def test_the_true_numbers_give_the_course_of_the_other_integrator(
-        plain_tests: list[ServoTest]) -> None:
+        plain_tests: list[ServoLog]) -> None:
     # what is left is the resolution, a quarter of a count on the mean
     assert servo_refit.error(plain_tests, TRUTH) < 0.5e-3
     # and others do not
@@ -159,7 +158,7 @@ def drag(of: Mapping[str, float]) -> float:
 
 
 @pytest.mark.slow
-def test_a_refit_finds_the_numbers_of_the_servo(plain_tests: list[ServoTest]) -> None:
+def test_a_refit_finds_the_numbers_of_the_servo(plain_tests: list[ServoLog]) -> None:
     fit = servo_refit.refit(plain_tests, BASE, (), 2500)
     assert fit.error < 0.7e-3
     # motion tells the torque at stall and the drag, which back-EMF and friction share: of k_t, R
@@ -181,22 +180,21 @@ def test_the_generic_search_names_the_hidden_effect(hidden: str,
     tests = [made(kp, name, **effect) for kp, name in (
         (200.0, 'sweep'), (600.0, 'mixed'), (400.0, 'slow'))]
     # noise: the resolution, and what the model's coarse steps make of stops
-    model = ServoModel(tests, TRUTH, BASE, noise=[2e-3, 0.05, 0.01])
-    candidates = Search(Problem(model), lambda share, doing: None).run()
-    assert hidden in verdict.best(candidates).effects
-    alone = [c for c in candidates if c.effects == (hidden,)]
-    none = [c for c in candidates if not c.effects]
+    model = ServoMachine(tests, TRUTH, BASE, noise=[2e-3, 0.05, 0.01])
+    found = [answer.hypothesis for answer in rank_hypotheses(model).answers]
+    assert hidden in found[0].effects
+    alone = [h for h in found if h.effects == (hidden,)]
+    none = [h for h in found if not h.effects]
     assert alone[0].cost < 0.3 * none[0].cost
 
 
-def test_a_servo_without_effects_lacks_nothing(plain_tests: list[ServoTest]) -> None:
-    model = ServoModel(plain_tests, TRUTH, BASE, noise=[2e-3, 0.05, 0.01])
-    candidates = Search(Problem(model), lambda share, doing: None).run()
-    assert verdict.best(candidates).effects == ()
+def test_a_servo_without_effects_lacks_nothing(plain_tests: list[ServoLog]) -> None:
+    model = ServoMachine(plain_tests, TRUTH, BASE, noise=[2e-3, 0.05, 0.01])
+    assert rank_hypotheses(model).answers[0].hypothesis.effects == ()
 
 
-def test_the_model_keeps_to_the_protocol(plain_tests: list[ServoTest]) -> None:
-    model = ServoModel(plain_tests, TRUTH, BASE)
+def test_the_model_keeps_to_the_protocol(plain_tests: list[ServoLog]) -> None:
+    model = ServoMachine(plain_tests, TRUTH, BASE)
     everything = model.simulate([{}, {'delay': 0.01}])
     one = model.simulate([{'delay': 0.01}], [1])
     assert one[0][0] is None
@@ -210,18 +208,18 @@ def test_the_model_keeps_to_the_protocol(plain_tests: list[ServoTest]) -> None:
     assert np.isfinite(early[model.experiments[0].time <= 1.0]).all()
 
 
-def test_threads_change_no_figure(plain_tests: list[ServoTest]) -> None:
+def test_threads_change_no_figure(plain_tests: list[ServoLog]) -> None:
     points = [{}, {'delay': 0.01}, {'load_friction': 0.1}]
-    alone = ServoModel(plain_tests, TRUTH, BASE).simulate(points)
-    together = ServoModel(plain_tests, TRUTH, BASE, threads=2).simulate(points)
+    alone = ServoMachine(plain_tests, TRUTH, BASE).simulate(points)
+    together = ServoMachine(plain_tests, TRUTH, BASE, threads=2).simulate(points)
     for a, b in zip(alone, together, strict=True):
         for x, y in zip(a, b, strict=True):
             np.testing.assert_array_equal(x, y)
 
 
-def test_an_effect_that_is_there_is_no_candidate(plain_tests: list[ServoTest]) -> None:
+def test_an_effect_that_is_there_is_no_candidate(plain_tests: list[ServoLog]) -> None:
     values = {**TRUTH, 'load_friction': 0.1, 'ripple_cosine@8': 0.01, 'ripple_sine@8': 0.0}
-    model = ServoModel(plain_tests, values, tuple(values))
+    model = ServoMachine(plain_tests, values, tuple(values))
     assert 'gearbox.load_dependent_friction' not in model.effects
     assert 'motor.torque_ripple' not in model.effects  # the physics has one wave of each kind
     assert 'gearbox.position_dependent_friction' in model.effects
@@ -257,12 +255,12 @@ def test_the_ladders_simpler_models_are_parts_of_the_richer() -> None:
                     assert value == 0.0
 
 
-def grid() -> list[ServoTest]:
+def grid() -> list[ServoLog]:
     """Return four gains by three trajectories, of which only the names count."""
     log = made(100.0, 'slow', 1.0)
-    return [ServoTest(f'{name} {kp:g}', kp, name, log.mass, log.length,
-                      kp * log.firmware.error_gain, log.supply, log.firmware, log.time, log.goal,
-                      log.enabled, log.temperature, log.measured)
+    return [ServoLog(f'{name} {kp:g}', kp, name, log.mass, log.length,
+                     kp * log.firmware.error_gain, log.supply, log.firmware, log.time, log.goal,
+                     log.enabled, log.temperature, log.measured)
             for kp in (100.0, 200.0, 400.0, 800.0) for name in ('sweep', 'slow', 'mixed')]
 
 
@@ -288,7 +286,7 @@ def test_nothing_withheld_can_change_what_is_found() -> None:
     tests = [made(kp, name, 1.5, load_friction=0.2)
              for kp in (150.0, 400.0, 800.0) for name in ('sweep', 'mixed')]
     direction = Direction('gain', (150.0, 400.0))
-    spoilt = [t if t.kp < 800.0 else ServoTest(**{
+    spoilt = [t if t.kp < 800.0 else ServoLog(**{
         **vars(t), 'measured': np.zeros_like(t.measured)}) for t in tests]
     effort = Effort(60, 20)
     first, second = (compared(each, direction, effort) for each in (tests, spoilt))
@@ -381,7 +379,7 @@ def test_logs_that_cannot_serve_are_told_in_one_line(
 @pytest.mark.trial
 @pytest.mark.skipif(not LOGS.is_dir(), reason='the recordings of the servo are not here')
 def test_a_real_servos_diagnosis_beats_the_ladder_on_withheld_gains() -> None:
-    tests = [ServoTest.of(path.stem, read_bam(path)) for path in sorted(LOGS.glob('*.json'))]
+    tests = [ServoLog.of(path.stem, read_bam(path)) for path in sorted(LOGS.glob('*.json'))]
     result = compared(tests, Direction('gain', (100.0, 400.0)), Effort())
     errors = {name: model['withheld_mrad'] for name, model in result['models'].items()}
     ours = errors.pop('diagnosed')

@@ -21,7 +21,7 @@ from typing import Any
 
 from antenna_drive.machines.servo.bam import read_bam
 from antenna_drive.machines.servo.catalogue import catalogue, vector
-from antenna_drive.machines.servo.machine import ServoTest
+from antenna_drive.machines.servo.log import ServoLog
 from antenna_drive.machines.servo.physics import GRAVITY, swing
 from antenna_drive.machines.servo.refit import error, LADDER
 import numpy as np
@@ -204,8 +204,8 @@ def test_every_effect_acts_on_some_course_and_none_is_there_at_nought(effect: st
         return np.array(outs)
 
     for form in catalogue()[effect].forms:
-        absent = {p.name: p.start if p.shape else 0.0 for p in form.parameters}
-        there = {p.name: p.start if p.shape else 0.5 * p.high for p in form.parameters}
+        absent = {p.name: p.start if p.is_shape else 0.0 for p in form.parameters}
+        there = {p.name: p.start if p.is_shape else 0.5 * p.high for p in form.parameters}
         np.testing.assert_array_equal(swung(absent), swung({}))
         assert float(np.abs(swung(there) - swung({})).max()) > 1e-4, form.name
 
@@ -231,6 +231,6 @@ def test_the_peers_own_parameters_give_the_peers_own_figure() -> None:
         'stribeck_rate': 0.11532863880939243, 'stribeck_shape': 1.000022697315946,
         'viscous_friction': 0.0185448141303962, 'delay': 0.0}
     assert set(values) == set(LADDER['m6'])
-    tests = [ServoTest.of(path.stem, read_bam(path)) for path in sorted(LOGS.glob('*.json'))]
+    tests = [ServoLog.of(path.stem, read_bam(path)) for path in sorted(LOGS.glob('*.json'))]
     assert len(tests) == 16
     assert 1e3 * error(tests, values) == pytest.approx(74.1, abs=2.0)

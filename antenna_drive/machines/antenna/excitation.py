@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import math
 from typing import Protocol
 
-from antenna_drive.diagnosis.machine import FloatArray
+from antenna_drive.diagnosis import FloatArray
 from antenna_drive.emulator import batch
 from antenna_drive.recording import sheet as sheets
 import numpy as np

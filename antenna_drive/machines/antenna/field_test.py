@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import math
 from typing import Any
 
-from antenna_drive.diagnosis.machine import FloatArray
+from antenna_drive.diagnosis import FloatArray
 from antenna_drive.errors import UserError
 from antenna_drive.machines.antenna.excitation import Bias, Command, RecordedCommand, SheetCommand
 from antenna_drive.machines.antenna.sensors import jitter_of, Sensors

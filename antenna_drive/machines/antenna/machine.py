@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The antenna drive of a configuration, in the tests that were recorded, for a diagnosis."""
+"""The antenna drive of a configuration, in the tests that were recorded, as a `Machine`."""
 
 from __future__ import annotations
 
@@ -22,62 +22,66 @@ import copy
 from dataclasses import dataclass, replace
 import math
 from threading import Lock
-from typing import Any
 
-from antenna_drive.diagnosis.machine import (
-    Effect, Entry, Experiment, FloatArray, Form, Input, Motion, Parameter, Point,
+from antenna_drive.diagnosis import (
+    Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Motion, Parameter,
+    Point, Regimes, TimeScales,
 )
 from antenna_drive.emulator import batch
-from antenna_drive.machines.antenna import catalogue
-from antenna_drive.machines.antenna.catalogue import ADD, DriveEntry, DriveParameter, SCALE, Wave
+from antenna_drive.machines.antenna import gust
+from antenna_drive.machines.antenna.catalogue import catalogue, EXTRA_MODE
+from antenna_drive.machines.antenna.disturbances import DISTURBANCES, DriveDisturbance
 from antenna_drive.machines.antenna.excitation import (
     Bias, Longest, schedule, with_bias, with_torque,
 )
 from antenna_drive.machines.antenna.field_test import (
-    BIAS, CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, prepared, TACH_1, TACH_2, UNITS,
+    CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, prepared, TACH_1, TACH_2, UNITS,
+)
+from antenna_drive.machines.antenna.modifiers import (
+    ADD, AntennaParameter, change, Modifier, ReadingModifier, Readings, RunModifier, RunSetup,
 )
 from antenna_drive.machines.antenna.sensors import digit_of
-from antenna_drive.machines.antenna.tolerances import CLOCK, offsets, SUPPLY, ZERO
+from antenna_drive.machines.antenna.tolerances import nuisances, starting_places
 from antenna_drive.machines.antenna.wave_orders import likely_orders
+from antenna_drive.machines.antenna.waves import Wave
 from antenna_drive.parameters.records import place_of
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.recording import Recording
 import numpy as np
-from scipy.interpolate import CubicSpline
 
+_TIME_SCALES = TimeScales(start_s=1.5, scan_s=8.0, pulse_s=0.15, response_s=1.5, block_s=1.0)
 LONGEST_STEP = 2.5e-3
-# A search looks at so much of a test [s]; it and derivatives take longer steps, whose error is a
-# tenth of the noise.
-BRIEF_S = 15.0
-ROUGH_STEP = 5.3e-3
-# A wave of the motors' angle turns by no more than this in a step [rad], however short [s].
+# A search looks at this much of a test [s]. It and derivatives take longer steps, whose error is
+# a tenth of the noise.
+TRUNCATED_S = 15.0
+LOW_FIDELITY_STEP = 5.3e-3
+# A wave of the motors' angle turns by at most this much in a step [rad], down to a shortest
+# step [s].
 WAVE_STEP = 0.9
 SHORTEST_STEP = 7e-4
-# An encoder's digit is another than the sheet's if it is so many times as large.
+# An encoder's digit differs from the sheet's if it is larger by this factor.
 COARSER = 1.3
-# How many cycles per revolution are tried of each wave.
-_WAVES = 3
-# Hysteresis runs in faster than long steps can follow.
+# Numbers of cycles per revolution that are tried of each wave.
+_ORDERS = 3
+# Hysteresis settles too fast for long steps.
 _STIFF = ('hysteresis', 'hysteresis_share')
-# The mode that the record has room for and the configuration has not.
-_EXTRA = 3
-_CACHE = 120
-# How many tables of steps are kept: a test has one for each bias voltage and each wave.
-_PLANS = 24
-# A gust's torque is smooth; within so much time it may be a straight line [s].
-_GUST_S = 0.02
+# Places inside the gap, as shares of half the gap, at which each motor may start.
+_STARTS = np.linspace(-0.95, 0.95, 13)
+# Runs that are kept, and tables of steps: a test has one for each bias voltage and each wave.
+_KEPT_RUNS = 120
+_KEPT_PLANS = 24
 
 
 @dataclass(frozen=True)
 class _Job:
-    """A run that is wanted: what acts on it, by name and value, and its end [s]."""
+    """A run that is wanted: the parameters that act on it, by name and value, and its end [s]."""
 
     experiment: int
     items: tuple[tuple[str, float], ...]
     until: float
 
 
-class DriveModel:
+class AntennaMachine(Machine):
     """
     The antenna drive of a configuration, in the tests that were recorded.
 
@@ -98,82 +102,74 @@ class DriveModel:
 
     """
 
+    disturbance_inputs: Sequence[DisturbanceInput] = DISTURBANCES
+    time_scales = _TIME_SCALES
+
     def __init__(self, recordings: Mapping[str, Recording], drive: Drive, threads: int = 2,
                  tolerance: float = 0.02) -> None:
-        """Prepare the tests and find the sensors' noise from a first run."""
+        """Prepare the tests and take the sensors' noise from a first run."""
         self._executor = ThreadPoolExecutor(threads)
-        self._cache: OrderedDict[_Job, FloatArray] = OrderedDict()
+        self._runs: OrderedDict[_Job, FloatArray] = OrderedDict()
+        self._plans: OrderedDict[tuple[int, Longest, Bias], batch.Schedule] = OrderedDict()
         self._lock = Lock()
         self._longest_step = LONGEST_STEP
-        self._rougher: DriveModel | None = None
-        self.notes: list[str] = []
-        self.runs = 0
-        self._tests = [prepared(name, recording, drive, self.notes.append)
+        self._low_fidelity: AntennaMachine | None = None
+        self.run_count = 0
+        notes: list[str] = []
+        self._tests = [prepared(name, recording, drive, notes.append)
                        for name, recording in recordings.items()]
-        self._plans: OrderedDict[tuple[int, Longest, Bias], batch.Schedule] = OrderedDict()
         for test in self._tests:
-            test.record['plant']['axis']['mode_frequencies'][0, _EXTRA] = 1.0
+            test.record['plant']['axis']['mode_frequencies'][0, EXTRA_MODE] = 1.0
         given = [recording.sheet.parameter_tolerance for recording in recordings.values()
                  if recording.sheet.parameter_tolerance is not None]
         if not given:
-            self.notes.append(f'no sheet gives parameter_tolerance: {tolerance:g} assumed')
+            notes.append(f'no sheet gives parameter_tolerance: {tolerance:g} assumed')
+        self.notes = notes
         self.tolerance = max(given, default=tolerance)
-        self.effects: dict[str, Effect] = catalogue.catalogue()
-        gust = self.effects[catalogue.GUST]
-        self.effects[gust.id] = replace(gust, forms=(catalogue.gust_form(
-            [float(test.time[-1]) for test in self._tests]),))
         self._digit = _coarser_digit(self._tests)
-        if self._digit:
-            coarse = self.effects[catalogue.QUANTISATION]
-            self.effects[coarse.id] = replace(
-                coarse, forms=(catalogue.quantisation_form(self._digit),))
-        self.nuisances = offsets(self._tests, self.tolerance)
-        self.effects = {key: _tolerated(effect, self.nuisances)
-                        for key, effect in self.effects.items()}
-        self._by_name: dict[str, DriveParameter] = {}
-        self._waves: dict[str, tuple[Wave, int]] = {}
-        for item in (*self.nuisances, *(p for effect in self.effects.values()
-                                        for form in effect.forms for p in form.parameters)):
-            assert isinstance(item, DriveParameter)
-            self._by_name[item.name] = item
-        kind = self._tests[0].record.dtype
-        # where in the record those act that change numbers of it and nothing else
-        self._places = {name: tuple(place_of(kind, path) for path in item.fields)
-                        for name, item in self._by_name.items()
-                        if item.fields and not item.reading
-                        and not name.startswith(catalogue.GUST)}
+        tolerances = nuisances(self._tests, self.tolerance)
+        effects = catalogue([float(test.time[-1]) for test in self._tests], self._digit)
+        # the nuisance that changes the same number in the same way, by field
+        self._tolerance_of = {(item.modifier.fields[0], item.modifier.how): item
+                              for item in tolerances
+                              if item.experiment is None and item.modifier.fields}
+        # parameters are looked up by name: a point is plain numbers
+        self._modifiers: dict[str, AntennaParameter] = {}
+        super().__init__((), tolerances, [
+            _tolerated(effect, tolerances) for effect in effects.values()])
+        for item in (*tolerances, *(p for effect in effects.values()
+                                    for form in effect.forms for p in form.parameters)):
+            self._register(item)
         self.experiments = self._experiments({})
+
+    def _register(self, item: Parameter) -> None:
+        assert isinstance(item, AntennaParameter)
+        self._modifiers[item.name] = item
 
     def _experiments(self, point: Point) -> tuple[Experiment, ...]:
         """Return the tests, with the noise of readings that move as at a point."""
         found = []
         for k, test in enumerate(self._tests):
             out = self._run(self._job(k, point, math.inf))
-            # what the model lacks may be steeper than anything in it: the readings tell
+            # the machine may move faster than the model without effects: the readings tell
             slope = np.fmax(np.abs(out[:, :, 1]), np.abs(test.slope))
             noise = test.sensors.noise(out[:, :, 0], slope, test.jitter)
             found.append(Experiment(test.name, test.time, tuple(CHANNELS.values()), UNITS,
-                                    test.measured, noise, coarse=('encoder',)))
+                                    test.measured, noise, quantised=('encoder',)))
         return tuple(found)
 
-    def heard_at(self, point: Point) -> DriveModel:
-        """Return the model with the noise of readings that move as at a point."""
+    # -- variants of the machine ---------------------------------------------------------------
+
+    def with_noise_at(self, point: Point) -> AntennaMachine:
+        """Return the machine with the noise of readings that move as at a point."""
         other = copy.copy(self)
         other.experiments = self._experiments(point)
         return other
 
-    def _in_rough_steps(self) -> DriveModel:
-        """Return the model with longer steps, and so with runs and tables of steps of its own."""
-        other = copy.copy(self)
-        other._cache = OrderedDict()
-        other._plans = OrderedDict()
-        other._longest_step = ROUGH_STEP
-        return other
-
-    def brief(self) -> DriveModel:
-        """Return the model with as much of each test as a search needs; a chirp stays whole."""
-        other = self._in_rough_steps()
-        other._tests = [test.until(BRIEF_S if test.repeats else math.inf)
+    def truncated(self) -> AntennaMachine:
+        """Return the machine with the first part of each test; a chirp stays whole."""
+        other = self._with_long_steps()
+        other._tests = [test.until(TRUNCATED_S if test.repeats else math.inf)
                         for test in self._tests]
         sizes = [test.time.size for test in other._tests]
         other.experiments = tuple(
@@ -181,174 +177,175 @@ class DriveModel:
             for n, e in zip(sizes, self.experiments, strict=True))
         return other
 
-    def rough(self) -> DriveModel:
-        """Return the model with the longer steps that do for derivatives."""
-        if self._longest_step >= ROUGH_STEP:
+    def low_fidelity(self) -> AntennaMachine:
+        """Return the machine with longer steps."""
+        if self._longest_step >= LOW_FIDELITY_STEP:
             return self
-        if self._rougher is None:
-            self._rougher = self._in_rough_steps()
-        return self._rougher
+        if self._low_fidelity is None:
+            self._low_fidelity = self._with_long_steps()
+        return self._low_fidelity
 
-    def motion(self, experiment: int) -> Motion:
-        """Return how the machine moved in an experiment: as measured, else as simulated."""
-        measured_there = self.experiments[experiment].measured
-        predicted = self.simulate([{}], [experiment])[0][experiment]
-        assert predicted is not None
+    def _with_long_steps(self) -> AntennaMachine:
+        other = copy.copy(self)
+        other._runs = OrderedDict()
+        other._plans = OrderedDict()
+        other._longest_step = LOW_FIDELITY_STEP
+        return other
+
+    # -- what it knows of its motion -----------------------------------------------------------
+
+    def regimes(self, experiment: int) -> Regimes:
+        """Return the regime of motion of each sample."""
+        return self._motion(experiment).regimes()
+
+    def covariates(self, experiment: int) -> Mapping[str, FloatArray]:
+        """Return rate, direction, load, angle, time and acceleration."""
+        return self._motion(experiment).covariates()
+
+    def _motion(self, experiment: int) -> Motion:
+        """Return the motion in an experiment, as measured or else as simulated."""
+        recorded = self.experiments[experiment]
+        predicted = self.predict({}, experiment)
 
         def signal(c: int) -> FloatArray:
-            measured = measured_there[:, c]
+            measured = recorded.measured[:, c]
             return np.where(np.isfinite(measured), measured, predicted[:, c])
 
-        test = self._tests[experiment]
-        return Motion(rate=0.5 * (signal(TACH_1) + signal(TACH_2)),
+        limit = float(self._tests[experiment].record['motor_1']['motor']['current_limit'][0])
+        return Motion(recorded.time, rate=0.5 * (signal(TACH_1) + signal(TACH_2)),
                       load=signal(CURRENT_1) + signal(CURRENT_2), angle=signal(ENCODER),
-                      limit=float(test.record['motor_1']['motor']['current_limit'][0]))
+                      load_limit=2.0 * limit)
+
+    def initial_conditions(self, experiment: int) -> Sequence[Point]:
+        """Return starting places of both motors inside their gaps."""
+        first, second = (item.name for item in starting_places(
+            experiment, self._tests[experiment]))
+        return [{first: float(a), second: float(b)} for a in _STARTS for b in _STARTS]
 
     # -- effects -------------------------------------------------------------------------------
 
     def forms(self, effect: Effect, residuals: Sequence[FloatArray]) -> Sequence[Form]:
-        """Return an effect's forms; those of a wave with the likeliest cycles per revolution."""
+        """Return an effect's forms; those of a wave with its likeliest orders."""
         found: list[Form] = []
         for form in effect.forms:
-            if not isinstance(form, Wave):
+            if isinstance(form, Wave):
+                found += [self._wave_at(form, order) for order in likely_orders(
+                    form, self.experiments, residuals, _ORDERS)]
+            else:
                 found.append(form)
-                continue
-            for order in likely_orders(form, self.experiments, residuals, _WAVES):
-                wave = form.at(order)
-                self.register(wave)
-                found.append(wave)
         return found
+
+    def typical_form(self, effect: Effect) -> Form:
+        """Return the first form of an effect; of a wave, one of a middle order."""
+        form = effect.forms[0]
+        if isinstance(form, Wave):
+            return self._wave_at(form, form.orders[min(11, len(form.orders) - 1)])
+        return form
 
     def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
-        """Return the form of an effect's part that is like a form of the effect."""
+        """Return the form of an effect's part that corresponds to a form of the effect."""
         if not isinstance(form, Wave):
             return part.forms[effect.forms.index(form)]
-        found = part.forms[0]
-        assert isinstance(found, Wave)
-        found = found.at(form.order)
-        self.register(found)
-        return found
+        wave = part.forms[0]
+        assert isinstance(wave, Wave)
+        return self._wave_at(wave, form.shape.order)
 
-    def register(self, wave: Wave) -> None:
-        """Make a wave's parameters known."""
-        for part, item in enumerate(wave.parameters):
-            assert isinstance(item, DriveParameter)
-            self._waves[item.name] = (wave, part)
-            self._by_name[item.name] = item
+    def _wave_at(self, form: Wave, order: float) -> Wave:
+        wave = form.at(order)
+        for item in wave.parameters:
+            self._register(item)
+        return wave
 
-    def absorbed(self, point: Point, gone: Point) -> dict[str, float]:
-        """Return the offsets that do as much as they can of what an effect did."""
+    def absorb(self, point: Point, removed: Point) -> dict[str, float]:
+        """Return the tolerances that take over what they can of an effect that is removed."""
         result = dict(point)
-        for name, value in gone.items():
-            item = self._by_name[name]
-            for path in item.fields:
-                offset = self._by_name.get(f'offset:{path}')
-                if offset is None or offset.name not in result or offset.how != item.how:
+        for name, value in removed.items():
+            modifier = self._modifiers[name].modifier
+            for path in modifier.fields:
+                tolerance = self._tolerance_of.get((path, modifier.how))
+                if tolerance is None or tolerance.name not in result:
                     continue
-                both = (result[offset.name] + value if item.how == ADD else
-                        (1.0 + result[offset.name]) * (1.0 + value) - 1.0)
-                result[offset.name] = min(max(both, offset.low), offset.high)
+                both = (result[tolerance.name] + value if modifier.how == ADD else
+                        (1.0 + result[tolerance.name]) * (1.0 + value) - 1.0)
+                result[tolerance.name] = min(max(both, tolerance.low), tolerance.high)
         return result
 
     # -- running -------------------------------------------------------------------------------
 
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return the readings of one experiment; see `Machine.predict`."""
+        found = self.simulate([point], [experiment])[0][experiment]
+        assert found is not None
+        return found
+
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
                  until: float = math.inf) -> list[list[FloatArray | None]]:
-        """Return what the sensors would have shown; see `Model.simulate`."""
+        """Return the readings of several variants; see `Machine.simulate`."""
         jobs: list[tuple[int, _Job, Point]] = []
         known: dict[_Job, FloatArray] = {}
         wanted: dict[_Job, None] = {}
         for i, (point, one) in enumerate(zip(points, only or [None] * len(points), strict=True)):
             for k in range(len(self._tests)) if one is None else (one,):
                 job = self._job(k, point, until)
-                # several threads use the cache: what it has now it may not have a moment later
-                out = self._cache.get(job)
+                # another thread may drop a run from the cache at any moment
+                out = self._runs.get(job)
                 if out is None:
                     wanted[job] = None
                 else:
                     known[job] = out
                 jobs.append((i, job, point))
-        self.runs += len(wanted)
+        self.run_count += len(wanted)
         fresh = dict(zip(wanted, self._executor.map(self._run, wanted), strict=True))
         results: list[list[FloatArray | None]] = [[None] * len(self._tests) for _ in points]
         for i, job, point in jobs:
             out = known[job] if job in known else fresh[job]
             results[i][job.experiment] = self._read(job.experiment, out, point)
         with self._lock:
-            self._cache.update(fresh)
-            while len(self._cache) > _CACHE:
-                self._cache.popitem(last=False)
+            self._runs.update(fresh)
+            while len(self._runs) > _KEPT_RUNS:
+                self._runs.popitem(last=False)
         return results
 
-    @property
-    def entries(self) -> Sequence[Entry]:
-        """Return where something unknown may enter."""
-        return catalogue.ENTRIES
-
-    def pushed(self, point: Point, entry: Entry, course: Input) -> list[FloatArray]:
-        """Return what the sensors would have shown; see `Model.pushed`."""
-        assert isinstance(entry, DriveEntry)
+    def simulate_disturbed(self, point: Point, place: DisturbanceInput,
+                           course: Course) -> list[FloatArray]:
+        """Return the readings with an unknown input; see `Machine.simulate_disturbed`."""
+        assert isinstance(place, DriveDisturbance)
 
         def run(k: int) -> FloatArray:
-            out = self._run(self._job(k, point, math.inf), (entry, course))
-            return self._read(k, out, point)
+            return self._read(k, self._run(self._job(k, point, math.inf), (place, course)), point)
 
         return list(self._executor.map(run, range(len(self._tests))))
 
     def _job(self, k: int, point: Point, until: float) -> _Job:
         """Return the run of one test at a point: what acts on readings alone is no part of it."""
-        items = sorted(point.items())
-        return _Job(k, tuple(item for item in items if not self._by_name[item[0]].reading
-                             and self._by_name[item[0]].experiment in (None, k)), until)
+        return _Job(k, tuple(item for item in sorted(point.items())
+                             if not self._modifiers[item[0]].on_readings
+                             and self._modifiers[item[0]].experiment in (None, k)), until)
 
-    def _run(self, job: _Job, push: tuple[DriveEntry, Input] | None = None) -> FloatArray:
+    def _run(self, job: _Job, disturbance: tuple[DriveDisturbance, Course] | None = None,
+             ) -> FloatArray:
         test = self._tests[job.experiment]
         kind = test.record.dtype
-        # as plain numbers: numpy copies a record field by field
-        numbers = test.record.view(np.float64).copy()
-        record = numbers.view(kind)
-        waves: dict[Wave, list[float]] = {}
-        gust: FloatArray | None = None
-        bias, delay = test.bias, 0.0
+        run = RunSetup(test.record.view(np.float64).copy(), kind, float(test.time[-1]), test.bias)
         for name, value in job.items:
-            places = self._places.get(name)
-            if places is not None:
-                for place in places:
-                    _change(numbers, place, self._by_name[name].how, value)
-            elif name in self._waves:
-                form, part = self._waves[name]
-                waves.setdefault(form, [0.0] * len(form.parameters))[part] = value
-            elif name == catalogue.DELAY:
-                delay = value
-            elif name.startswith(catalogue.GUST):
-                if gust is None:
-                    gust = np.zeros(catalogue.gust_knots(float(test.time[-1])))
-                knot = int(name.rpartition(':')[2])
-                if knot < gust.size:
-                    gust[knot] = value
-            elif name.startswith(SUPPLY):
-                bias = Bias(bias.before * (1.0 + value), bias.after * (1.0 + value), bias.at)
+            modifier = self._modifiers[name].modifier
+            assert isinstance(modifier, RunModifier)
+            modifier.apply(run, value)
+        record = run.numbers.view(kind)
         turns = 0.0
-        for form, values in waves.items():
-            for path, how, value in form.settings(*values):
-                _change(numbers, place_of(kind, path), how, value)
-            if form.angle != 'axis' and any(values):
-                turns = max(turns, form.order * float(record[form.angle]['gear_ratio'][0]))
+        for shape, parts in run.waves.items():
+            shape.set_fields(run, parts)
+            if shape.angle != 'axis' and any(parts):
+                turns = max(turns, shape.order * float(record[shape.angle]['gear_ratio'][0]))
         axis = record['plant']['axis']
-        if axis['mode_inertias'][0, _EXTRA] > 0.0:
-            axis['mode_inertias_count'] = _EXTRA + 1
-        torque = None
-        if gust is not None:
-            knots = catalogue.GUST_KNOT_S * np.arange(gust.size)
-            fine = np.arange(0.0, knots[-1] + _GUST_S, _GUST_S)
-            torque = (fine, CubicSpline(knots, gust)(fine))
+        if axis['mode_inertias'][0, EXTRA_MODE] > 0.0:
+            axis['mode_inertias_count'] = EXTRA_MODE + 1
         stiff = any(record[motor]['gearbox'][name][0] > 0.0
                     for motor in ('motor_1', 'motor_2') for name in _STIFF)
         longest = min(self._longest_step, LONGEST_STEP) if stiff else self._longest_step
-        plan = self._plan(job.experiment, bias, delay, torque, Longest(
-            longest, SHORTEST_STEP, WAVE_STEP, turns))
-        if push is not None:
-            plan = _with(plan, record, *push)
+        plan = self._plan(job.experiment, run, Longest(longest, SHORTEST_STEP, WAVE_STEP, turns))
+        if disturbance is not None:
+            plan = _disturbed(plan, run, *disturbance)
         samples = int(np.count_nonzero(test.time - test.time[0] < job.until))
         if samples == test.time.size:
             return batch.run(record, plan)
@@ -358,17 +355,16 @@ class DriveModel:
                                                          plan.keep[:steps + 1]))
         return out
 
-    def _plan(self, k: int, bias: Bias, delay: float,
-              torque: tuple[FloatArray, FloatArray] | None, longest: Longest) -> batch.Schedule:
+    def _plan(self, k: int, run: RunSetup, longest: Longest) -> batch.Schedule:
         """Return the steps of a run."""
         test = self._tests[k]
-        if delay:
-            plan = schedule(test.command, bias, test.time, longest, delay)
+        if run.delay:
+            plan = schedule(test.command, run.bias, test.time, longest, run.delay)
         else:
-            plan = self._kept((k, longest, bias), lambda: with_bias(self._kept(
+            plan = self._kept((k, longest, run.bias), lambda: with_bias(self._kept(
                 (k, longest, test.bias),
-                lambda: schedule(test.command, test.bias, test.time, longest)), bias))
-        return plan if torque is None else with_torque(plan, *torque)
+                lambda: schedule(test.command, test.bias, test.time, longest)), run.bias))
+        return plan if run.gust is None else with_torque(plan, *gust.course(run.gust))
 
     def _kept(self, key: tuple[int, Longest, Bias],
               made: Callable[[], batch.Schedule]) -> batch.Schedule:
@@ -378,63 +374,47 @@ class DriveModel:
             plan = made()
             with self._lock:
                 self._plans[key] = plan
-                while len(self._plans) > _PLANS:
+                while len(self._plans) > _KEPT_PLANS:
                     self._plans.popitem(last=False)
         return plan
 
     def _read(self, k: int, out: FloatArray, point: Point) -> FloatArray:
-        """Return the readings of a run: what sensors do that nothing feeds back."""
-        values = out[:, :, 0].copy()
-        shift = np.zeros(len(CHANNELS))
-        gain = np.ones(len(CHANNELS))
-        step = turn = 0.0
-        parts: list[float] = []
-        form: Wave | None = None
+        """Return the readings of a run, with the errors of sensors that nothing feeds back."""
+        readings = Readings(out[:, :, 0].copy(), out[:, :, 1])
         for name, value in point.items():
-            item = self._by_name[name]
-            if not item.reading or item.experiment not in (None, k) or not value:
-                continue
-            if name.startswith(CLOCK):
-                values += value * out[:, :, 1]
-            elif name.startswith(ZERO):
-                shift[_CHANNEL[name.split(':')[1]]] += value
-            elif name in self._waves:
-                form, part = self._waves[name]
-                parts = parts or [0.0] * len(form.parameters)
-                parts[part] = value
-            elif item.fields[0] == catalogue.DIGIT:
-                step = value
-            elif item.fields[0] == catalogue.TURN:
-                turn = value
-            else:
-                effect, _, what = item.fields[0].rpartition('.')
-                (gain if 'gain' in what else shift)[_METERS[effect]] += value
-        values *= gain
-        if form is not None:
-            values[:, ENCODER] += form.along(out[:, ENCODER, 0], parts)
-        values += shift
-        if step > 0.0 and self._digit:
+            item = self._modifiers[name]
+            if item.on_readings and item.experiment in (None, k) and value:
+                assert isinstance(item.modifier, ReadingModifier)
+                item.modifier.apply_to_readings(readings, value)
+        values, digit = readings.values, readings.digit
+        values *= readings.gain
+        for shape, parts in readings.waves.items():
+            values[:, ENCODER] += shape.along(out[:, ENCODER, 0], parts)
+        values += readings.zero
+        if digit > 0.0 and self._digit:
             # whatever lies within the digit that was read would have been read
-            read = self.experiments[k].measured[:, ENCODER] + turn * step
+            shift = readings.turn * digit
+            read = self.experiments[k].measured[:, ENCODER] + shift
             off = np.nan_to_num(values[:, ENCODER] - read)
-            values[:, ENCODER] -= np.clip(off, -0.5 * step, 0.5 * step) + turn * step
-        elif step > 0.0:
-            values[:, ENCODER] = step * np.floor(values[:, ENCODER] / step + 0.5)
+            values[:, ENCODER] -= np.clip(off, -0.5 * digit, 0.5 * digit) + shift
+        elif digit > 0.0:
+            values[:, ENCODER] = digit * np.floor(values[:, ENCODER] / digit + 0.5)
         return values
 
 
-def _tolerated(effect: Effect, offsets_known: Sequence[DriveParameter]) -> Effect:
+def _tolerated(effect: Effect, tolerances: Sequence[AntennaParameter]) -> Effect:
     """Return an effect whose parameters know by how much their numbers may be off anyway."""
-    may_be_off = {(path, item.how): item.high for item in offsets_known
-                  if item.experiment is None for path in item.fields}
+    allowed = {(path, item.modifier.how): item.high for item in tolerances
+               if item.experiment is None for path in item.modifier.fields}
 
-    def told(item: Parameter) -> Parameter:
-        assert isinstance(item, DriveParameter)
-        known = [may_be_off.get((path, item.how), 0.0) for path in item.fields]
-        return replace(item, tolerance=min(known, default=0.0))
+    def tolerated(item: Parameter) -> Parameter:
+        assert isinstance(item, AntennaParameter)
+        modifier: Modifier = item.modifier
+        return replace(item, tolerance=min(
+            (allowed.get((path, modifier.how), 0.0) for path in modifier.fields), default=0.0))
 
     return replace(effect, forms=tuple(
-        replace(form, parameters=tuple(told(p) for p in form.parameters))
+        replace(form, parameters=tuple(tolerated(p) for p in form.parameters))
         for form in effect.forms))
 
 
@@ -447,29 +427,12 @@ def _coarser_digit(tests: Sequence[FieldTest]) -> float:
     return digit if len(seen) == len(tests) and digit > COARSER * known else 0.0
 
 
-_CHANNEL = {name: c for c, name in enumerate(CHANNELS.values())}
-# Which channel a meter's errors act on, by where they are in the record.
-_METERS = {'motor_1.ammeter': CURRENT_1, 'motor_2.ammeter': CURRENT_2, 'plant.encoder': ENCODER,
-           'torque_share.circuit': BIAS}
-
-
-def _with(plan: batch.Schedule, record: np.ndarray[Any, np.dtype[Any]], entry: DriveEntry,
-          course: Input) -> batch.Schedule:
-    """Return a plan that lets an input into the drive, whose record is set up for it."""
-    numbers, kind = record.view(np.float64), record.dtype
-    for path, how, value in entry.settings:
-        _change(numbers, place_of(kind, path), how, value)
+def _disturbed(plan: batch.Schedule, run: RunSetup, place: DriveDisturbance,
+               course: Course) -> batch.Schedule:
+    """Return a plan that lets an input into the drive, and set the drive's record up for it."""
+    for path, how, value in place.settings:
+        change(run.numbers, place_of(run.kind, path), how, value)
     steps = plan.steps.copy()
     length = steps[:, batch.LENGTH]
-    steps[:, batch.CHANGE] = entry.size * course(np.cumsum(length) - 0.5 * length)
-    return batch.Schedule(steps, plan.keep, place_of(kind, entry.path))
-
-
-def _change(numbers: FloatArray, place: int, how: str, value: float) -> None:
-    """Change one number of a record."""
-    if how == SCALE:
-        numbers[place] *= 1.0 + value
-    elif how == ADD:
-        numbers[place] += value
-    else:
-        numbers[place] = value
+    steps[:, batch.CHANGE] = place.size * course(np.cumsum(length) - 0.5 * length)
+    return batch.Schedule(steps, plan.keep, place_of(run.kind, place.path))

@@ -18,7 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-from antenna_drive.diagnosis.machine import FloatArray
+from antenna_drive.diagnosis import FloatArray
 from antenna_drive.machines.antenna.excitation import Command, RecordedCommand
 from antenna_drive.recording import sheet as sheets
 import numpy as np

@@ -11,19 +11,21 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""What is no effect and must be fitted beside any: tolerances, places at the start, zeros."""
+"""The nuisances: tolerances of the machine, its initial conditions, zeros of the sensors."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 import math
 
-from antenna_drive.machines.antenna.catalogue import ADD, DriveParameter, SCALE
-from antenna_drive.machines.antenna.field_test import FieldTest
+from antenna_drive.machines.antenna.field_test import (
+    BIAS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, TACH_1, TACH_2,
+)
+from antenna_drive.machines.antenna.modifiers import (
+    add, AntennaParameter, ClockShift, Modifier, ReadingZero, scale, SupplyGain,
+)
 
-# What the names of those begin with that no field of the record holds.
-SUPPLY, CLOCK, ZERO = 'supply:', 'clock:', 'zero:'
-# What numbers of the machine the configuration knows only within the sheet's tolerance.
+# The numbers that the configuration knows only within the tolerance of the test sheet.
 TOLERANT_MOTOR = (
     'rate_command.k_s', 'rate_command.k_1', 'rate_command.tau_1', 'amplifier.rate_gain',
     'amplifier.integral_time', 'amplifier.lag', 'amplifier.current_feedback_gain',
@@ -45,60 +47,74 @@ TOLERANT_DRIVE = (
 )
 
 
-def offsets(tests: Sequence[FieldTest], tolerance: float) -> tuple[DriveParameter, ...]:
+def nuisances(tests: Sequence[FieldTest], tolerance: float) -> tuple[AntennaParameter, ...]:
     """
-    Return the offsets of a machine in its tests.
+    Return the nuisances of a machine in its tests.
 
     Parameters
     ----------
     tests
         that were made
     tolerance
-        by what share the machine's numbers may be other than configured
+        by what share the machine's numbers may differ from the configuration
 
     """
     return (*_of_the_machine(tests[0], tolerance),
             *(item for k, test in enumerate(tests) for item in _of_a_test(k, test, tolerance)))
 
 
-def _of_the_machine(test: FieldTest, tolerance: float) -> Iterator[DriveParameter]:
-    spread = tolerance / math.sqrt(3.0)
+def _within(name: str, unit: str, half_width: float, modifier: Modifier,
+            experiment: int | None = None) -> AntennaParameter:
+    """Return a number that is spread evenly within a tolerance."""
+    return AntennaParameter(name, unit, -half_width, half_width, 0.3 * half_width,
+                            half_width / math.sqrt(3.0), experiment=experiment,
+                            modifier=modifier)
 
-    def scaled(name: str, *fields: str) -> DriveParameter:
-        return DriveParameter(f'offset:{name}', '1', -tolerance, tolerance, 0.3 * tolerance,
-                              spread, how=SCALE, fields=fields or (name,))
+
+def _of_the_machine(test: FieldTest, tolerance: float) -> Iterator[AntennaParameter]:
+    def relative(name: str, *others: str) -> AntennaParameter:
+        return _within(f'offset:{name}', '1', tolerance, scale(name, *others))
 
     for motor in ('motor_1', 'motor_2'):
         for name in TOLERANT_MOTOR:
-            yield scaled(f'{motor}.{name}')
+            yield relative(f'{motor}.{name}')
         # a motor's magnets make its torque and its back-EMF
-        yield scaled(f'{motor}.motor.torque_constant', f'{motor}.motor.torque_constant',
-                     f'{motor}.armature.back_emf_share')
-        yield scaled(f'{motor}.armature.back_emf_constant')
-        # its amplifier is made for the resistance that the winding should have
+        yield relative(f'{motor}.motor.torque_constant', f'{motor}.armature.back_emf_share')
+        yield relative(f'{motor}.armature.back_emf_constant')
+        # the amplifier is made for the resistance that the winding should have
         ohms = tolerance * float(test.record[motor]['armature']['resistance'][0])
         path = f'{motor}.armature.resistance_change'
-        yield DriveParameter(f'offset:{path}', 'ohm', -ohms, ohms, 0.3 * ohms,
-                             ohms / math.sqrt(3.0), how=ADD, fields=(path,))
+        yield _within(f'offset:{path}', 'ohm', ohms, add(path))
     for name in TOLERANT_DRIVE:
-        yield scaled(name)
+        yield relative(name)
 
 
-def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[DriveParameter]:
-    for motor in ('motor_1', 'motor_2'):
-        yield DriveParameter(f'start:{test.name}.{motor}', '1', -1.0, 1.0, 0.05, 0.6,
-                             experiment=k, how=ADD, fields=(f'{motor}.start_in_gap',))
+def starting_places(k: int, test: FieldTest) -> tuple[AntennaParameter, ...]:
+    """Return where in its gap each motor starts in test k, as a share of half the gap."""
+    return tuple(AntennaParameter(
+        f'start:{test.name}.{motor}', '1', -1.0, 1.0, 0.05, 0.6, experiment=k,
+        modifier=add(f'{motor}.start_in_gap')) for motor in ('motor_1', 'motor_2'))
+
+
+def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaParameter]:
+    yield from starting_places(k, test)
     if test.record['torque_share']['circuit']['bias_source'][0] == 1:
-        yield DriveParameter(f'{SUPPLY}{test.name}', '1', -tolerance, tolerance, 0.3 * tolerance,
-                             tolerance / math.sqrt(3.0), experiment=k, how=SCALE)
-    yield DriveParameter(f'{CLOCK}{test.name}', 's', -0.01, 0.01, 1e-4, 1e-3, experiment=k,
-                         reading=True)
-    yield DriveParameter(f'{ZERO}encoder:{test.name}', 'rad', -4e-5, 4e-5, 2e-6, 1e-5,
-                         experiment=k, reading=True)
+        yield _within(f'supply:{test.name}', '1', tolerance, SupplyGain(), k)
+    yield AntennaParameter(f'clock:{test.name}', 's', -0.01, 0.01, 1e-4, 1e-3, experiment=k,
+                           on_readings=True, modifier=ClockShift())
+
+    def zero(channel: int, name: str, unit: str, half_width: float, step: float,
+             sigma: float) -> AntennaParameter:
+        return AntennaParameter(f'zero:{name}:{test.name}', unit, -half_width, half_width, step,
+                                sigma, experiment=k, on_readings=True,
+                                modifier=ReadingZero(channel))
+
+    yield zero(ENCODER, 'encoder', 'rad', 4e-5, 2e-6, 1e-5)
     sensors = test.sensors
-    for name, unit, noise in (
-            ('current_1', 'A', sensors.current_noise), ('current_2', 'A', sensors.current_noise),
-            ('tach_1', 'rad/s', sensors.tach_noise), ('tach_2', 'rad/s', sensors.tach_noise),
-            ('bias_voltage', 'V', sensors.bias_noise)):
-        yield DriveParameter(f'{ZERO}{name}:{test.name}', unit, -2.0 * noise, 2.0 * noise, noise,
-                             0.7 * noise, experiment=k, reading=True)
+    for channel, name, unit, noise in (
+            (CURRENT_1, 'current_1', 'A', sensors.current_noise),
+            (CURRENT_2, 'current_2', 'A', sensors.current_noise),
+            (TACH_1, 'tach_1', 'rad/s', sensors.tach_noise),
+            (TACH_2, 'tach_2', 'rad/s', sensors.tach_noise),
+            (BIAS, 'bias_voltage', 'V', sensors.bias_noise)):
+        yield zero(channel, name, unit, 2.0 * noise, noise, 0.7 * noise)

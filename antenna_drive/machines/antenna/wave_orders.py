@@ -17,9 +17,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from antenna_drive.diagnosis.machine import Experiment, FloatArray
-from antenna_drive.machines.antenna.catalogue import Wave
+from antenna_drive.diagnosis import Experiment, FloatArray
 from antenna_drive.machines.antenna.field_test import CURRENT_1, CURRENT_2, ENCODER, TACH_1
+from antenna_drive.machines.antenna.waves import Wave
 import numpy as np
 from scipy.ndimage import median_filter
 
@@ -63,7 +63,7 @@ def likely_orders(form: Wave, experiments: Sequence[Experiment],
     while len(found) < count and any(ranks):
         rank = ranks[len(found) % 2] or ranks[0]
         order = float(orders[rank.pop(0)])
-        near = form.angle == 'axis' and any(abs(np.log(order / f)) < 0.15 for f in found)
+        near = form.shape.angle == 'axis' and any(abs(np.log(order / f)) < 0.15 for f in found)
         if order not in found and not near:
             found.append(order)
     return found
@@ -75,16 +75,16 @@ def _scores(form: Wave, experiment: Experiment, residual: FloatArray,
     clean = np.nan_to_num(residual / experiment.noise)
     time = experiment.time
     score = np.zeros(orders.size)
-    if form.angle == 'axis':
+    if form.shape.angle == 'axis':
         angle = np.nan_to_num(experiment.measured[:, ENCODER])
-        if form.stem == 'cyclic_error':
+        if form.shape.stem == 'cyclic_error':
             return _power(clean[:, ENCODER], angle, orders)
         rate = np.gradient(angle, time)
         moving = np.abs(rate) > 0.1 * np.abs(rate).max()
         return _power((clean[:, CURRENT_1] + clean[:, CURRENT_2]) * np.sign(rate) * moving,
                       angle, orders)
     windows = (time / _WINDOW_S).astype(int)
-    for path in form.paths:
+    for path in form.shape.paths:
         m = int(path.partition('.')[0][-1]) - 1
         rate = np.nan_to_num(experiment.measured[:, TACH_1 + m])
         angle = np.r_[0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time))]

@@ -27,7 +27,7 @@ import math
 from types import MappingProxyType
 from typing import Final
 
-from antenna_drive.diagnosis.machine import Effect, FloatArray, Form, Parameter
+from antenna_drive.diagnosis import Effect, FloatArray, Form, Parameter
 from antenna_drive.machines.servo.physics import ORDER, UNITS
 import numpy as np
 
@@ -181,7 +181,7 @@ def parameter(name: str) -> Parameter:
     """Return a number of an absent effect as a parameter: nought, or its shape's start."""
     item = number(name)
     return Parameter(name, unit(name), item.low, item.high, item.step,
-                     start=item.start if item.shape else 0.0, shape=item.shape)
+                     start=item.start if item.shape else 0.0, is_shape=item.shape)
 
 
 def _form(name: str, *numbers: str) -> Form:
@@ -190,7 +190,7 @@ def _form(name: str, *numbers: str) -> Form:
 
 def _waves(kind: str) -> tuple[Form, ...]:
     return tuple(replace(_form(f'{cycles} cycles', f'{kind}_cosine@{cycles}',
-                               f'{kind}_sine@{cycles}'), sought=True) for cycles in CYCLES)
+                               f'{kind}_sine@{cycles}'), scanned=True) for cycles in CYCLES)
 
 
 def catalogue(without: Iterable[str] = ()) -> dict[str, Effect]:

@@ -25,7 +25,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from antenna_drive.machines.servo.catalogue import BASE, number, vector
-from antenna_drive.machines.servo.machine import ServoTest
+from antenna_drive.machines.servo.log import ServoLog
 import cma
 import numpy as np
 
@@ -68,7 +68,7 @@ class Fit:
     error: float
 
 
-def error(tests: Sequence[ServoTest], values: Values) -> float:
+def error(tests: Sequence[ServoLog], values: Values) -> float:
     """Return the mean over tests of the mean absolute position error of free runs [rad]."""
     row = vector(values)
     return float(np.mean([test.error(row) for test in tests]))
@@ -96,7 +96,7 @@ def begun(names: Sequence[str], known: Values | None = None) -> dict[str, float]
     return values
 
 
-def refit(tests: Sequence[ServoTest], names: Sequence[str], begins: Sequence[Values],
+def refit(tests: Sequence[ServoLog], names: Sequence[str], begins: Sequence[Values],
           runs: int, seed: int = 1) -> Fit:
     """
     Fit numbers to tests.
@@ -123,13 +123,13 @@ def refit(tests: Sequence[ServoTest], names: Sequence[str], begins: Sequence[Val
     return _searched(tests, names, best.values, CLOSE, runs - share * len(starts), seed)
 
 
-def nearby(tests: Sequence[ServoTest], names: Sequence[str], start: Values, runs: int,
+def nearby(tests: Sequence[ServoLog], names: Sequence[str], start: Values, runs: int,
            seed: int = 1) -> Fit:
     """Fit numbers to tests in the neighbourhood of where they are; see `refit`."""
     return _searched(tests, names, begun(names, start), 0.5 * NEAR, runs, seed)
 
 
-def _searched(tests: Sequence[ServoTest], names: Sequence[str], start: Values, spread: float,
+def _searched(tests: Sequence[ServoLog], names: Sequence[str], start: Values, spread: float,
               runs: int, seed: int) -> Fit:
     """Search with CMA-ES; what it ends with is never worse than the start."""
     items = [number(name) for name in names]

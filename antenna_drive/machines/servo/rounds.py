@@ -12,13 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-What a servo's model lacks, one effect after the other, each judged on withheld tests.
+What a servo's model lacks: forward selection of effects, judged by cross-validation.
 
-Begun from a motor with Coulomb and viscous friction alone. In each round the numbers so far are
-fitted, the generic search ranks what could be added, and the likeliest are tried out: fitted to
-a part of the tests and judged on the rest, each test withheld once. The best stays if it lowers
-that error by more than its price; what it makes superfluous goes; when nothing is worth its
-price the search is over. Nothing but the given tests takes part in any choice.
+The search starts from a motor with Coulomb and viscous friction. In each round the numbers are
+fitted, the engine ranks the effects that could be added, and the likeliest are tried: fitted to a
+part of the logs and judged on the rest, so that each log is withheld once. The best is added if
+it lowers the withheld error by more than its price. Effects that it makes superfluous are
+removed. The search ends when no effect is worth its price. No other log takes part in any choice.
 """
 
 from __future__ import annotations
@@ -27,12 +27,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from antenna_drive.diagnosis import verdict
-from antenna_drive.diagnosis.least_squares import Problem
-from antenna_drive.diagnosis.search import Candidate, Search
+from antenna_drive.diagnosis import Hypothesis, LeastSquares, rank_hypotheses
 from antenna_drive.machines.servo import refit as servo_refit
 from antenna_drive.machines.servo.catalogue import BASE, catalogue, vector
-from antenna_drive.machines.servo.machine import ServoModel, ServoTest
+from antenna_drive.machines.servo.log import ServoLog
+from antenna_drive.machines.servo.machine import ServoMachine
 from antenna_drive.machines.servo.refit import Fit
 import numpy as np
 
@@ -44,7 +43,7 @@ WORTH = 0.01
 ROUNDS = 7
 # What is tried out of the verdict's ranking, pairs among it, and of all single effects.
 TRIED_RANKED, TRIED_SINGLES = 2, 7
-TURNS = 5
+ITERATIONS = 5
 
 
 @dataclass(frozen=True)
@@ -67,8 +66,8 @@ class Effort:
 class Fold:
     """A part of the tests that is fitted, and the rest, on which the fit is judged."""
 
-    fitted: tuple[ServoTest, ...]
-    withheld: tuple[ServoTest, ...]
+    fitted: tuple[ServoLog, ...]
+    withheld: tuple[ServoLog, ...]
 
 
 @dataclass(frozen=True)
@@ -91,7 +90,7 @@ class Found:
     rounds: list[dict[str, Any]]
 
 
-def folds(tests: Sequence[ServoTest]) -> list[Fold]:
+def folds(tests: Sequence[ServoLog]) -> list[Fold]:
     """
     Return folds that withhold each test once, together with none of its gain or trajectory.
 
@@ -109,7 +108,7 @@ def folds(tests: Sequence[ServoTest]) -> list[Fold]:
     return [part for part in parts if part.fitted and part.withheld]
 
 
-def lacking(tests: Sequence[ServoTest], effort: Effort, without: Sequence[str] = (),
+def lacking(tests: Sequence[ServoLog], effort: Effort, without: Sequence[str] = (),
             progress: Progress = lambda share, doing: None) -> Found:
     """
     Find what the model of a motor with Coulomb and viscous friction lacks.
@@ -134,16 +133,16 @@ def lacking(tests: Sequence[ServoTest], effort: Effort, without: Sequence[str] =
         progress(turn / ROUNDS, 'what the model lacks')
         scale = _scale(tests, fit)
         judged = _judged(parts, structure, fit.values, scale)
-        problem = Problem(ServoModel(tests, fit.values, numbers(structure), without, scale))
-        candidates = Search(problem, lambda share, doing: None).run()
-        ranked = verdict.rank(candidates, 0.0)
-        likeliest = _likeliest([r.candidate for r in ranked], _singles(problem))
+        problem = LeastSquares(ServoMachine(tests, fit.values, numbers(structure), without, scale))
+        ranking = rank_hypotheses(problem.machine)
+        likeliest = _likeliest([answer.hypothesis for answer in ranking.answers],
+                               _singles(problem))
         trials = [_Trial.of(c, structure, fit.values, parts, scale) for c in likeliest]
         rounds.append({
             'withheld_mrad': 1e3 * judged,
-            'ranked': [{'effects': list(r.candidate.effects), 'probability': r.probability}
-                       for r in ranked[:6]],
-            'confusable': verdict.confusable(candidates),
+            'ranked': [{'effects': list(answer.hypothesis.effects),
+                        'probability': answer.probability} for answer in ranking.answers[:6]],
+            'confusable': ranking.confusable,
             'tried': [{'effects': list(c.effects), 'forms': [f.name for f in c.forms],
                        'withheld_mrad': 1e3 * trial.judged}
                       for c, trial in zip(likeliest, trials, strict=True)],
@@ -193,7 +192,7 @@ class _Trial:
     priced: float
 
     @classmethod
-    def of(cls, candidate: Candidate, structure: Structure, values: Mapping[str, float],
+    def of(cls, candidate: Hypothesis, structure: Structure, values: Mapping[str, float],
            parts: Sequence[Fold], scale: Sequence[float]) -> _Trial:
         point = candidate.state.point()
         own = {p.name: point[p.name] for form in candidate.forms for p in form.parameters}
@@ -220,7 +219,7 @@ def _judged(parts: Sequence[Fold], structure: Structure, start: Mapping[str, flo
         part.withheld, settled(part.fitted, names, start, scale).values) for part in parts]))
 
 
-def _scale(tests: Sequence[ServoTest], fit: Fit) -> list[float]:
+def _scale(tests: Sequence[ServoLog], fit: Fit) -> list[float]:
     """Return the scale of what a fit leaves, in each channel a sensor's step at least."""
     row = vector(fit.values)
     left = np.concatenate([test.measured - test.readings(row) for test in tests])
@@ -229,32 +228,32 @@ def _scale(tests: Sequence[ServoTest], fit: Fit) -> list[float]:
     return scale
 
 
-def _singles(problem: Problem) -> list[Candidate]:
+def _singles(problem: LeastSquares) -> list[Hypothesis]:
     """Return every single effect in its best form, after a few turns, the best first."""
-    state = problem.fit(problem.start(problem.model.nuisances, {}), TURNS)
+    state = problem.fit(problem.start(problem.machine.nuisances, {}), ITERATIONS)
     found = []
-    for effect in problem.model.effects.values():
+    for effect in problem.machine.effects.values():
         forms = []
         for form in effect.forms:
             values = [p.start for p in form.parameters]
             # what its shape does shows once the effect is there: a little of it
-            point = {**state.point(), **{p.name: p.start if p.shape else 0.0
+            point = {**state.point(), **{p.name: p.start if p.is_shape else 0.0
                                          for p in form.parameters}}
-            columns = problem.columns(point, form.parameters, state.residual, central=False)
-            wider = problem.widened(state, form.parameters, values, columns)
-            forms.append(Candidate((effect.id,), (form,), problem.fit(wider, TURNS)))
+            columns = problem.jacobian(point, form.parameters, state.residual, central=False)
+            wider = problem.extended(state, form.parameters, values, columns)
+            forms.append(Hypothesis((effect.id,), (form,), problem.fit(wider, ITERATIONS)))
         found.append(min(forms, key=lambda c: c.cost))
     return sorted(found, key=lambda c: c.cost)
 
 
-def _likeliest(ranked: Sequence[Candidate], singles: Sequence[Candidate]) -> list[Candidate]:
+def _likeliest(ranked: Sequence[Hypothesis], singles: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Return what is tried out: the likeliest of the verdict, and the best single effects."""
     chosen = [c for c in ranked if c.effects][:TRIED_RANKED]
     known = {c.effects for c in chosen}
     return chosen + [c for c in singles if c.effects not in known][:TRIED_SINGLES]
 
 
-def settled(tests: Sequence[ServoTest], names: Sequence[str], start: Mapping[str, float],
+def settled(tests: Sequence[ServoLog], names: Sequence[str], start: Mapping[str, float],
             scale: Sequence[float]) -> Fit:
     """
     Fit numbers by robust least squares from where they are.
@@ -271,10 +270,10 @@ def settled(tests: Sequence[ServoTest], names: Sequence[str], start: Mapping[str
         that residuals are measured by, in position, speed and duty
 
     """
-    model = ServoModel(tests, {name: start[name] for name in names}, names, noise=scale)
-    problem = Problem(model)
-    state = problem.fit(problem.start(model.nuisances, {}), TURNS)
-    state = problem.fit(problem.refreshed(state, central=False), TURNS)
+    model = ServoMachine(tests, {name: start[name] for name in names}, names, noise=scale)
+    problem = LeastSquares(model)
+    state = problem.fit(problem.start(model.nuisances, {}), ITERATIONS)
+    state = problem.fit(problem.refreshed(state, central=False), ITERATIONS)
     values = model.numbers(state.point())
     return Fit(values, servo_refit.error(tests, values))
 

@@ -36,7 +36,7 @@ from typing import Any
 from antenna_drive.errors import UserError
 from antenna_drive.machines.servo import refit as servo_refit
 from antenna_drive.machines.servo.catalogue import catalogue, vector
-from antenna_drive.machines.servo.machine import ServoTest
+from antenna_drive.machines.servo.log import ServoLog
 from antenna_drive.machines.servo.refit import Fit, LADDER, PARENTS
 from antenna_drive.machines.servo.rounds import Effort, lacking, plain
 import numpy as np
@@ -61,14 +61,14 @@ class Direction:
     split: str
     fitted: tuple[Any, ...]
 
-    def parted(self, tests: Sequence[ServoTest]) -> tuple[list[ServoTest], list[ServoTest]]:
+    def parted(self, tests: Sequence[ServoLog]) -> tuple[list[ServoLog], list[ServoLog]]:
         """Return the tests that are fitted and those that are withheld."""
         key = SPLITS[self.split]
         chosen = [test for test in tests if getattr(test, key) in self.fitted]
         return chosen, [test for test in tests if getattr(test, key) not in self.fitted]
 
 
-def directions(tests: Sequence[ServoTest], splits: Iterable[str] = tuple(SPLITS),
+def directions(tests: Sequence[ServoLog], splits: Iterable[str] = tuple(SPLITS),
                ) -> list[Direction]:
     """
     Return every choice of two gains and of two trajectories that leaves something withheld.
@@ -89,7 +89,7 @@ def directions(tests: Sequence[ServoTest], splits: Iterable[str] = tuple(SPLITS)
     return found
 
 
-def compared(tests: Sequence[ServoTest], direction: Direction, effort: Effort,
+def compared(tests: Sequence[ServoLog], direction: Direction, effort: Effort,
              without: Sequence[str] = ()) -> dict[str, Any]:
     """
     Return how the models do in one direction, as plain data.
@@ -126,7 +126,7 @@ def compared(tests: Sequence[ServoTest], direction: Direction, effort: Effort,
     }
 
 
-def _model(fit: Fit, fitted: Sequence[ServoTest], withheld: Sequence[ServoTest],
+def _model(fit: Fit, fitted: Sequence[ServoLog], withheld: Sequence[ServoLog],
            ) -> dict[str, Any]:
     row = vector(fit.values)
     errors = {test.name: 1e3 * test.error(row) for test in withheld}
@@ -135,7 +135,7 @@ def _model(fit: Fit, fitted: Sequence[ServoTest], withheld: Sequence[ServoTest],
             'per_recording_mrad': errors, 'values': plain(fit.values)}
 
 
-def study(tests: Sequence[ServoTest], chosen: Sequence[Direction], effort: Effort,
+def study(tests: Sequence[ServoLog], chosen: Sequence[Direction], effort: Effort,
           without: Sequence[str] = (), jobs: int = 1, keep: Path | None = None,
           progress: Progress = lambda share, doing: None) -> dict[str, Any]:
     """
@@ -203,7 +203,7 @@ def study(tests: Sequence[ServoTest], chosen: Sequence[Direction], effort: Effor
 class _Shelf:
     """Results of directions, each in a file of its own, found again by what they came from."""
 
-    def __init__(self, folder: Path | None, tests: Sequence[ServoTest], effort: Effort,
+    def __init__(self, folder: Path | None, tests: Sequence[ServoLog], effort: Effort,
                  without: Sequence[str]) -> None:
         self._folder = folder
         digest = hashlib.sha256(repr((effort, sorted(without))).encode())

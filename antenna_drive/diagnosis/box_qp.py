@@ -1,0 +1,82 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A box-constrained quadratic programme by an active-set method: the step of a bounded fit."""
+
+from __future__ import annotations
+
+from antenna_drive.diagnosis.machine import FloatArray
+import numpy as np
+from scipy import linalg
+
+# For this many iterations all wrongly active bounds are released at once; after that one by one,
+# because releasing all of them may cycle.
+_ALL_AT_ONCE = 12
+# A gradient below this, in the metric of the scaled Hessian, gains nothing.
+_LEVEL = 1e-6
+
+
+def box_constrained_step(hessian: FloatArray, gradient: FloatArray, low: FloatArray,
+                         high: FloatArray) -> FloatArray:
+    """
+    Return the step d within bounds that maximises gradient d - d hessian d / 2.
+
+    Parameters
+    ----------
+    hessian
+        symmetric and positive semidefinite, shape (m, m)
+    gradient
+        shape (m,)
+    low, high
+        bounds of the step, low <= 0 <= high, shape (m,)
+
+    """
+    m = gradient.size
+    step = np.zeros(m)
+    diagonal = np.diag(hessian)
+    dead = diagonal <= 1e-30  # a variable that changes nothing stays where it is
+    scale = np.where(dead, 0.0, 1.0 / np.sqrt(np.where(dead, 1.0, diagonal)))
+    scaled = hessian * np.outer(scale, scale)
+    scaled[np.diag_indices(m)] += 1e-12
+    room = (high > low) & ~dead
+    free = room & ~((low >= 0.0) & (gradient < 0.0)) & ~((high <= 0.0) & (gradient > 0.0))
+    for iteration in range(4 * m):
+        index = np.flatnonzero(free)
+        if index.size:
+            rest = gradient - hessian @ np.where(free, 0.0, step)
+            step[index] = scale[index] * _solved(scaled[np.ix_(index, index)],
+                                                 (scale * rest)[index])
+        out = free & ((step < low) | (step > high))
+        if out.any():
+            np.clip(step, low, high, out=step)
+            free &= ~out
+            continue
+        slope = gradient - hessian @ step
+        wrong = ~free & room & (((step <= low) & (slope > 0.0)) | ((step >= high) & (slope < 0.0)))
+        steepness = np.abs(slope) * scale
+        wrong &= steepness > _LEVEL
+        if not wrong.any():
+            break
+        if iteration < _ALL_AT_ONCE:
+            free |= wrong
+        else:
+            free[np.argmax(np.where(wrong, steepness, -1.0))] = True
+    return np.asarray(np.clip(step, low, high))
+
+
+def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve for a symmetric matrix, by its Cholesky factor if it has one."""
+    factor, failed = linalg.lapack.dpotrf(matrix, lower=1)
+    if failed:
+        return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-10)[0])
+    return np.asarray(linalg.lapack.dpotrs(factor, right, lower=1)[0])

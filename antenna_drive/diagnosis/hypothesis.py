@@ -1,0 +1,83 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A hypothesis: effects that were fitted together with all nuisances, and what they pay."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from antenna_drive.diagnosis.least_squares import FitState
+from antenna_drive.diagnosis.machine import Form, Parameter, Point
+from antenna_drive.diagnosis.settings import PenaltySettings
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """
+    Effects that were fitted together with all nuisances.
+
+    Attributes
+    ----------
+    effects : their ids; none for the nuisances alone
+    forms : one for each effect
+    state : where the fit ended
+
+    """
+
+    effects: tuple[str, ...]
+    forms: tuple[Form, ...]
+    state: FitState
+
+    @property
+    def cost(self) -> float:
+        """Return half a chi-square, robust, with the priors."""
+        return self.state.cost
+
+    @property
+    def values(self) -> list[tuple[Parameter, float]]:
+        """Return the parameters of the effects with their values."""
+        point = self.state.point()
+        return [(p, point[p.name]) for form in self.forms for p in form.parameters]
+
+    @property
+    def has_course(self) -> bool:
+        """Return whether one of the effects is a course over time."""
+        return any(form.is_course for form in self.forms)
+
+    def penalised(self, settings: PenaltySettings) -> float:
+        """Return the cost with the penalty of the effects."""
+        return self.state.cost + penalty(self.forms, self.state.point(), settings)
+
+    def without_jacobian(self, keep_hessian: bool = False) -> Hypothesis:
+        """Return the hypothesis without its Jacobian, which takes most of the memory."""
+        return replace(self, state=self.state.without_jacobian(keep_hessian))
+
+
+def penalty(forms: Sequence[Form], point: Point, settings: PenaltySettings) -> float:
+    """
+    Return the penalty of effects in these forms with these values, in halves of a chi-square.
+
+    An effect pays for itself and for each parameter. An effect that is as small as the tolerance
+    of its number is that tolerance, and pays for it; the payment falls to zero as the effect
+    outgrows the tolerance.
+    """
+    total = 0.0
+    for form in forms:
+        total += settings.effect + settings.scanned * form.scanned
+        for p in form.parameters:
+            total += settings.prior_parameter if p.prior_sigma else settings.parameter
+            if p.tolerance:
+                total += settings.tolerated * max(0.0, 1.0 - abs(point[p.name]) / p.tolerance)
+    return total

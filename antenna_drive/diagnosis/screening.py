@@ -1,0 +1,185 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Screening: how much of the residual each effect could explain, by its derivative alone.
+
+A screening is a filter, not a judgement: what it promises is far above what a fit gains, but the
+true effect is nearly always among the first dozen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from antenna_drive.diagnosis.box_qp import box_constrained_step
+from antenna_drive.diagnosis.least_squares import (
+    FitState, Jacobian, least_cost, LeastSquares, prior_precision, transposed_product,
+    weighted_product,
+)
+from antenna_drive.diagnosis.machine import Effect, Form
+import numpy as np
+
+# The values that a scan tries, as shares of the bounds, and then as multiples of the best one.
+_COARSE = (-0.9, -0.6, -0.4, -0.25, -0.15, -0.08, 0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 0.9)
+_FINE = (0.7, 0.8, 0.87, 0.94, 1.06, 1.13, 1.2, 1.3)
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """
+    A form of an effect and the derivatives of the prediction by its parameters.
+
+    Attributes
+    ----------
+    effect : its id
+    form : of the effect
+    jacobian : shape (n, m); zero for shape parameters
+
+    """
+
+    effect: str
+    form: Form
+    jacobian: Jacobian
+
+
+def sensitivities(problem: LeastSquares, state: FitState,
+                  concurrently: Callable[..., Iterable[Any]] = map) -> list[Sensitivity]:
+    """Return the sensitivity to every form of every effect, at the end of a fit."""
+    machine = problem.machine
+    residuals = [
+        state.residual[problem.rows(k)].reshape(e.measured.shape) * e.noise * problem.scale
+        for k, e in enumerate(problem.experiments)]
+    forms = [(effect.id, form) for effect in machine.effects.values()
+             for form in machine.forms(effect, residuals)]
+    return list(concurrently(
+        lambda item: Sensitivity(item[0], item[1], jacobian_of_form(problem, state, item[1])),
+        forms))
+
+
+def jacobian_of_form(problem: LeastSquares, state: FitState, form: Form) -> Jacobian:
+    """Return the derivatives by a form's parameters, zero for those of its shape."""
+    columns = np.zeros((state.residual.size, len(form.parameters)), np.float32)
+    sizes = [j for j, p in enumerate(form.parameters) if not p.is_shape]
+    columns[:, sizes] = problem.jacobian(
+        {**state.point(), **form.start}, [form.parameters[j] for j in sizes], state.residual,
+        central=form.scanned)
+    return columns
+
+
+def rescaled(known: Sequence[Sensitivity], ratio: float) -> list[Sensitivity]:
+    """Return sensitivities in the residuals of a problem whose noise is `ratio` times less."""
+    return [replace(item, jacobian=item.jacobian * ratio) for item in known]
+
+
+def same_effect(effects: Mapping[str, Effect], effect: str, others: Sequence[str]) -> bool:
+    """Return whether an effect is one of the others, or contains or is a part of one."""
+    return any(effect == other or effect in effects[other].parts
+               or other in effects[effect].parts for other in others)
+
+
+def screened(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
+             besides: Sequence[str] = ()) -> list[tuple[float, Sensitivity]]:
+    """
+    Return the gain that each form promises beside the effects that are there, the greatest first.
+
+    Parameters
+    ----------
+    problem, state
+        the fit that the effect is added to
+    known
+        from `sensitivities`
+    besides
+        ids of the effects that are there
+
+    """
+    names = {p.name for p in state.parameters}
+    low = np.array([p.low for p in state.parameters]) - state.x
+    high = np.array([p.high for p in state.parameters]) - state.x
+    prior = prior_precision(state.parameters)
+    hessian = state.hessian + np.diag(prior)
+    gradient = transposed_product(state.jacobian, state.weight * state.residual) - prior * state.x
+    found: dict[str, list[tuple[float, Sensitivity]]] = {}
+    for item in known:
+        form = item.form
+        if same_effect(problem.machine.effects, item.effect, besides):
+            continue
+        if besides and form.is_course:
+            continue  # a free course explains what any other effect leaves
+        if any(p.name in names for p in form.parameters):
+            continue  # another effect with the same numbers
+        own = item.jacobian[:, [j for j, p in enumerate(form.parameters) if not p.is_shape]]
+        cross = weighted_product(state.jacobian, state.weight, own)
+        full = np.block([[hessian, cross], [cross.T, weighted_product(own, state.weight)]])
+        slope = np.r_[gradient, transposed_product(own, state.weight * state.residual)]
+        step = box_constrained_step(full + 1e-9 * np.diag(np.diag(full) + 1e-9), slope,
+                                    np.r_[low, [p.low for p in form.sizes]],
+                                    np.r_[high, [p.high for p in form.sizes]])
+        gain = float(slope @ step - 0.5 * step @ full @ step)
+        found.setdefault(item.effect, []).append((gain, item))
+    best: list[tuple[float, Sensitivity]] = []
+    close = problem.settings.search.second_form
+    for forms in found.values():
+        # a screening does not tell the forms of an effect apart: a close second is kept
+        first, *others = sorted(forms, key=lambda pair: -pair[0])
+        best += [first, *(pair for pair in others[:1] if pair[0] > close * first[0])]
+    return sorted(best, key=lambda pair: -pair[0])
+
+
+def scan(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
+         besides: Sequence[str] = ()) -> list[tuple[Sensitivity, float]]:
+    """
+    Return the forms of one size whose best value, tried out far from zero, fits best.
+
+    A strong effect may bend the misfit so much that its derivative at zero tells nothing: a mode
+    at another frequency, a limit that was not reached. Only the worst test is looked at.
+
+    Parameters
+    ----------
+    problem, state, known, besides
+        as in `screened`
+
+    Returns
+    -------
+    sensitivities with the value from which a fit should begin, the best first
+
+    """
+    here = state.point()
+    count = problem.settings.search.scanned
+    until = problem.machine.time_scales.scan_s
+    worst = int(np.argmax([problem.loss(state.residual[problem.rows(k)])
+                           for k in range(len(problem.experiments))]))
+
+    def tried(form: Form, name: str, values: Sequence[float]) -> tuple[float, float]:
+        cost, best = least_cost(problem, [{**here, **form.start, name: value}
+                                          for value in values], worst, until)
+        return cost, best[name]
+
+    coarse: list[tuple[float, float, Sensitivity]] = []
+    for item in known:
+        sizes = item.form.sizes
+        if len(sizes) != 1 or same_effect(problem.machine.effects, item.effect, besides) or any(
+                p.name in here for p in item.form.parameters):
+            continue
+        values = [share * (sizes[0].high if share > 0.0 else -sizes[0].low)
+                  for share in _COARSE if share > 0.0 or sizes[0].low < 0.0]
+        coarse.append((*tried(item.form, sizes[0].name, values), item))
+    coarse.sort(key=lambda entry: entry[0])
+    fine = []
+    for cost, value, item in coarse[:2 * count]:
+        nearby = tried(item.form, item.form.sizes[0].name, [value * share for share in _FINE])
+        fine.append((*min((cost, value), nearby), item))
+    fine.sort(key=lambda entry: entry[0])
+    return [(item, value) for _, value, item in fine[:count]]

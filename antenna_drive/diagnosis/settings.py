@@ -1,0 +1,282 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Every threshold of the diagnosis: its unit, what it decides, and the trial that set it.
+
+`Settings()` is what a diagnosis uses unless it is given another record. `antenna-drive thresholds`
+prints the table and says what halving and doubling a threshold does to the score of a trial.
+Trials are listed in docs/history.md; 'design' means that the value was chosen without a trial.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, Field, field, fields, is_dataclass, replace
+from typing import Any, TypeVar
+
+Group = TypeVar('Group')
+
+DESIGN = 'design'
+STUDY = 'feasibility study'
+TRIAL_0 = 'trial 0'
+TRIAL_1 = 'trial 1'
+TRIAL_2 = 'trial 2'
+
+
+def _setting(default: Any, unit: str, decides: str, set_by: str = DESIGN) -> Any:
+    return field(default=default, metadata={'unit': unit, 'decides': decides, 'set_by': set_by})
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """Robust Levenberg-Marquardt fits."""
+
+    outlier: float = _setting(
+        3.0, 'noise sigma', 'residual beyond which the loss grows with its logarithm', STUDY)
+    initial_damping: float = _setting(1e-3, '1', 'damping with which a fit begins')
+    least_damping: float = _setting(1e-6, '1', 'lower bound of the damping')
+    greatest_damping: float = _setting(1e4, '1', 'upper bound of the damping')
+    damping_after_failure: float = _setting(
+        1e-2, '1', 'least damping after a step that failed, before it grows')
+    damping_growth: float = _setting(8.0, '1', 'growth of the damping after a step that failed')
+    damping_decay: float = _setting(5.0, '1', 'decay of the damping after a good step')
+    good_step: float = _setting(
+        0.5, '1', 'share of the expected gain from which a step counts as good')
+    least_gain: float = _setting(
+        1.0, 'half chi-square', 'gain of an iteration below which a fit is idle')
+    worth_a_step: float = _setting(
+        0.3, '1', 'share of least_gain that a step must promise')
+    idle_iterations: int = _setting(1, '1', 'idle iterations that a fit goes on through')
+    stale_weights: float = _setting(
+        0.02, '1', 'mean change of the weights after which the Hessian is made anew')
+    broyden_error: float = _setting(
+        0.5, '1', "step's error, as a share of its prediction, up to which it corrects the "
+        'Jacobian', TRIAL_0)
+    dead_column: float = _setting(
+        1e-6, 'noise sigma', 'greatest change by a step below which a derivative is rounding')
+    runaway: float = _setting(1e4, 'noise sigma', 'bound of every residual')
+    batch: int = _setting(16, '1', 'variants that are simulated at once')
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """The search for effects."""
+
+    singles: int = _setting(
+        12, '1', 'effects that are fitted after the screening', STUDY)
+    finalists: int = _setting(5, '1', 'single effects that are fitted further', STUDY)
+    bases: int = _setting(3, '1', 'single effects that are given partners', STUDY)
+    partners: int = _setting(5, '1', 'partners that are fitted for each of them', STUDY)
+    partner_gain: float = _setting(
+        12.0, 'half chi-square', 'promised gain below which a partner is not fitted', TRIAL_0)
+    partner_gain_share: float = _setting(
+        1e-3, '1', 'the same as a share of the cost of the best single effect', TRIAL_0)
+    base_ratio: float = _setting(
+        3.0, '1', 'cost, as a multiple of the best, up to which an effect is given partners')
+    second_form: float = _setting(
+        0.7, '1', "share of the best form's promised gain from which a second form is kept")
+    full_singles: int = _setting(5, '1', 'single effects that are fitted to the whole tests')
+    full_pairs: int = _setting(4, '1', 'pairs that are fitted to the whole tests')
+    passes: int = _setting(3, '1', 'greatest number of passes over the whole tests')
+    reach: float = _setting(
+        250.0, 'half chi-square', 'excess over the best cost beyond which a fit is given up',
+        TRIAL_0)
+    strong: float = _setting(
+        1.5, 'noise sigma', 'residual level from which the misfit counts as noise', STUDY)
+    sharper: float = _setting(
+        0.7, '1', 'share of the noise scale below which the scale is lowered and fits go on',
+        STUDY)
+    scale_passes: int = _setting(3, '1', 'times that the noise scale is lowered')
+    first_passes: int = _setting(5, '1', 'passes of the first fit of the nuisances')
+    first_gain: float = _setting(
+        0.003, '1', 'gain, as a share of the cost, below which the first fit has ended')
+    wanting: float = _setting(
+        1.03, 'noise sigma', 'residual level above which sensitivities are taken anew for pairs')
+    settled: float = _setting(
+        4.0, 'half chi-square', 'gain of a pass below which the fits have ended')
+    settled_share: float = _setting(1e-3, '1', 'the same as a share of the cost')
+    clean: float = _setting(
+        0.97, 'noise sigma', 'residual level below which a fit needs no more iterations')
+    final_passes: int = _setting(
+        5, '1', 'passes, with central differences, of the fit that is judged')
+    final_gain: float = _setting(
+        0.01, '1', 'gain of such a pass, as a share of the cost, below which it has ended')
+    scanned: int = _setting(
+        5, '1', 'effects that are fitted from a value found by a scan', TRIAL_0)
+    first_iterations: int = _setting(5, '1', 'iterations of a first fit of an effect')
+    iterations: int = _setting(8, '1', 'iterations of a further fit')
+    pair_iterations: int = _setting(6, '1', "iterations of a pair's further fit")
+    settling_iterations: int = _setting(10, '1', 'iterations of a fit with fresh derivatives')
+    full_iterations: int = _setting(6, '1', 'iterations of a fit to the whole tests')
+    doubtful: float = _setting(
+        0.25, '1', 'gain, as a share of the cost, below which an effect is fitted without and '
+        'judged anew', TRIAL_1)
+
+
+@dataclass(frozen=True)
+class PenaltySettings:
+    """What a hypothesis pays for its complexity."""
+
+    effect: float = _setting(30.0, 'half chi-square', 'price of an effect', STUDY)
+    parameter: float = _setting(4.0, 'half chi-square', 'price of a parameter', STUDY)
+    prior_parameter: float = _setting(
+        8.0, 'half chi-square', 'price of a parameter with a prior: one of a course over time, '
+        'which imitates anything slow', TRIAL_0)
+    scanned: float = _setting(
+        10.0, 'half chi-square', 'price of a form that a scan has chosen', TRIAL_0)
+    tolerated: float = _setting(
+        24.0, 'half chi-square', 'price of an effect as small as its tolerance', TRIAL_0)
+
+
+@dataclass(frozen=True)
+class VerdictSettings:
+    """From costs to probabilities."""
+
+    temperature: float = _setting(
+        8.0, 'half chi-square', 'cost that makes a hypothesis e times less probable', TRIAL_0)
+    form_error: float = _setting(
+        0.02, '1', "gain, as a share of the noise's cost, that an error of the model's form may "
+        'have', TRIAL_0)
+    second_effect: float = _setting(
+        60.0, 'half chi-square', 'price of a second effect', TRIAL_0)
+    second_share: float = _setting(
+        0.015, '1', 'the same as a share of what the first effect gains', TRIAL_0)
+    twin_share: float = _setting(
+        0.005, '1', 'the same where both are one effect in two places', TRIAL_0)
+    confusable: float = _setting(
+        14.0, 'half chi-square', 'excess cost up to which an effect counts as confusable',
+        TRIAL_0)
+    largest_group: int = _setting(5, '1', 'effects of a confusable group')
+    slow: float = _setting(
+        1.0, '1', 'slow excess of the residual that tips the scales to unknown', TRIAL_0)
+    slow_slope: float = _setting(1.6, '1', 'how sharply', TRIAL_0)
+    left: float = _setting(
+        0.06, '1', 'share of the gap left that tips the scales to unknown', TRIAL_0)
+    left_slope: float = _setting(1.6, '1', 'how sharply', TRIAL_0)
+    fast: float = _setting(
+        5.0, 'noise variance', 'fast residual that tips the scales to unknown', TRIAL_0)
+    fast_slope: float = _setting(4.0, '1', 'how sharply', TRIAL_0)
+    fast_left: float = _setting(
+        0.3, '1', 'share of that residual left that tips the scales to unknown', TRIAL_0)
+    fast_left_slope: float = _setting(3.0, '1', 'how sharply', TRIAL_0)
+    implausible_slope: float = _setting(
+        6.0, '1', 'how sharply implausible values of an effect speak for unknown', TRIAL_0)
+    held_out: float = _setting(
+        0.4, '1', 'explained share of withheld data below which an effect has failed', TRIAL_0)
+    held_out_slope: float = _setting(12.0, '1', 'how sharply', TRIAL_0)
+    noise_only: float = _setting(
+        0.3, '1', 'slow excess below which an effect cannot have failed', TRIAL_0)
+    noise_only_slope: float = _setting(4.0, '1', 'how sharply', TRIAL_0)
+    least_unknown: float = _setting(0.05, '1', 'least probability of unknown', TRIAL_0)
+    most_unknown: float = _setting(0.88, '1', 'greatest probability of unknown', TRIAL_0)
+    partly: float = _setting(
+        0.3, '1', "probability of unknown from which the verdict is 'partly explained'")
+    entries: int = _setting(12, '1', "greatest number of answers beside 'none' and 'unknown'")
+    least_probability: float = _setting(1e-4, '1', 'probability below which an answer is left out')
+
+
+@dataclass(frozen=True)
+class LackOfFitSettings:
+    """Tests of the residual that a hypothesis leaves."""
+
+    clip: float = _setting(
+        6.0, 'noise sigma', 'residual beyond which a sample says no more about slow excess')
+    clip_fast: float = _setting(
+        10.0, 'noise sigma', 'the same for every other statistic')
+    least_samples: int = _setting(50, '1', 'samples up to which a channel is not tested')
+    block: int = _setting(10, 'samples', 'length of the blocks whose means are the slow part')
+    least_blocks: int = _setting(4, '1', 'blocks below which a channel is not tested')
+    lags: int = _setting(20, 'samples', 'greatest lag of the autocorrelation')
+    least_excess: float = _setting(-0.5, '1', 'lower bound of the slow excess')
+    greatest_energy: float = _setting(
+        1e6, 'noise variance', 'upper bound of the mean square of a channel')
+    least_gap: float = _setting(0.05, '1', 'gap, as a share of the noise, that counts as one')
+    bins: int = _setting(12, '1', 'bins of a covariate')
+    least_dependence: float = _setting(
+        0.02, '1', 'share of the variance from which a dependence is listed')
+    dependences: int = _setting(8, '1', 'dependences that are listed')
+
+
+@dataclass(frozen=True)
+class LocalisationSettings:
+    """Where the gap lies, and where an unknown input acts."""
+
+    outlier: float = _setting(
+        6.0, 'residual level', 'residual beyond which a sample loses weight')
+    caution: float = _setting(
+        0.02, '1', 'share of the log evidence that counts, because residuals are not white',
+        TRIAL_0)
+    least_evidence: float = _setting(
+        20.0, 'log evidence', 'evidence below which no place is named', TRIAL_0)
+    entries: int = _setting(12, '1', 'greatest number of entries')
+    least_share: float = _setting(0.01, '1', 'share below which an entry is left out')
+
+
+@dataclass(frozen=True)
+class HeldOutSettings:
+    """The judgement on withheld data."""
+
+    iterations: int = _setting(6, '1', 'iterations of the fits to the training data')
+    no_gap: float = _setting(
+        1e-3, '1', 'gap, as a share of the energy before, below which nothing is to be explained')
+    resamples: int = _setting(400, '1', 'resamples of the block bootstrap')
+
+
+@dataclass(frozen=True)
+class ConfusabilitySettings:
+    """Which effects a planned test can tell apart, from derivatives alone."""
+
+    detectable: float = _setting(
+        12.0, 'half chi-square', 'cost without the effect from which an effect shows')
+    alike: float = _setting(
+        0.95, '1', 'share of what an effect does that another must imitate to pass for it')
+
+
+@dataclass(frozen=True)
+class Settings:
+    """All thresholds of a diagnosis."""
+
+    fit: FitSettings = FitSettings()
+    search: SearchSettings = SearchSettings()
+    penalty: PenaltySettings = PenaltySettings()
+    verdict: VerdictSettings = VerdictSettings()
+    lack_of_fit: LackOfFitSettings = LackOfFitSettings()
+    localisation: LocalisationSettings = LocalisationSettings()
+    held_out: HeldOutSettings = HeldOutSettings()
+    confusability: ConfusabilitySettings = ConfusabilitySettings()
+
+    def entries(self) -> Iterator[tuple[str, Field[Any], Any]]:
+        """Yield each threshold: 'group.name', its field (see `metadata`), its value."""
+        for group in fields(self):
+            values = getattr(self, group.name)
+            assert is_dataclass(values)
+            for item in fields(values):
+                yield f'{group.name}.{item.name}', item, getattr(values, item.name)
+
+    def changed(self, name: str, value: Any) -> Settings:
+        """
+        Return the settings with one threshold changed.
+
+        Raises
+        ------
+        KeyError : there is no threshold of that name
+
+        """
+        if name not in {known for known, _, _ in self.entries()}:
+            raise KeyError(name)
+        group, _, key = name.partition('.')
+        return replace(self, **{group: replace(getattr(self, group), **{key: value})})
+
+
+DEFAULT = Settings()

@@ -1,0 +1,61 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The diagnosis of recordings of the antenna drive.
+
+Examples
+--------
+>>> from antenna_drive.machines.antenna.diagnose import diagnose_recordings  # doctest: +SKIP
+>>> from antenna_drive.parameters import load                                # doctest: +SKIP
+>>> from antenna_drive.recording.files import read_recording                 # doctest: +SKIP
+>>> recording = read_recording('field.csv')                                  # doctest: +SKIP
+>>> print(diagnose_recordings({'field': recording}, load()).summary())       # doctest: +SKIP
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from antenna_drive.diagnosis import DEFAULT, diagnose, Diagnosis, Progress, Settings
+from antenna_drive.machines.antenna.machine import AntennaMachine
+from antenna_drive.parameters.sets import Drive
+from antenna_drive.recording.recording import Recording
+
+
+def diagnose_recordings(recordings: Mapping[str, Recording], drive: Drive,
+                        progress: Progress = lambda share, doing: None, threads: int = 2,
+                        settings: Settings = DEFAULT) -> Diagnosis:
+    """
+    Say where a real drive and its model part, which effect is behind it, and how far it goes.
+
+    Parameters
+    ----------
+    recordings
+        of one machine, by name, with their test sheets
+    drive
+        the configuration of the model
+    progress
+        called with the share that is done, 0 to 1, and what is being done
+    threads
+        how many simulations at once
+    settings
+        thresholds
+
+    Raises
+    ------
+    UserError : a recording cannot be used; the message says which and why
+
+    """
+    return diagnose(AntennaMachine(recordings, drive, threads), progress, threads, settings)

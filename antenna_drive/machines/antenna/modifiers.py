@@ -1,0 +1,236 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+What a parameter does: it modifies the run before it is simulated, or the readings after it.
+
+Each entry of the catalogue, and each tolerance, declares its modifier where it stands.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any, TYPE_CHECKING
+
+from antenna_drive.diagnosis import FloatArray, Parameter
+from antenna_drive.machines.antenna.excitation import Bias
+from antenna_drive.machines.antenna.field_test import CHANNELS
+from antenna_drive.parameters.records import place_of
+import numpy as np
+
+if TYPE_CHECKING:
+    from antenna_drive.machines.antenna.waves import WaveShape
+
+SCALE, ADD, SET = 'scale', 'add', 'set'
+
+
+@dataclass
+class RunSetup:
+    """
+    A run as parameters modify it.
+
+    Attributes
+    ----------
+    numbers : the drive's record as plain numbers: numpy copies a record field by field
+    kind : type of the record
+    duration_s : of the test
+    bias : source of the bias voltage, where the share circuit is not connected
+    delay : of the rate command [s]
+    gust : torque on the axis at its knots [N m]; None for none
+    waves : parts of each wave
+
+    """
+
+    numbers: FloatArray
+    kind: np.dtype[Any]
+    duration_s: float
+    bias: Bias
+    delay: float = 0.0
+    gust: FloatArray | None = None
+    waves: dict[WaveShape, list[float]] = field(default_factory=dict)
+
+    def change(self, path: str, how: str, value: float) -> None:
+        """Scale a number of the record by 1 + value, add the value to it, or set it."""
+        change(self.numbers, place_of(self.kind, path), how, value)
+
+
+@dataclass
+class Readings:
+    """
+    Readings as parameters modify them.
+
+    Attributes
+    ----------
+    values, slopes : of every channel and their time derivatives, shape (n, 6)
+    gain, zero : of every channel, shape (6,)
+    digit : of the encoder [rad]; 0 for none
+    turn : share of a digit by which the encoder's rounding is off its middle
+    waves : parts of each wave of the encoder
+
+    """
+
+    values: FloatArray
+    slopes: FloatArray
+    gain: FloatArray = field(default_factory=lambda: np.ones(len(CHANNELS)))
+    zero: FloatArray = field(default_factory=lambda: np.zeros(len(CHANNELS)))
+    digit: float = 0.0
+    turn: float = 0.0
+    waves: dict[WaveShape, list[float]] = field(default_factory=dict)
+
+
+class Modifier(ABC):
+    """
+    What a parameter does.
+
+    Attributes
+    ----------
+    fields : the numbers of the drive's configuration that it stands for
+    how : how it changes them
+
+    """
+
+    fields: tuple[str, ...] = ()
+    how: str = ADD
+
+
+class RunModifier(Modifier):
+    """Modifies a run before it is simulated."""
+
+    @abstractmethod
+    def apply(self, run: RunSetup, value: float) -> None:
+        """Modify the run."""
+
+
+class ReadingModifier(Modifier):
+    """Modifies readings after a run."""
+
+    @abstractmethod
+    def apply_to_readings(self, readings: Readings, value: float) -> None:
+        """Modify the readings."""
+
+
+@dataclass(frozen=True)
+class Change(RunModifier):
+    """Changes numbers of the drive's record."""
+
+    how: str
+    fields: tuple[str, ...]
+
+    def apply(self, run: RunSetup, value: float) -> None:
+        for place in _places(run.kind, self.fields):
+            change(run.numbers, place, self.how, value)
+
+
+@cache
+def _places(kind: np.dtype[Any], fields: tuple[str, ...]) -> tuple[int, ...]:
+    return tuple(place_of(kind, path) for path in fields)
+
+
+def change(numbers: FloatArray, place: int, how: str, value: float) -> None:
+    """Change one number of a record."""
+    if how == SCALE:
+        numbers[place] *= 1.0 + value
+    elif how == ADD:
+        numbers[place] += value
+    else:
+        numbers[place] = value
+
+
+@dataclass(frozen=True)
+class SupplyGain(RunModifier):
+    """Scales the voltages of the source of bias."""
+
+    def apply(self, run: RunSetup, value: float) -> None:
+        run.bias = Bias(run.bias.before * (1.0 + value), run.bias.after * (1.0 + value),
+                        run.bias.at)
+
+
+@dataclass(frozen=True)
+class CommandDelay(RunModifier):
+    """Delays the rate command."""
+
+    def apply(self, run: RunSetup, value: float) -> None:
+        run.delay = value
+
+
+@dataclass(frozen=True)
+class ReadingGain(ReadingModifier):
+    """Scales the reading of a channel."""
+
+    channel: int
+    fields: tuple[str, ...] = ()
+
+    def apply_to_readings(self, readings: Readings, value: float) -> None:
+        readings.gain[self.channel] += value
+
+
+@dataclass(frozen=True)
+class ReadingZero(ReadingModifier):
+    """Shifts the reading of a channel."""
+
+    channel: int
+    fields: tuple[str, ...] = ()
+
+    def apply_to_readings(self, readings: Readings, value: float) -> None:
+        readings.zero[self.channel] += value
+
+
+@dataclass(frozen=True)
+class ClockShift(ReadingModifier):
+    """Reads every channel later."""
+
+    def apply_to_readings(self, readings: Readings, value: float) -> None:
+        readings.values += value * readings.slopes
+
+
+@dataclass(frozen=True)
+class Digit(ReadingModifier):
+    """Rounds the encoder's reading to a digit."""
+
+    fields = ('plant.encoder.step',)
+    how = SET
+
+    def apply_to_readings(self, readings: Readings, value: float) -> None:
+        readings.digit = value
+
+
+@dataclass(frozen=True)
+class DigitTurn(ReadingModifier):
+    """Shifts where the encoder rounds, by a share of its digit."""
+
+    def apply_to_readings(self, readings: Readings, value: float) -> None:
+        readings.turn = value
+
+
+@dataclass(frozen=True)
+class AntennaParameter(Parameter):
+    """A parameter of the antenna, with what it does."""
+
+    modifier: Modifier = Modifier()
+
+
+def add(*fields: str) -> Change:
+    """Return the modifier that adds to numbers of the record."""
+    return Change(ADD, fields)
+
+
+def scale(*fields: str) -> Change:
+    """Return the modifier that scales numbers of the record by 1 + value."""
+    return Change(SCALE, fields)
+
+
+def set_to(*fields: str) -> Change:
+    """Return the modifier that sets numbers of the record."""
+    return Change(SET, fields)
