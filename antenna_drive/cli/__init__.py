@@ -73,6 +73,7 @@ COMMANDS = {
     'diagnose': Command('diagnose', 'say where a real drive and the model part, and why'),
     'trial': Command('trial', 'make sealed test cases with an independent antenna'),
     'score': Command('score', 'score the verdicts of a trial against its truths'),
+    'thresholds': Command('thresholds', "list the diagnosis' thresholds and what they decide"),
     'servo': Command('servo', 'say what the model of an ordinary servo lacks'),
     'confusability': Command('confusability', 'measure which effects can be told apart'),
     'bench': Command('bench', 'measure speed'),

@@ -28,8 +28,10 @@ For example:
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 import sys
+from typing import TYPE_CHECKING
 
 from antenna_drive.cli.output import (
     add_json_option, Progress, replaced, STANDARD_OUTPUT, write_json,
@@ -37,6 +39,9 @@ from antenna_drive.cli.output import (
 from antenna_drive.cli.reading import warnings_in_one_line
 from antenna_drive.errors import UserError
 from antenna_drive.recording.files import read_recording
+
+if TYPE_CHECKING:
+    from antenna_drive.diagnosis import Settings
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,6 +55,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--report', metavar='FILE', help='write a self-contained page to FILE')
     parser.add_argument('--jobs', type=int, default=2, metavar='N',
                         help='simulations at once (default: 2)')
+    parser.add_argument('--threshold', action='append', default=[], metavar='NAME=VALUE',
+                        help='change a threshold; antenna-drive thresholds lists them')
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -61,6 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.jobs < 1:
         raise UserError(f'--jobs: {arguments.jobs} given, allowed is 1 or more')
     drive = load(*arguments.config)
+    settings = _settings(arguments.threshold)
     recordings = {}
     with warnings_in_one_line():
         for path in arguments.recordings:
@@ -70,7 +78,8 @@ def run(arguments: argparse.Namespace) -> int:
             recordings[name] = read_recording(path)
     with Progress('diagnosis', 1.0) as progress:
         diagnosis = diagnose_recordings(
-            recordings, drive, lambda share, doing: progress.update(share), arguments.jobs)
+            recordings, drive, lambda share, doing: progress.update(share), arguments.jobs,
+            settings)
     if arguments.json:
         write_json(diagnosis.result, arguments.json)
     if arguments.report:
@@ -80,3 +89,20 @@ def run(arguments: argparse.Namespace) -> int:
     stream_out = sys.stderr if arguments.json == STANDARD_OUTPUT else sys.stdout
     print(diagnosis.summary(), file=stream_out)
     return 0
+
+
+def _settings(changes: Sequence[str]) -> Settings:
+    """Return the thresholds with what was given changed."""
+    from antenna_drive.diagnosis.settings import DEFAULT
+    settings = DEFAULT
+    known = {name: value for name, _, value in DEFAULT.entries()}
+    for text in changes:
+        name, equals, value = text.partition('=')
+        if name not in known:
+            raise UserError(f'--threshold {text}: {name}: no such threshold; '
+                            'antenna-drive thresholds lists them')
+        try:
+            settings = settings.changed(name, type(known[name])(value))
+        except ValueError as error:
+            raise UserError(f'--threshold {text}: {value!r} given, allowed is a number') from error
+    return settings

@@ -28,14 +28,14 @@ from typing import Any
 from antenna_drive.diagnosis import localisation, unknown_input, verdict
 from antenna_drive.diagnosis.check import check_machine
 from antenna_drive.diagnosis.elimination import backward_elimination
+from antenna_drive.diagnosis.evidence import Evidence
 from antenna_drive.diagnosis.held_out import held_out
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.lack_of_fit import lack_of_fit, residual_tests
 from antenna_drive.diagnosis.least_squares import LeastSquares, prior_precision
 from antenna_drive.diagnosis.machine import Machine
 from antenna_drive.diagnosis.search import Search
-from antenna_drive.diagnosis.settings import DEFAULT, Settings, VerdictSettings
-from antenna_drive.diagnosis.verdict import Decision, LackOfFit
+from antenna_drive.diagnosis.settings import DEFAULT, Settings
 import numpy as np
 try:
     from threadpoolctl import threadpool_limits
@@ -64,9 +64,6 @@ class Diagnosis:
     result : the JSON of docs/diagnosis.md, as plain data
     machine : that was compared, with the noise of the motion that was found
     none, best : the hypotheses without and with the likeliest effects
-    hypotheses : everything that was fitted to the whole tests
-    lack : what the best hypothesis leaves
-    settings : the thresholds
 
     """
 
@@ -74,9 +71,6 @@ class Diagnosis:
     machine: Machine
     none: Hypothesis
     best: Hypothesis
-    hypotheses: Sequence[Hypothesis]
-    lack: LackOfFit
-    settings: Settings
 
     def __repr__(self) -> str:
         """Return the verdict and its first answer, in a line."""
@@ -157,8 +151,9 @@ def _diagnose(machine: Machine, progress: Progress, threads: int,
     none = hypotheses[0]
     progress(0.9, 'withheld data')
     reach = held_out(problem, none, best)
-    lack = lack_of_fit(problem, best, reach['explained_fraction']['ci95'][1])
-    decision = verdict.decide(hypotheses, lack, settings)
+    evidence = _evidence(problem, hypotheses, best, reach['explained_fraction']['ci95'][1])
+    decision = evidence.decide(settings)
+    lack = decision.lack
     places: Sequence[unknown_input.Place] = ()
     if decision.word in ('unknown_effect', 'partly_explained'):
         progress(0.95, 'where an unknown input may act')
@@ -168,37 +163,26 @@ def _diagnose(machine: Machine, progress: Progress, threads: int,
     result = {
         'verdict': decision.word,
         'where': located,
-        'which': _which(decision, settings.verdict),
+        'which': verdict.which(decision, settings.verdict, _values),
         'confusable': decision.confusable,
         'how_far': reach,
         'residual_tests': residual_tests(problem, best.state, lack),
         'may_enter_at': [vars(place) for place in places if place.evidence > 0.0],
+        'fits': evidence.as_data(),
         'seconds': time.monotonic() - began,
         'notes': list(machine.notes),
     }
     progress(1.0, 'done')
-    return Diagnosis(result, problem.machine, none, best, hypotheses, lack, settings)
+    return Diagnosis(result, problem.machine, none, best)
 
 
-def _which(decision: Decision, settings: VerdictSettings) -> list[dict[str, Any]]:
-    """Return the likeliest answers for the JSON, 'none' and 'unknown' among them."""
-    entries: list[dict[str, Any]] = []
-    likeliest = set(decision.answers[0].hypothesis.effects)
-    for answer in decision.answers[:settings.entries]:
-        effects = answer.hypothesis.effects
-        # the members of the likeliest pair, and 'none', are listed however improbable they are
-        if answer.probability >= settings.least_probability or set(effects) <= likeliest:
-            entries.append({'effects': list(effects) or ['none'],
-                            'probability': answer.probability,
-                            'parameters': _values(answer.hypothesis)})
-    if ['none'] not in [entry['effects'] for entry in entries]:
-        share = next(a.probability for a in decision.answers if not a.hypothesis.effects)
-        entries.append({'effects': ['none'], 'probability': share, 'parameters': {}})
-    entries.append({'effects': ['unknown'], 'probability': decision.unknown, 'parameters': {}})
-    total = sum(entry['probability'] for entry in entries)
-    for entry in entries:
-        entry['probability'] /= total
-    return sorted(entries, key=lambda entry: -entry['probability'])
+def _evidence(problem: LeastSquares, hypotheses: Sequence[Hypothesis], best: Hypothesis,
+              explained: float | None) -> Evidence:
+    """Return the fits with what each leaves; only that of the best has converged."""
+    top = verdict.best(hypotheses, problem.settings)
+    return Evidence(hypotheses, [
+        lack_of_fit(problem, best if h is top else h, explained if h.effects else None)
+        for h in hypotheses])
 
 
 def _values(hypothesis: Hypothesis) -> dict[str, Any]:

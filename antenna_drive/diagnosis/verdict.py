@@ -23,9 +23,10 @@ hypothesis leaves.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import math
+from typing import Any
 
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.settings import Settings, VerdictSettings
@@ -78,6 +79,7 @@ class Decision:
     word : no_gap, explained, partly_explained or unknown_effect
     answers : the hypotheses by score, with probabilities that leave room for `unknown`
     unknown : probability of something outside the catalogue
+    lack : what the best hypothesis leaves
     confusable : groups of effects that the data cannot tell apart
 
     """
@@ -85,6 +87,7 @@ class Decision:
     word: str
     answers: Sequence[Answer]
     unknown: float
+    lack: LackOfFit
     confusable: Sequence[Sequence[str]]
 
 
@@ -112,7 +115,41 @@ def decide(hypotheses: Sequence[Hypothesis], lack: LackOfFit, settings: Settings
         word = 'no_gap'
     else:
         word = 'explained' if unknown < settings.verdict.partly else 'partly_explained'
-    return Decision(word, answers, unknown, confusable(hypotheses, settings) if named else [])
+    return Decision(word, answers, unknown, lack,
+                    confusable(hypotheses, settings) if named else [])
+
+
+def which(decision: Decision, settings: VerdictSettings,
+          values: Callable[[Hypothesis], dict[str, Any]] = lambda hypothesis: {},
+          ) -> list[dict[str, Any]]:
+    """
+    Return the likeliest answers for the JSON, 'none' and 'unknown' among them.
+
+    Parameters
+    ----------
+    decision, settings
+        from `decide`, and its thresholds
+    values
+        returns the parameters of an answer
+
+    """
+    entries: list[dict[str, Any]] = []
+    likeliest = set(decision.answers[0].hypothesis.effects)
+    for answer in decision.answers[:settings.entries]:
+        effects = answer.hypothesis.effects
+        # the members of the likeliest pair, and 'none', are listed however improbable they are
+        if answer.probability >= settings.least_probability or set(effects) <= likeliest:
+            entries.append({'effects': list(effects) or ['none'],
+                            'probability': answer.probability,
+                            'parameters': values(answer.hypothesis)})
+    if ['none'] not in [entry['effects'] for entry in entries]:
+        share = next(a.probability for a in decision.answers if not a.hypothesis.effects)
+        entries.append({'effects': ['none'], 'probability': share, 'parameters': {}})
+    entries.append({'effects': ['unknown'], 'probability': decision.unknown, 'parameters': {}})
+    total = sum(entry['probability'] for entry in entries)
+    for entry in entries:
+        entry['probability'] /= total
+    return sorted(entries, key=lambda entry: -entry['probability'])
 
 
 class _Scores:

@@ -1,0 +1,182 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+r"""
+List the thresholds of the diagnosis, and say what halving and doubling them does to a trial.
+
+Without TRIAL the table is printed: name, value, unit, what it decides, which trial set it. With
+TRIAL, a folder of `antenna-drive trial --diagnose`, every verdict is decided anew from the fits
+that it keeps, with each threshold of the verdict halved and doubled. That takes seconds, because
+nothing is fitted. Thresholds of the search change the fits themselves: --again runs the first
+--cases diagnoses with one of them changed, which takes minutes; interrupted, it goes on.
+
+For example:
+
+  antenna-drive thresholds
+  antenna-drive thresholds trial --json -
+  antenna-drive thresholds trial --again search.singles search.reach --cases 10
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+import json
+import math
+from pathlib import Path
+import sys
+from typing import Any
+
+from antenna_drive.cli.output import add_json_option, Progress, STANDARD_OUTPUT, write_json
+from antenna_drive.diagnosis.evidence import Evidence
+from antenna_drive.diagnosis.settings import DEFAULT, Settings
+from antenna_drive.diagnosis.verdict import which
+from antenna_drive.errors import UserError
+from antenna_drive.trial import sealing
+from antenna_drive.trial.batch import diagnose_case, VERDICT
+from antenna_drive.trial.scorecard import Case, score
+from antenna_drive.trial.verdict import parse_verdict, read_verdict
+
+# Groups whose thresholds act on kept fits; the fits depend on the others.
+DECIDED = ('penalty', 'verdict')
+FIGURES = ('top1', 'within_set', 'pairs_both', 'no_gap_on_none', 'auroc_unknown',
+           'overconfident_outside', 'ece')
+FACTORS = {'halved': 0.5, 'doubled': 2.0}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.add_argument('trial', nargs='?', type=Path, metavar='TRIAL',
+                        help='folder of a trial whose cases are diagnosed')
+    parser.add_argument('--again', nargs='+', default=[], metavar='NAME',
+                        help='thresholds of the search to run diagnoses again with')
+    parser.add_argument('--cases', type=int, default=10, metavar='N',
+                        help='how many cases --again takes (default: %(default)s)')
+    parser.add_argument('--jobs', type=int, default=2, metavar='N',
+                        help='diagnoses at once for --again (default: %(default)s)')
+    add_json_option(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the table, or what changed thresholds do."""
+    table = [{'name': name, 'value': value, **item.metadata}
+             for name, item, value in DEFAULT.entries()]
+    if arguments.trial is None:
+        if arguments.json:
+            write_json(table, arguments.json)
+        if arguments.json != STANDARD_OUTPUT:
+            for row in table:
+                print(f'{row["name"]:32s} {row["value"]:<10g} {row["unit"]:20s} '
+                      f'{row["set_by"]:20s} {row["decides"]}')
+        return 0
+    if arguments.again:
+        found = _run_again(arguments)
+    else:
+        found = _decided_anew(arguments.trial)
+    if arguments.json:
+        write_json(found, arguments.json)
+    out = sys.stderr if arguments.json == STANDARD_OUTPUT else sys.stdout
+    print(f'{"":44s}' + ''.join(f'{name[:12]:>14s}' for name in FIGURES), file=out)
+    for name, figures in found.items():
+        print(f'{name:44s}' + ''.join(f'{figures[key]:14.3f}' for key in FIGURES), file=out)
+    return 0
+
+
+def variants(groups: tuple[str, ...]) -> Iterator[tuple[str, Settings]]:
+    """Yield the settings with each threshold of these groups halved and doubled."""
+    for name, _, value in DEFAULT.entries():
+        if name.partition('.')[0] in groups:
+            yield from _halved_and_doubled(name, value)
+
+
+def _halved_and_doubled(name: str, value: Any) -> Iterator[tuple[str, Settings]]:
+    for word, factor in FACTORS.items():
+        changed = max(1, round(factor * value)) if isinstance(value, int) else factor * value
+        if changed != value:
+            yield f'{name} {word}, {changed:g}', DEFAULT.changed(name, changed)
+
+
+def _decided_anew(folder: Path) -> dict[str, Mapping[str, float]]:
+    manifest = sealing.read_manifest(folder)
+    kept: list[tuple[Any, dict[str, Any], Evidence]] = []
+    for name in manifest['seals']:
+        path = folder / name / VERDICT
+        if not path.exists():
+            continue
+        content = json.loads(path.read_text(encoding='utf-8'))
+        if 'fits' not in content:
+            raise UserError(f'{path}: fits: is missing; diagnose the trial anew with this version')
+        kept.append((sealing.open_truth(folder, name, manifest), content,
+                     Evidence.of_data(content['fits'])))
+    if not kept:
+        raise UserError(f'{folder}: no case is diagnosed; antenna-drive trial --diagnose does it')
+    return {name: _scored(kept, settings)
+            for name, settings in (('as they are', DEFAULT), *variants(DECIDED))}
+
+
+def _scored(kept: list[tuple[Any, dict[str, Any], Evidence]],
+            settings: Settings) -> dict[str, float]:
+    """Return the figures of the verdicts that kept fits give with these thresholds."""
+    cases = []
+    for truth, content, evidence in kept:
+        decision = evidence.decide(settings)
+        cases.append(Case(truth, parse_verdict({
+            **content, 'verdict': decision.word, 'confusable': decision.confusable,
+            'which': which(decision, settings.verdict)})))
+    figures = score(cases, 0)
+    return {key: float(figures[key]) for key in FIGURES}
+
+
+def _run_again(arguments: argparse.Namespace) -> dict[str, Mapping[str, float]]:
+    """Diagnose the first cases again with changed thresholds; what is there is kept."""
+    folder: Path = arguments.trial
+    manifest = sealing.read_manifest(folder)
+    names = list(manifest['seals'])[:arguments.cases]
+    values = {name: value for name, _, value in DEFAULT.entries()}
+    wanted: dict[str, list[str]] = {'as they are': []}
+    for name in arguments.again:
+        if name not in values:
+            raise UserError(f'--again: {name}: no such threshold; antenna-drive thresholds lists '
+                            'them')
+        for label, _ in _halved_and_doubled(name, values[name]):
+            wanted[label] = ['--threshold', f'{name}={label.rpartition(" ")[2]}']
+    jobs = [(_linked(folder, label, case), options)
+            for label, options in wanted.items() for case in names]
+    with Progress('diagnoses', len(jobs)) as progress, ThreadPoolExecutor(arguments.jobs) as pool:
+        runs = pool.map(lambda job: (job[0] / VERDICT).exists() or diagnose_case(
+            job[0], ['--jobs', '1', *job[1]], math.inf), jobs)
+        for done, _ in enumerate(runs, start=1):
+            progress.update(done)
+    found: dict[str, Mapping[str, float]] = {}
+    for label in wanted:
+        cases = []
+        for case in names:
+            path = _linked(folder, label, case) / VERDICT
+            verdict = read_verdict(path) if path.exists() else None
+            cases.append(Case(sealing.open_truth(folder, case, manifest), verdict))
+        figures = score(cases, 0)
+        found[label] = {key: float(figures[key]) for key in FIGURES}
+    return found
+
+
+def _linked(folder: Path, label: str, case: str) -> Path:
+    """Return a folder for one diagnosis, with links to the case's recordings."""
+    if label == 'as they are':
+        return folder / case
+    place = folder / 'thresholds' / label.replace(', ', '_').replace(' ', '_') / case
+    if not place.exists():
+        place.mkdir(parents=True)
+        for path in (folder / case).glob('rec_*'):
+            (place / path.name).symlink_to(path.resolve())
+    return place
