@@ -16,7 +16,8 @@ Every threshold of the diagnosis: its unit, what it decides, and the trial that 
 
 `Settings()` is what a diagnosis uses unless it is given another record. `antenna-drive thresholds`
 prints the table and says what halving and doubling a threshold does to the score of a trial.
-Trials are listed in docs/history.md; 'design' means that the value was chosen without a trial.
+Trials are listed in docs/history.md. 'Practice cases' are those before the first sealed trial;
+'design' means that the value was chosen without any.
 """
 
 from __future__ import annotations
@@ -28,9 +29,8 @@ from typing import Any, TypeVar
 Group = TypeVar('Group')
 
 DESIGN = 'design'
-STUDY = 'feasibility study'
+PRACTICE = 'practice cases'
 TRIAL_0 = 'trial 0'
-TRIAL_1 = 'trial 1'
 TRIAL_2 = 'trial 2'
 
 
@@ -43,7 +43,7 @@ class FitSettings:
     """Robust Levenberg-Marquardt fits."""
 
     outlier: float = _setting(
-        3.0, 'noise sigma', 'residual beyond which the loss grows with its logarithm', STUDY)
+        3.0, 'noise sigma', 'residual beyond which the loss grows with its logarithm', PRACTICE)
     initial_damping: float = _setting(1e-3, '1', 'damping with which a fit begins')
     least_damping: float = _setting(1e-6, '1', 'lower bound of the damping')
     greatest_damping: float = _setting(1e4, '1', 'upper bound of the damping')
@@ -62,7 +62,7 @@ class FitSettings:
         0.02, '1', 'mean change of the weights after which the Hessian is made anew')
     broyden_error: float = _setting(
         0.5, '1', "step's error, as a share of its prediction, up to which it corrects the "
-        'Jacobian', TRIAL_0)
+        'Jacobian', PRACTICE)
     dead_column: float = _setting(
         1e-6, 'noise sigma', 'greatest change by a step below which a derivative is rounding')
     runaway: float = _setting(1e4, 'noise sigma', 'bound of every residual')
@@ -74,14 +74,14 @@ class SearchSettings:
     """The search for effects."""
 
     singles: int = _setting(
-        12, '1', 'effects that are fitted after the screening', STUDY)
-    finalists: int = _setting(5, '1', 'single effects that are fitted further', STUDY)
-    bases: int = _setting(3, '1', 'single effects that are given partners', STUDY)
-    partners: int = _setting(5, '1', 'partners that are fitted for each of them', STUDY)
+        12, '1', 'effects that are fitted after the screening', PRACTICE)
+    finalists: int = _setting(5, '1', 'single effects that are fitted further', PRACTICE)
+    bases: int = _setting(3, '1', 'single effects that are given partners', PRACTICE)
+    partners: int = _setting(5, '1', 'partners that are fitted for each of them', PRACTICE)
     partner_gain: float = _setting(
-        12.0, 'half chi-square', 'promised gain below which a partner is not fitted', TRIAL_0)
+        12.0, 'half chi-square', 'promised gain below which a partner is not fitted', PRACTICE)
     partner_gain_share: float = _setting(
-        1e-3, '1', 'the same as a share of the cost of the best single effect', TRIAL_0)
+        1e-3, '1', 'the same as a share of the cost of the best single effect', PRACTICE)
     base_ratio: float = _setting(
         3.0, '1', 'cost, as a multiple of the best, up to which an effect is given partners')
     second_form: float = _setting(
@@ -91,12 +91,12 @@ class SearchSettings:
     passes: int = _setting(3, '1', 'greatest number of passes over the whole tests')
     reach: float = _setting(
         250.0, 'half chi-square', 'excess over the best cost beyond which a fit is given up',
-        TRIAL_0)
+        PRACTICE)
     strong: float = _setting(
-        1.5, 'noise sigma', 'residual level from which the misfit counts as noise', STUDY)
+        1.5, 'noise sigma', 'residual level from which the misfit counts as noise', PRACTICE)
     sharper: float = _setting(
         0.7, '1', 'share of the noise scale below which the scale is lowered and fits go on',
-        STUDY)
+        PRACTICE)
     scale_passes: int = _setting(3, '1', 'times that the noise scale is lowered')
     first_passes: int = _setting(5, '1', 'passes of the first fit of the nuisances')
     first_gain: float = _setting(
@@ -113,7 +113,7 @@ class SearchSettings:
     final_gain: float = _setting(
         0.01, '1', 'gain of such a pass, as a share of the cost, below which it has ended')
     scanned: int = _setting(
-        5, '1', 'effects that are fitted from a value found by a scan', TRIAL_0)
+        5, '1', 'effects that are fitted from a value found by a scan', PRACTICE)
     first_iterations: int = _setting(5, '1', 'iterations of a first fit of an effect')
     iterations: int = _setting(8, '1', 'iterations of a further fit')
     pair_iterations: int = _setting(6, '1', "iterations of a pair's further fit")
@@ -121,20 +121,20 @@ class SearchSettings:
     full_iterations: int = _setting(6, '1', 'iterations of a fit to the whole tests')
     doubtful: float = _setting(
         0.25, '1', 'gain, as a share of the cost, below which an effect is fitted without and '
-        'judged anew', TRIAL_1)
+        'judged anew', TRIAL_2)
 
 
 @dataclass(frozen=True)
 class PenaltySettings:
     """What a hypothesis pays for its complexity."""
 
-    effect: float = _setting(30.0, 'half chi-square', 'price of an effect', STUDY)
-    parameter: float = _setting(4.0, 'half chi-square', 'price of a parameter', STUDY)
+    effect: float = _setting(30.0, 'half chi-square', 'price of an effect', PRACTICE)
+    parameter: float = _setting(4.0, 'half chi-square', 'price of a parameter', PRACTICE)
     prior_parameter: float = _setting(
         8.0, 'half chi-square', 'price of a parameter with a prior: one of a course over time, '
-        'which imitates anything slow', TRIAL_0)
+        'which imitates anything slow', PRACTICE)
     scanned: float = _setting(
-        10.0, 'half chi-square', 'price of a form that a scan has chosen', TRIAL_0)
+        10.0, 'half chi-square', 'price of a form that a scan has chosen', PRACTICE)
     tolerated: float = _setting(
         24.0, 'half chi-square', 'price of an effect as small as its tolerance', TRIAL_0)
 
@@ -144,40 +144,40 @@ class VerdictSettings:
     """From costs to probabilities."""
 
     temperature: float = _setting(
-        8.0, 'half chi-square', 'cost that makes a hypothesis e times less probable', TRIAL_0)
+        8.0, 'half chi-square', 'cost that makes a hypothesis e times less probable', PRACTICE)
     form_error: float = _setting(
         0.02, '1', "gain, as a share of the noise's cost, that an error of the model's form may "
         'have', TRIAL_0)
     second_effect: float = _setting(
-        60.0, 'half chi-square', 'price of a second effect', TRIAL_0)
+        60.0, 'half chi-square', 'price of a second effect', PRACTICE)
     second_share: float = _setting(
         0.015, '1', 'the same as a share of what the first effect gains', TRIAL_0)
     twin_share: float = _setting(
-        0.005, '1', 'the same where both are one effect in two places', TRIAL_0)
+        0.005, '1', 'the same where both are one effect in two places', PRACTICE)
     confusable: float = _setting(
         14.0, 'half chi-square', 'excess cost up to which an effect counts as confusable',
-        TRIAL_0)
+        PRACTICE)
     largest_group: int = _setting(5, '1', 'effects of a confusable group')
     slow: float = _setting(
-        1.0, '1', 'slow excess of the residual that tips the scales to unknown', TRIAL_0)
-    slow_slope: float = _setting(1.6, '1', 'how sharply', TRIAL_0)
+        1.0, '1', 'slow excess of the residual that tips the scales to unknown', PRACTICE)
+    slow_slope: float = _setting(1.6, '1', 'how sharply', PRACTICE)
     left: float = _setting(
-        0.06, '1', 'share of the gap left that tips the scales to unknown', TRIAL_0)
-    left_slope: float = _setting(1.6, '1', 'how sharply', TRIAL_0)
+        0.06, '1', 'share of the gap left that tips the scales to unknown', PRACTICE)
+    left_slope: float = _setting(1.6, '1', 'how sharply', PRACTICE)
     fast: float = _setting(
-        5.0, 'noise variance', 'fast residual that tips the scales to unknown', TRIAL_0)
-    fast_slope: float = _setting(4.0, '1', 'how sharply', TRIAL_0)
+        5.0, 'noise variance', 'fast residual that tips the scales to unknown', PRACTICE)
+    fast_slope: float = _setting(4.0, '1', 'how sharply', PRACTICE)
     fast_left: float = _setting(
         0.3, '1', 'share of that residual left that tips the scales to unknown', TRIAL_0)
     fast_left_slope: float = _setting(3.0, '1', 'how sharply', TRIAL_0)
     implausible_slope: float = _setting(
-        6.0, '1', 'how sharply implausible values of an effect speak for unknown', TRIAL_0)
+        6.0, '1', 'how sharply implausible values of an effect speak for unknown', PRACTICE)
     held_out: float = _setting(
-        0.4, '1', 'explained share of withheld data below which an effect has failed', TRIAL_0)
-    held_out_slope: float = _setting(12.0, '1', 'how sharply', TRIAL_0)
+        0.4, '1', 'explained share of withheld data below which an effect has failed', PRACTICE)
+    held_out_slope: float = _setting(12.0, '1', 'how sharply', PRACTICE)
     noise_only: float = _setting(
-        0.3, '1', 'slow excess below which an effect cannot have failed', TRIAL_0)
-    noise_only_slope: float = _setting(4.0, '1', 'how sharply', TRIAL_0)
+        0.3, '1', 'slow excess below which an effect cannot have failed', PRACTICE)
+    noise_only_slope: float = _setting(4.0, '1', 'how sharply', PRACTICE)
     least_unknown: float = _setting(0.05, '1', 'least probability of unknown', TRIAL_0)
     most_unknown: float = _setting(0.88, '1', 'greatest probability of unknown', TRIAL_0)
     partly: float = _setting(
