@@ -64,7 +64,7 @@ setup(
     version='0.1.0',
     packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
     package_data={PACKAGE: ['py.typed', '**/*.yaml', '**/*.html', '**/*.js', '**/*.css',
-                            '**/*.c']},
+                            '**/LICENSE', '**/*.c']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
         (f'share/{PACKAGE}', ['package.xml']),
@@ -79,6 +79,8 @@ setup(
         # read the old one's cache: a new series is let in once the suite has passed with it.
         'numba >= 0.58, < 0.69',
         'PyYAML >= 5.4',
+        # the pages: what a recording says is escaped by a library that is known for it
+        'Jinja2 >= 3.0',
         # a diagnosis makes its fits side by side, each with a linear algebra of one thread
         'threadpoolctl >= 3.0',
     ],

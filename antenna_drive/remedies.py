@@ -23,6 +23,7 @@ REMEDIES = {
     'std_msgs': ROS_REMEDY,
     'rosgraph_msgs': ROS_REMEDY,
     'diagnostic_msgs': ROS_REMEDY,
+    'jinja2': 'pip install Jinja2',
     'matplotlib': 'pip install matplotlib',
     'mcap': 'pip install mcap',
     'cma': 'pip install cma',

@@ -22,7 +22,6 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Callable, Sequence
-from html import escape
 import io
 import math
 from typing import Any
@@ -32,6 +31,7 @@ from antenna_drive.article.experiments import GAINS, LAGS, SAW_TOOTH
 from antenna_drive.article.measures import NEW_CIRCUIT, OLD_CIRCUIT, Results
 from antenna_drive.article.profile_measures import loaded_axis as loop_of_load
 from antenna_drive.article.static_profile import as_in_the_text, bias_voltage, NEW_GAIN
+from antenna_drive.pages.builder import render
 from antenna_drive.parameters.sets import changed, TorqueShare
 from antenna_drive.physics.backlash import dead_zone
 from antenna_drive.physics.friction import friction_torque
@@ -333,33 +333,8 @@ def draw_all(results: Results, progress: Callable[[int, int], None] | None = Non
             drawing = io.BytesIO()
             draw(results).savefig(drawing, format='svg', metadata={'Date': None})
             files[f'fig_{number:02d}.svg'] = drawing.getvalue()
-            parts.append((number, caption, drawing.getvalue()))
-    files['figures.html'] = _page(parts).encode()
+            parts.append((number, caption, b64encode(drawing.getvalue()).decode()))
+    files['figures.html'] = render(
+        'figures.html', title="The article's figures, drawn anew",
+        lead='Each figure is also a file of its own.', figures=parts).encode()
     return files
-
-
-def _page(parts: Sequence[tuple[int, str, bytes]]) -> str:
-    """Return one page with all figures in it, for the screen and for print."""
-    # as pictures, not as part of the page: ids within one drawing are not those of another
-    figures = '\n'.join(
-        f'<figure id="fig_{number:02d}"><img alt="Fig. {number}" src="data:image/svg+xml;base64,'
-        f'{b64encode(drawing).decode()}"><figcaption><b>Fig. {number}.</b> {escape(caption)}'
-        '</figcaption></figure>' for number, caption, drawing in parts)
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<title>The article's figures, drawn anew</title>
-<style>
-body {{ font: 11pt/1.4 serif; max-width: 17cm; margin: 1cm auto; color: #111 }}
-figure {{ margin: 0 0 1cm; break-inside: avoid }}
-img {{ width: 100% }}
-figcaption {{ font-size: 10pt }}
-</style>
-</head>
-<body>
-<h1>The article's figures, drawn anew</h1>
-{figures}
-</body>
-</html>
-"""

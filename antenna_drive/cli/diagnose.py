@@ -83,9 +83,10 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         write_json(diagnosis.result, arguments.json)
     if arguments.report:
-        from antenna_drive.diagnosis.page import page
+        from antenna_drive.diagnosis.page import contents
+        from antenna_drive.pages.builder import render
         with replaced(Path(arguments.report)) as stream:
-            stream.write(page(diagnosis).encode())
+            stream.write(render('verdict.html', **vars(contents(diagnosis))).encode())
     stream_out = sys.stderr if arguments.json == STANDARD_OUTPUT else sys.stdout
     print(diagnosis.summary(), file=stream_out)
     return 0

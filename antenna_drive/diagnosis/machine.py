@@ -26,6 +26,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 import math
 
+from antenna_drive.diagnosis.diagram import Diagram
 import numpy as np
 from numpy.typing import NDArray
 
@@ -223,6 +224,9 @@ class Machine(ABC):
     experiments, nuisances, effects : as given; the effects by id
     disturbance_inputs : where an unknown input may act; readings need not be listed
     notes : what the machine inferred or missed, for people
+    diagram : picture of the machine for the page; None for a block for each component
+    advice : tests that settle what is open: names of effects without their component (empty for
+        any), and what to record
 
     """
 
@@ -231,6 +235,8 @@ class Machine(ABC):
     effects: Mapping[str, Effect]
     disturbance_inputs: Sequence[DisturbanceInput] = ()
     notes: Sequence[str] = ()
+    diagram: Diagram | None = None
+    advice: Sequence[tuple[Sequence[str], str]] = ()
 
     def __init__(self, experiments: Iterable[Experiment], nuisances: Iterable[Parameter] = (),
                  effects: Iterable[Effect] = ()) -> None:

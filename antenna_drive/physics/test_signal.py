@@ -54,11 +54,11 @@ def _cycle(t: float, p: Waveform) -> float:
 @inner
 def _saw_tooth(s: float) -> tuple[float, float]:
     """Return a symmetric triangle that begins at zero and rises, and its slope per period."""
-    if s < 0.25 - _ON_TIME:
-        return 4.0 * s, 4.0
-    if s < 0.75 - _ON_TIME:
-        return 2.0 - 4.0 * s, -4.0
-    return 4.0 * s - 4.0, 4.0
+    rise = 4.0 * s - 1.0
+    if rise < 0.0:
+        rise += 4.0
+    falls = 0.25 - _ON_TIME <= s < 0.75 - _ON_TIME
+    return abs(rise - 2.0) - 1.0, -4.0 if falls else 4.0
 
 
 @inner
@@ -69,7 +69,9 @@ def _shape(t: float, p: Waveform, bits: FloatArray) -> tuple[float, float]:
     if kind == SQUARE:
         return (1.0 if _cycle(t, p) < 0.5 - _ON_TIME else -1.0), 0.0
     if kind == SAW_TOOTH:
-        value, slope = _saw_tooth(_cycle(t, p))
+        # it jumps nowhere: what is a little before a period's end need not count as after it
+        turns = t / p.period + p.phase
+        value, slope = _saw_tooth(turns - math.floor(turns))
         return value, slope / p.period
     if kind == SAW_TOOTH_JUMP:
         s = _cycle(t, p)
@@ -120,6 +122,27 @@ def waveform(t: float, p: Waveform, bits: FloatArray) -> tuple[float, float]:
         return p.offset, 0.0
     value, slope = _shape(max(since, 0.0), p, bits)
     return p.offset + p.amplitude * value, p.amplitude * slope
+
+
+@compiled
+def values(t: FloatArray, p: Waveform, bits: FloatArray, y: FloatArray) -> None:
+    """
+    Write the values of a test signal at any times.
+
+    Parameters
+    ----------
+    t
+        times since the waveform was chosen [s], shape (n,)
+    p
+        record of Waveform
+    bits
+        from `prbs_bits`; any array if the waveform is another
+    y
+        receives the values, shape (n,)
+
+    """
+    for i in range(t.size):
+        y[i] = waveform(t[i], p, bits)[0]
 
 
 @compiled

@@ -19,12 +19,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
+from antenna_drive.pages.curves import COLOURS
 from antenna_drive.recording.panels import panels_of, real_amperes
 from antenna_drive.recording.recording import Recording, RecordingError
 
 FORMATS = ('png', 'pdf', 'svg')
-# Colours that stay apart for colour-blind readers and in print (Okabe and Ito).
-COLOURS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9')
 
 
 def draw(recording: Recording, stream: IO[bytes], form: str, *,

@@ -30,6 +30,7 @@ from typing import Any, ClassVar, get_args, get_type_hints
 from antenna_drive.errors import one_line
 from antenna_drive.parameters.plain_yaml import read_yaml
 from antenna_drive.parameters.schema import Entry, nearest, ParameterError
+from antenna_drive.parameters.sets import SINES_LIMIT
 import yaml
 
 FILE_NAME = 'test_sheet.yaml'
@@ -216,6 +217,9 @@ def _parse(key: str, tree: object, classes: tuple[type, ...]) -> Any:
             if not isinstance(value, list):
                 raise ParameterError(f'{full}: {one_line(repr(value))} given, allowed is '
                                      'a list of numbers')
+            if len(value) > SINES_LIMIT:
+                raise ParameterError(f'{full}: {len(value)} numbers given, '
+                                     f'allowed are up to {SINES_LIMIT}')
             content[name] = tuple(metadata['each'].check(f'{full}[{i}]', plain_value(item))
                                   for i, item in enumerate(value))
         else:

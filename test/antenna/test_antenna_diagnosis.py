@@ -25,14 +25,15 @@ import math
 from typing import Any
 
 from antenna_drive.cli import main
-from antenna_drive.diagnosis.diagnosis import value_lines
-from antenna_drive.diagnosis.page import page
+from antenna_drive.diagnosis.diagnosis import Diagnosis, value_lines
+from antenna_drive.diagnosis.page import contents
 from antenna_drive.errors import UserError
 from antenna_drive.machines.antenna.diagnose import diagnose_recordings
 from antenna_drive.machines.antenna.field_test import CHANNELS
 from antenna_drive.machines.antenna.machine import AntennaMachine
 from antenna_drive.machines.antenna.planned_tests import BUILT_IN, confusability_of, planned
 from antenna_drive.machines.antenna.waves import Wave
+from antenna_drive.pages.builder import render
 from antenna_drive.parameters import load
 from antenna_drive.recording.csv_format import write_csv
 from antenna_drive.recording.recording import Recording
@@ -68,6 +69,10 @@ def made(point: Any, seconds: float, names: tuple[str, ...] = ('square', 'triang
         recordings[name] = Recording.from_arrays(
             test['test_signal/rate_command'].time_s, signals, sheet=test.sheet)
     return recordings
+
+
+def page(diagnosis: Diagnosis) -> str:
+    return render('verdict.html', **vars(contents(diagnosis)))
 
 
 def check_schema(result: Any) -> Any:
@@ -110,7 +115,7 @@ def test_offsets_within_the_tolerance_are_no_gap() -> None:
     check_schema(diagnosis.result)
     assert diagnosis.result['verdict'] == 'no_gap'
     text = page(diagnosis)
-    assert text.startswith('<!DOCTYPE html>') and 'No gap' in text
+    assert text.startswith('<!doctype html>') and 'No gap' in text
     assert 'http' not in text.replace('http-equiv', '')
 
 

@@ -21,12 +21,12 @@ import math
 from pathlib import Path
 import re
 
+from antenna_drive.pages.curves import COLOURS
 from antenna_drive.recording.panels import PANELS, panels_of
-from antenna_drive.recording.picture import COLOURS
-from antenna_drive.recording.recording import Change, Channel, Recording, RecordingError
-from antenna_drive.recording.report import page, thinned
+from antenna_drive.recording.recording import Change, Recording, RecordingError
+from antenna_drive.recording.report import page
 from antenna_drive.recording.sheet import parse_sheet
-from chromium import EXECUTABLE, Page  # type: ignore[import-not-found]
+from chromium import EXECUTABLE, Page
 import numpy as np
 import pytest
 
@@ -183,25 +183,6 @@ def test_the_page_holds_the_samples(tmp_path: Path) -> None:
     assert all(c['n'] == 4000 and c['step'] == 1e-3 for p in data['panels'] for c in p['curves'])
     assert 'http' not in html.replace('http-equiv', '').replace(
         HOSTILE, '').replace('http://127.0.0.1:9/x', '')
-
-
-def test_thinning_keeps_peaks_and_ends() -> None:
-    rng = np.random.default_rng(3)
-    values = rng.standard_normal(100_003)
-    values[[777, 88_888]] = 50.0, -50.0
-    channel = Channel('A', np.cumsum(rng.integers(1, 9, len(values))), values)
-    few, width = thinned(channel, 1000)
-    assert len(few) <= 1010
-    assert width == 201
-    assert (few.values.max(), few.values.min()) == (50.0, -50.0)
-    assert few.time_ns[0] == channel.time_ns[0]
-    assert few.time_ns[-1] == channel.time_ns[-1]
-    assert set(few.time_ns.tolist()) <= set(channel.time_ns.tolist())
-    for low in range(0, 100_003 - 201, 201 * 50):  # each run's extremes are there
-        run = channel.values[low:low + 201]
-        assert run.max() in few.values
-        assert run.min() in few.values
-    assert thinned(channel, 200_000) == (channel, 1)
 
 
 def test_nothing_to_draw_is_said() -> None:

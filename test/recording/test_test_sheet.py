@@ -91,6 +91,8 @@ def test_nothing_is_known_of_an_empty_file(tmp_path: Path) -> None:
     ('bias: {type: circuit, bias_pot: 1.2}', r'bias\.bias_pot: 1.2 given.*from 0 to 1'),
     ('bias: 5.69', 'bias: float given, allowed is a mapping'),
     ('waveform: {type: square, period_s: 0}', r'waveform\.period_s: 0 given'),
+    ('waveform: {type: multisine, weights: [' + 33 * '1,' + ']}',
+     r'waveform\.weights: 33 numbers given, allowed are up to 32'),
     ('waveform: {type: square, period_s: 6.3s}', r"waveform\.period_s: '6.3s' given"),
     ('waveform: {type: multisine, weights: [1, x]}', r"waveform\.weights\[1\]: 'x' given"),
     ('waveform: {type: multisine, weights: [1], phases: [0, 0]}', 'waveform:.*one of each'),

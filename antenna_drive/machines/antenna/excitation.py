@@ -21,17 +21,22 @@ of samples; between two that differ by more than their neighbours do, a jump is 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 import math
-from typing import Protocol
+from typing import Any, Protocol
 
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.emulator import batch
+from antenna_drive.parameters.records import record_of
+from antenna_drive.parameters.sets import Waveform
+from antenna_drive.physics import test_signal
 from antenna_drive.recording import sheet as sheets
 import numpy as np
 
 DEGREE = np.pi / 180.0
 # The three places in a step at which its command is read: off its ends, where jumps may be.
 _PLACES = np.array([0.1, 0.5, 0.9])
+_NO_BITS = np.ones(1)   # no test sheet has a pseudo-random sequence
 _PARABOLA = np.linalg.inv(np.vander(_PLACES, 3, increasing=True))
 
 
@@ -45,33 +50,38 @@ class Command(Protocol):
         """Return the times up to `end` at which the command or its slope jumps [s]."""
 
 
+def test_signal_of(waveform: sheets.Waveform) -> Waveform:
+    """Return the drive's test signal that plays the waveform of a test sheet."""
+    amplitude = float(waveform.amplitude_deg_s or 0.0) * DEGREE
+    if isinstance(waveform, (sheets.Square, sheets.Triangle)):
+        kind = 'square' if isinstance(waveform, sheets.Square) else 'saw_tooth'
+        return Waveform(waveform=kind, amplitude=amplitude, period=waveform.period_s or 1.0,
+                        phase=waveform.phase or 0.0)
+    start = waveform.start_s or 0.0
+    if isinstance(waveform, sheets.Multisine):
+        return Waveform(waveform='multisine', amplitude=amplitude, start_after=start,
+                        frequencies=waveform.frequencies_hz or (),
+                        weights=waveform.weights or (), phases=waveform.phases or ())
+    return Waveform(waveform='chirp', amplitude=amplitude, start_after=start,
+                    sweep_from=waveform.f0_hz or 0.0, sweep_to=waveform.f1_hz or 0.0,
+                    sweep_time=waveform.duration_s or 1.0)
+
+
 @dataclass(frozen=True)
 class SheetCommand:
-    """The waveform of a test sheet."""
+    """The waveform of a test sheet, as the drive's own test signal plays it."""
 
     waveform: sheets.Waveform
 
+    @cached_property
+    def _record(self) -> Any:
+        return record_of(test_signal_of(self.waveform))[0]
+
     def __call__(self, time: FloatArray) -> FloatArray:
         """Return the rate command [rad/s] at these times [s]."""
-        w = self.waveform
-        amplitude = float(w.amplitude_deg_s or 0.0) * DEGREE
-        if isinstance(w, (sheets.Square, sheets.Triangle)):
-            turn = np.mod(time / (w.period_s or 1.0) + (w.phase or 0.0), 1.0)
-            if isinstance(w, sheets.Square):
-                value = np.where(turn < 0.5, 1.0, -1.0)
-            else:
-                value = np.abs(np.mod(4.0 * turn - 1.0, 4.0) - 2.0) - 1.0
-            return np.where(time < 0.0, 0.0, amplitude * value)
-        since = time - (w.start_s or 0.0)
-        if isinstance(w, sheets.Multisine):
-            value = np.zeros_like(time)
-            for frequency, weight, phase in zip(w.frequencies_hz or (), w.weights or (),
-                                                w.phases or (), strict=True):
-                value += weight * np.sin(2.0 * np.pi * frequency * since + phase)
-            return np.where(since < 0.0, 0.0, amplitude * value)
-        f0, f1, duration = w.f0_hz or 0.0, w.f1_hz or 0.0, w.duration_s or 1.0
-        value = np.sin(2.0 * np.pi * (f0 + 0.5 * (f1 - f0) / duration * since) * since)
-        return np.where((since < 0.0) | (since > duration), 0.0, amplitude * value)
+        command = np.empty(time.size)
+        test_signal.values(time, self._record, _NO_BITS, command)
+        return command
 
     def knots(self, end: float) -> FloatArray:
         """Return the times up to `end` at which the command or its slope jumps [s]."""

@@ -29,7 +29,9 @@ from antenna_drive.diagnosis import (
 )
 from antenna_drive.emulator import batch
 from antenna_drive.machines.antenna import gust
+from antenna_drive.machines.antenna.advice import ADVICE
 from antenna_drive.machines.antenna.catalogue import catalogue, EXTRA_MODE
+from antenna_drive.machines.antenna.diagram import DIAGRAM
 from antenna_drive.machines.antenna.disturbances import DISTURBANCES, DriveDisturbance
 from antenna_drive.machines.antenna.excitation import (
     Bias, Longest, schedule, with_bias, with_torque,
@@ -104,6 +106,8 @@ class AntennaMachine(Machine):
 
     disturbance_inputs: Sequence[DisturbanceInput] = DISTURBANCES
     time_scales = _TIME_SCALES
+    diagram = DIAGRAM
+    advice = ADVICE
 
     def __init__(self, recordings: Mapping[str, Recording], drive: Drive, threads: int = 2,
                  tolerance: float = 0.02) -> None:

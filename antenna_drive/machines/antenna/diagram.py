@@ -1,0 +1,42 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The picture of the drive: from the rate command on the left to the encoder on the right."""
+
+from __future__ import annotations
+
+from antenna_drive.diagnosis import Block, Diagram
+
+DIAGRAM = Diagram(
+    blocks=(
+        Block('loop', 'rate command', 10, 95, 120),
+        Block('current_1', 'ammeter 1', 170, 2, 175),
+        Block('motor_1', 'motor 1, amplifiers', 170, 30, 175),
+        Block('torque_share', 'torque share, Filter 1', 170, 95, 175),
+        Block('motor_2', 'motor 2, amplifiers', 170, 160, 175),
+        Block('current_2', 'ammeter 2', 170, 188, 175),
+        Block('tach_1', 'tach 1', 380, 2, 100),
+        Block('gearbox_1', 'gearbox 1', 380, 30, 100),
+        Block('bias_voltage', 'voltmeter', 380, 95, 100),
+        Block('gearbox_2', 'gearbox 2', 380, 160, 100),
+        Block('tach_2', 'tach 2', 380, 188, 100),
+        Block('axis', 'axis and dish', 530, 95, 130),
+        Block('encoder', 'encoder', 700, 95, 100),
+    ),
+    lines=(
+        (130, 104, 170, 44), (130, 112, 170, 172), (345, 43, 380, 43), (345, 173, 380, 173),
+        (480, 43, 530, 102), (480, 173, 530, 114), (660, 108, 700, 108), (255, 95, 255, 56),
+        (255, 121, 255, 160), (345, 108, 380, 108),
+    ),
+    several={'motors': ('motor_1', 'motor_2')},
+)

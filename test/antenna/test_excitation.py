@@ -1,0 +1,81 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The waveform of a test sheet, beside that of the program that shares no code with the model."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from antenna_drive.machines.antenna.excitation import SheetCommand
+from antenna_drive.recording.sheet import parse_sheet
+from antenna_drive.trial.sheet import TestSheet
+from antenna_drive.trial.waveform import command, corners
+from hypothesis import given, strategies as st
+import numpy as np
+import pytest
+
+END = 20.0
+
+
+def number(low: float, high: float) -> st.SearchStrategy[float]:
+    return st.floats(low, high).map(lambda value: round(value, 3))
+
+
+def periodic(kind: str) -> st.SearchStrategy[dict[str, Any]]:
+    return st.fixed_dictionaries({
+        'type': st.just(kind), 'amplitude_deg_s': number(0.01, 1.0),
+        'period_s': number(0.5, 9.0), 'phase': number(-1.0, 1.0)})
+
+
+def multisine(sines: list[tuple[float, float, float]], start: float) -> dict[str, Any]:
+    frequencies, weights, phases = (list(part) for part in zip(*sines))
+    return {'type': 'multisine', 'amplitude_deg_s': 0.3, 'frequencies_hz': frequencies,
+            'weights': weights, 'phases': phases, 'start_s': start}
+
+
+WAVEFORMS = st.one_of(
+    periodic('square'), periodic('triangle'),
+    st.builds(multisine, st.lists(st.tuples(number(0.0, 9.0), number(-1.0, 1.0),
+                                            number(-4.0, 4.0)), min_size=1, max_size=32),
+              number(0.0, 3.0)),
+    st.fixed_dictionaries({
+        'type': st.just('chirp'), 'amplitude_deg_s': number(0.01, 1.0), 'f0_hz': number(0.0, 1.0),
+        'f1_hz': number(1.0, 9.0), 'duration_s': number(1.0, 25.0), 'start_s': number(0.0, 3.0)}))
+
+
+@given(WAVEFORMS)
+def test_both_programs_play_a_sheet_alike(waveform: dict[str, Any]) -> None:
+    parsed = parse_sheet({'waveform': waveform}).waveform
+    assert parsed is not None
+    ours = SheetCommand(parsed)
+    theirs = TestSheet('new', 'new', {'type': 'circuit'}, waveform).record()[0]
+    knots = corners(theirs, END)
+    assert ours.knots(END) == pytest.approx(knots, abs=1e-9)
+    # within each stretch between two knots, up to a millionth of it from its ends
+    edges = np.r_[0.0, knots, END]
+    places = np.array([1e-6, 0.3, 0.5, 1.0 - 1e-6])
+    times = (edges[:-1, np.newaxis] + places * np.diff(edges)[:, np.newaxis]).ravel()
+    expected = [command(theirs, t, t) for t in times]
+    # a chirp's phase is the sum of numbers up to a thousand
+    assert ours(times) == pytest.approx(expected, abs=1e-11)
+    assert not ours(np.array([-1e-3, -5.0])).any()
+
+
+def test_a_jump_counts_at_its_own_time() -> None:
+    """A step ends on the jump, though in floating point it may end a little before it."""
+    waveform = parse_sheet({'waveform': {
+        'type': 'square', 'amplitude_deg_s': 180.0 / np.pi, 'period_s': 0.6}}).waveform
+    assert waveform is not None
+    jumps = np.array([0.3 * k for k in range(100)])     # 0.3, 0.6, 0.8999999999999999 ...
+    assert SheetCommand(waveform)(jumps) == pytest.approx(np.tile([1.0, -1.0], 50))

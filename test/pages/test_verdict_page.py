@@ -1,0 +1,173 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The page about a diagnosis: of any machine, whatever its names are, in a real browser."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from antenna_drive.diagnosis.diagnosis import Diagnosis
+from antenna_drive.diagnosis.diagram import Block, Diagram
+from antenna_drive.diagnosis.machine import Effect, Experiment
+from antenna_drive.diagnosis.page import contents
+from antenna_drive.machines.antenna.advice import ADVICE
+from antenna_drive.machines.antenna.catalogue import catalogue
+from antenna_drive.machines.antenna.diagram import DIAGRAM
+from antenna_drive.pages.builder import render
+from chromium import EXECUTABLE, Page
+import numpy as np
+import pytest
+
+needs_browser = pytest.mark.skipif(EXECUTABLE is None, reason='there is no Chromium '
+                                                              '(apt-get install chromium)')
+HOSTILE = '</script><script>boom()</script><img src="x" onerror="boom()">{{ boom }}'
+FULL: dict[str, Any] = {
+    'verdict': 'partly_explained',
+    'which': [
+        {'effects': ['motors.friction'], 'probability': 0.75, 'parameters': {
+            'motors.friction.torque': {'value': 0.25, 'ci95': [0.2, 0.3], 'unit': HOSTILE}}},
+        {'effects': ['dial.gain', HOSTILE], 'probability': 0.15, 'parameters': {}},
+        {'effects': ['unknown'], 'probability': 0.1, 'parameters': {}},
+        {'effects': ['none'], 'probability': 0.0, 'parameters': {}}],
+    'confusable': [['motors.friction', 'dial.gain']],
+    'how_far': {'before': 9.0, 'after': 1.25, 'held_out': HOSTILE,
+                'explained_fraction': {'value': 0.9, 'ci95': [0.8, 0.95]},
+                'per_signal': {HOSTILE: {'before': 9.0, 'after': 1.25}}},
+    'where': [{'component': HOSTILE, 'signal': 'dial', 'regime': 'reversal', 'share': 0.4}],
+    'may_enter_at': [{'name': HOSTILE, 'component': 'dial', 'explained': 0.3}],
+    'residual_tests': {
+        'signals': {HOSTILE: {'rms': 1.0, 'slow_excess': 0.1, 'greatest_correlation': 0.2}},
+        'depends_on': [{'signal': HOSTILE, 'depends_on': 'rate', 'share': 0.2}]},
+    'notes': [HOSTILE], 'seconds': 3.0,
+}
+BARE: dict[str, Any] = {
+    **FULL, 'verdict': 'no_gap', 'confusable': [], 'where': [], 'may_enter_at': [],
+    'which': [{'effects': ['none'], 'probability': 1.0, 'parameters': {}}],
+    'how_far': {**FULL['how_far'], 'explained_fraction': {'value': None, 'ci95': None}}}
+TIME = np.linspace(0.0, 1.99, 200)
+
+
+def diagnosis(result: dict[str, Any], **machine: Any) -> Diagnosis:
+    """Return a diagnosis of a machine with two tests and two effects."""
+    true = np.column_stack([np.sin(TIME), np.cos(TIME)])
+    measured = true.copy()
+    measured[:20, 1] = np.nan
+    measured[:, 0] = np.nan   # never read
+    model = SimpleNamespace(
+        experiments=[Experiment(name, TIME, ('speed', HOSTILE), ('m/s', 'V'), measured,
+                                np.full_like(true, 0.1)) for name in (HOSTILE, 'second')],
+        effects={'motors.friction': Effect('motors.friction', 'motors', HOSTILE, '', ()),
+                 'dial.gain': Effect('dial.gain', 'dial', 'a bent needle', '', ())},
+        simulate=lambda points: [[true - 1.0] * 2, [true] * 2], **machine)
+    fit: Any = SimpleNamespace(state=SimpleNamespace(point=dict))
+    return Diagnosis(result, model, fit, fit)  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def browser(tmp_path: Path) -> Iterator[Page]:
+    with Page(tmp_path / 'profile', width=390) as opened:
+        yield opened
+
+
+def show(browser: Page, tmp_path: Path, result: dict[str, Any], **machine: Any) -> str:
+    path = tmp_path / 'verdict.html'
+    path.write_text(render('verdict.html', **vars(contents(diagnosis(result, **machine)))))
+    browser.open(path.as_uri())
+    assert browser.tell('document.documentElement.dataset.state') == 'drawn'
+    assert browser.complaints == []
+    assert browser.requests == [path.as_uri()]
+    assert browser.tell('document.querySelectorAll("img, iframe, link[rel=stylesheet]").length'
+                        ) == 0
+    # nothing is wider than the window of a phone but what scrolls within itself
+    assert browser.tell('document.documentElement.scrollWidth <= innerWidth') is True
+    text = browser.tell('document.body.innerText')
+    assert isinstance(text, str)
+    return ' '.join(text.replace('\xa0', ' ').split())
+
+
+@needs_browser
+def test_everything_is_said_and_nothing_is_taken_for_html(browser: Page, tmp_path: Path) -> None:
+    text = show(browser, tmp_path, FULL, advice=(
+        (('friction',), 'Turn it by hand.'), (('ripple',), 'Hold one rate.'), ((), HOSTILE)))
+    for words in ('Partly explained', '75.0 % motors.friction', f'torque = 0.25 {HOSTILE}',
+                  '90.0 % of the gap is explained (80.0 % to 95.0 %)', f'dial.gain + {HOSTILE}',
+                  'cannot tell apart: motors.friction, dial.gain', 'reversal 40 %',
+                  f'{HOSTILE} dial 30 %', f'{HOSTILE} depends on rate (20 % of its residual)',
+                  'Turn it by hand.', '3 s of computing', 'a bent needle',
+                  f'data that was not fitted: {HOSTILE}.'):
+        assert words in text, words
+    assert 'Hold one rate.' not in text and '0.0 % none' not in text
+    # every text of the made-up recording's that can be seen, and the script's data
+    assert text.count(HOSTILE) >= 12
+    # without a layout of its own, the machine's components stand in rows
+    blocks = browser.tell('[...document.querySelectorAll(".diagram text")]'
+                          '.map(e => e.textContent.replace(/\\s+/g, " "))')
+    assert blocks == ['motors 75 %', 'dial 15 %']
+
+
+@needs_browser
+def test_the_tests_are_zoomed_apart(browser: Page, tmp_path: Path) -> None:
+    show(browser, tmp_path, FULL)
+    titles = browser.tell('[...document.querySelectorAll(".head b")].map(e => e.textContent)')
+    assert titles == [f'{HOSTILE} [V]', 'measured less simulated [V]'] * 2
+    names = browser.tell('[...document.querySelectorAll(".head")].map(head =>'
+                         ' [...head.querySelectorAll("span")].map(e => e.textContent))')
+    assert names == [['measured', 'before', 'after'], ['before', 'after']] * 2
+    before = pictures(browser)
+    browser.tell('document.getElementById("panels").focus()')
+    browser.key('+')
+    after = pictures(browser)
+    assert [a == b for a, b in zip(before, after, strict=True)] == [False, False, True, True]
+
+
+def pictures(browser: Page) -> list[str]:
+    found = browser.tell('[...document.querySelectorAll("canvas")].map(c => c.toDataURL())')
+    assert isinstance(found, list)
+    return found
+
+
+@needs_browser
+def test_no_gap_is_a_short_page(browser: Page, tmp_path: Path) -> None:
+    text = show(browser, tmp_path, BARE, advice=(((), 'Do more.'),))
+    assert text.count('No gap') == 1 and 'is explained (' not in text
+    for words in ('What would settle', 'Where the gap lies', 'cannot tell apart', 'Do more.'):
+        assert words not in text
+
+
+def test_a_component_may_stand_for_several_blocks() -> None:
+    diagram = Diagram((Block('left', '', 0, 0, 9), Block('right', '', 10, 5, 9)),
+                      several={'both': ('left', 'right')})
+    assert diagram.shares({'both': 0.5, 'left': 0.25, 'else': 0.1}) == {
+        'left': 0.75, 'right': 0.5, 'else': 0.1}
+    assert diagram.box == (-2, -2, 23, 35)
+
+
+def test_blocks_of_a_machine_without_a_layout_lie_apart() -> None:
+    blocks = Diagram.of(['a', 'b_c', 'a', *'defgh']).blocks
+    assert [block.label for block in blocks] == ['a', 'b c', *'defgh']
+    for i, one in enumerate(blocks):
+        for other in blocks[:i]:
+            assert one.y != other.y or one.x >= other.x + other.width
+
+
+def test_the_drives_picture_and_advice_are_of_its_catalogue() -> None:
+    effects = catalogue().values()
+    shown = {block.component for block in DIAGRAM.blocks}
+    for effect in effects:
+        assert set(DIAGRAM.several.get(effect.component, (effect.component,))) <= shown, effect.id
+    kinds = {effect.id.partition('.')[2] for effect in effects}
+    assert {name for names, _ in ADVICE for name in names} <= kinds
