@@ -72,7 +72,8 @@ def diagnosis(result: dict[str, Any], **machine: Any) -> Diagnosis:
                                 np.full_like(true, 0.1)) for name in (HOSTILE, 'second')],
         effects={'motors.friction': Effect('motors.friction', 'motors', HOSTILE, '', ()),
                  'dial.gain': Effect('dial.gain', 'dial', 'a bent needle', '', ())},
-        simulate=lambda points: [[true - 1.0] * 2, [true] * 2], **machine)
+        simulate=lambda points: [[true - 1.0] * 2, [true] * 2],
+        **{'diagram': None, 'advice': (), **machine})
     fit: Any = SimpleNamespace(state=SimpleNamespace(point=dict))
     return Diagnosis(result, model, fit, fit)  # type: ignore[arg-type]
 
