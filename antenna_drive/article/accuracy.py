@@ -25,7 +25,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
-from antenna_drive.article.experiments import Experiment, experiments
+from antenna_drive.article.experiments import DriveExperiment, experiments
 from antenna_drive.emulator.run import FINE_STEP, Run, simulate
 import numpy as np
 
@@ -50,7 +50,7 @@ def _reference(name: str) -> Run:
     return _kept(experiments()[name], FINE_STEP)
 
 
-def _kept(experiment: Experiment, step_s: float) -> Run:
+def _kept(experiment: DriveExperiment, step_s: float) -> Run:
     return simulate(experiment.drive(), experiment.duration, step_s,
                     every=round(_GRID / step_s))
 

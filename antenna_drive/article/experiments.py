@@ -45,7 +45,7 @@ RATE_STEP = math.radians(0.1)
 
 
 @dataclass(frozen=True)
-class Experiment:
+class DriveExperiment:
     """
     One experiment.
 
@@ -85,30 +85,30 @@ def _rate(waveform: Mapping[str, Any]) -> dict[str, Any]:
     return {f'test_signal.rate.{name}': value for name, value in waveform.items()}
 
 
-def filter_variant(gain: float, pole: float) -> Experiment:
+def filter_variant(gain: float, pole: float) -> DriveExperiment:
     """Return T4 with another Filter 1: k' [1/s] and p [1/s]."""
-    return Experiment(f'T4 k {gain:.4g} p {pole:.4g}', 8.0, 'old_circuit', {
+    return DriveExperiment(f'T4 k {gain:.4g} p {pole:.4g}', 8.0, 'old_circuit', {
         'torque_share.circuit.bias_pot': 0.7,
         'torque_share.filter_1.gain': gain, 'torque_share.filter_1.pole': pole})
 
 
-def experiments() -> dict[str, Experiment]:
+def experiments() -> dict[str, DriveExperiment]:
     """Return T1 to T4 by name."""
     square = _rate(SQUARE)
     saw_tooth = _rate(SAW_TOOTH)
     steady = {'torque_share.circuit.start': 'steady'}
     pot = 'torque_share.circuit.bias_pot'
     return {item.name: item for item in (
-        Experiment('T1', 4 * 6.3, 'old_circuit', square, 0.0),
-        Experiment('T2', 4 * 6.3, 'old_circuit', square, 0.15),
-        Experiment('T3a', 20.0, 'old_circuit', {**saw_tooth, **steady, pot: 0.8}),
-        Experiment('T3b', 20.0, 'new_circuit', {**saw_tooth, **steady, pot: 0.892}),
-        Experiment('T4a', 8.0, 'old_circuit', {pot: 0.7}),
-        Experiment('T4e', 8.0, 'new_circuit', {pot: 0.7}),
+        DriveExperiment('T1', 4 * 6.3, 'old_circuit', square, 0.0),
+        DriveExperiment('T2', 4 * 6.3, 'old_circuit', square, 0.15),
+        DriveExperiment('T3a', 20.0, 'old_circuit', {**saw_tooth, **steady, pot: 0.8}),
+        DriveExperiment('T3b', 20.0, 'new_circuit', {**saw_tooth, **steady, pot: 0.892}),
+        DriveExperiment('T4a', 8.0, 'old_circuit', {pot: 0.7}),
+        DriveExperiment('T4e', 8.0, 'new_circuit', {pot: 0.7}),
     )}
 
 
-def filter_variants() -> dict[str, Experiment]:
+def filter_variants() -> dict[str, DriveExperiment]:
     """Return T4b and T4d by name: Filter 1 with the gains of Fig. 21, the lags of Fig. 22."""
     variants = {f'T4b {gain:g}': filter_variant(gain / TAU_6_OLD, 1.0 / TAU_6_OLD)
                 for gain in GAINS}
@@ -116,7 +116,7 @@ def filter_variants() -> dict[str, Experiment]:
     return {name: replace(variant, name=name) for name, variant in variants.items()}
 
 
-def rate_step() -> Experiment:
+def rate_step() -> DriveExperiment:
     """Return a step of the rate command without bias; not in the article, it shows the damping."""
-    return Experiment('step', 6.0, 'old_circuit', _rate(
+    return DriveExperiment('step', 6.0, 'old_circuit', _rate(
         {'waveform': 'step', 'amplitude': RATE_STEP, 'start_after': 1.0}), 0.0)

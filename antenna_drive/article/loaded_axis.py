@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from antenna_drive.article.experiments import Experiment
+from antenna_drive.article.experiments import DriveExperiment
 from antenna_drive.article.static_profile import bias_voltage
 from antenna_drive.emulator.run import MACRO_STEP, simulate
 from antenna_drive.emulator.unit import FloatArray
@@ -97,7 +97,7 @@ def loaded(drive: Drive, circuit: str, share: float) -> LoadedAxis:
         torque bias at no load, as a share of the greatest torque
 
     """
-    experiment = Experiment(f'loaded axis {share:g}', 1.25 * PERIOD, circuit, {
+    experiment = DriveExperiment(f'loaded axis {share:g}', 1.25 * PERIOD, circuit, {
         'torque_share.circuit.bias_pot': bias_pot(drive, share),
         'torque_share.circuit.start': 'steady',
         'test_signal.torque.waveform': 'saw_tooth',

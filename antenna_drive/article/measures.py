@@ -29,7 +29,7 @@ from typing import Any, Protocol
 
 from antenna_drive.article import readings
 from antenna_drive.article.experiments import (
-    Experiment, experiments, filter_variants, GAINS, LAGS, rate_step, SAW_TOOTH, SQUARE,
+    DriveExperiment, experiments, filter_variants, GAINS, LAGS, rate_step, SAW_TOOTH, SQUARE,
     TAU_6_NEW, TAU_6_OLD,
 )
 from antenna_drive.article.linear import stability_limit
@@ -62,15 +62,15 @@ class Results:
     """
 
     def __init__(self, drives: Mapping[str, Drive],
-                 known: Mapping[str, Experiment] | None = None,
-                 run: Callable[[Experiment, Drive], Run] | None = None) -> None:
+                 known: Mapping[str, DriveExperiment] | None = None,
+                 run: Callable[[DriveExperiment, Drive], Run] | None = None) -> None:
         """Take the parameters; run nothing yet."""
         self.drives = drives
         self._known = known or article_experiments()
         self._simulate = run or _in_one_process
         self._runs: dict[str, Run] = {}
 
-    def experiment(self, name: str) -> Experiment:
+    def experiment(self, name: str) -> DriveExperiment:
         """Return an experiment; KeyError if there is none of that name."""
         return self._known[name]
 
@@ -83,7 +83,7 @@ class Results:
         return self._runs[name]
 
 
-def _in_one_process(experiment: Experiment, drive: Drive) -> Run:
+def _in_one_process(experiment: DriveExperiment, drive: Drive) -> Run:
     return simulate(drive, experiment.duration, MACRO_STEP)
 
 
@@ -93,7 +93,7 @@ def with_circuits(*configuration: str, circuits: Iterable[str] = (OLD_CIRCUIT, N
     return {circuit: load(*configuration, circuit) for circuit in circuits}
 
 
-def article_experiments() -> dict[str, Experiment]:
+def article_experiments() -> dict[str, DriveExperiment]:
     """Return every experiment that a figure of the article is read off, by name."""
     step = rate_step()
     return {**experiments(), **filter_variants(), step.name: step}

@@ -28,7 +28,7 @@ from collections.abc import Callable
 import math
 from typing import Any
 
-from antenna_drive.article.experiments import Experiment
+from antenna_drive.article.experiments import DriveExperiment
 from antenna_drive.parameters.sets import Drive
 import numpy as np
 from numpy.typing import NDArray
@@ -272,7 +272,7 @@ def equations(compiler: Callable[[Any], Any] = lambda function: function,
     return rates, guards, settle
 
 
-def pieces(experiment: Experiment) -> list[tuple[float, float, float, float]]:
+def pieces(experiment: DriveExperiment) -> list[tuple[float, float, float, float]]:
     """
     Return the rate command piece by piece, between its jumps and corners.
 

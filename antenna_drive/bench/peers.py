@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from antenna_drive.article.experiments import Experiment
+from antenna_drive.article.experiments import DriveExperiment
 from antenna_drive.bench import equations
 from antenna_drive.bench.equations import BODIES, FloatArray, IntArray, STATES
 from antenna_drive.parameters.records import record_of
@@ -69,7 +69,7 @@ class Setting:
 class Problem:
     """An experiment as a problem for solvers: equations, constants, command, friction's modes."""
 
-    def __init__(self, experiment: Experiment, compile_equations: bool = True) -> None:
+    def __init__(self, experiment: DriveExperiment, compile_equations: bool = True) -> None:
         """Prepare the experiment; its equations are compiled unless they are to stay Python."""
         self.experiment = experiment
         self.drive = drive = experiment.drive()
@@ -325,7 +325,7 @@ def drake(problem: Problem, setting: Setting) -> FloatArray:
     piece = problem.pieces[0]
     dx = np.empty(STATES)
 
-    class Drive(LeafSystem):  # type: ignore[misc]
+    class DriveSystem(LeafSystem):  # type: ignore[misc]
         def __init__(self) -> None:
             super().__init__()
             self.DeclareContinuousState(STATES)
@@ -355,7 +355,7 @@ def drake(problem: Problem, setting: Setting) -> FloatArray:
                   value + slope * (context.get_time() - start), slip, threshold, p, dx)
             derivatives.get_mutable_vector().SetFromVector(dx)
 
-    system = Drive()
+    system = DriveSystem()
     simulator = Simulator(system)
     ApplySimulatorConfig(SimulatorConfig(
         integration_scheme=setting.method, max_step_size=0.1, accuracy=setting.tolerance,

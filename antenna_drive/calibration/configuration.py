@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 import io
 from typing import Any
 
-from antenna_drive.calibration.problem import Problem
+from antenna_drive.calibration.problem import CalibrationProblem
 from antenna_drive.parameters.loading import find
 from antenna_drive.parameters.plain_yaml import read_yaml
 import yaml
@@ -28,7 +28,7 @@ import yaml
 _DIGITS = 7
 
 
-def configuration(problem: Problem, shares: Sequence[float], start: str) -> str:
+def configuration(problem: CalibrationProblem, shares: Sequence[float], start: str) -> str:
     """
     Return a candidate as a configuration file that lies over what the fit started from.
 

@@ -34,7 +34,7 @@ import re
 from typing import Any
 
 from antenna_drive.article import readings
-from antenna_drive.article.experiments import Experiment
+from antenna_drive.article.experiments import DriveExperiment
 from antenna_drive.article.measures import (
     article_experiments, article_measures, Measure, OLD_CIRCUIT, Reading, Results,
 )
@@ -148,7 +148,7 @@ class Evaluation:
     complete: bool
 
 
-class Problem:
+class CalibrationProblem:
     """
     A fit: free parameters, targets, and the configuration that everything else is taken from.
 
@@ -162,7 +162,8 @@ class Problem:
     """
 
     def __init__(self, free: Sequence[Free], targets: Sequence[Target], *,
-                 start: Sequence[str] = (), experiments: Mapping[str, Experiment] | None = None,
+                 start: Sequence[str] = (),
+                 experiments: Mapping[str, DriveExperiment] | None = None,
                  figures: Mapping[str, Measure] | None = None, population: int = 16,
                  spread: float = 0.1) -> None:
         """Load the configuration with every circuit that an experiment needs."""
@@ -263,7 +264,7 @@ def drive_names(key: str) -> list[str]:
     return [f'{_OWN_SECTIONS[section]}.{entry}']
 
 
-def read_problem(source: str | Path, start: Sequence[str] = ()) -> Problem:
+def read_problem(source: str | Path, start: Sequence[str] = ()) -> CalibrationProblem:
     """
     Read a file of targets; see this module's own description for its form.
 
@@ -291,7 +292,7 @@ def read_problem(source: str | Path, start: Sequence[str] = ()) -> Problem:
         figures = {str(name): _figure(str(name), body, known)
                    for name, body in (content.get('figures') or {}).items()}
         search = _table('search', content.get('search') or {}, ('population', 'spread'))
-        return Problem(
+        return CalibrationProblem(
             [_free(str(name), body) for name, body in _filled(content, 'free')],
             [_target(str(name), body) for name, body in _filled(content, 'targets')],
             start=start, experiments=experiments, figures=figures,
@@ -357,7 +358,7 @@ def _target(name: str, body: Any) -> Target:
                   _number(f'{key}.weight', table.get('weight', 1.0), 0.0))
 
 
-def _experiment(name: str, body: Any) -> Experiment:
+def _experiment(name: str, body: Any) -> DriveExperiment:
     key = f'experiments.{name}'
     table = _table(key, body, ('duration', 'circuit', 'settings', 'bias_share'))
     settings = {str(path): value for path, value in (table.get('settings') or {}).items()}
@@ -368,9 +369,10 @@ def _experiment(name: str, body: Any) -> Experiment:
                                  f'{nearest(path, tuple(known))}')
         settings[path] = known[path].check(f'{key}.settings.{path}', value)
     share = table.get('bias_share')
-    return Experiment(name, _number(f'{key}.duration', table.get('duration'), 1e-3, 1e5),
-                      str(table.get('circuit', NO_CIRCUIT)), settings,
-                      None if share is None else _number(f'{key}.bias_share', share, -1.0, 1.0))
+    return DriveExperiment(
+        name, _number(f'{key}.duration', table.get('duration'), 1e-3, 1e5),
+        str(table.get('circuit', NO_CIRCUIT)), settings,
+        None if share is None else _number(f'{key}.bias_share', share, -1.0, 1.0))
 
 
 def _figure(name: str, body: Any, experiments: set[str]) -> Reading:

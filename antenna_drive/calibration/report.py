@@ -26,8 +26,8 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
-from antenna_drive.calibration.problem import Problem
-from antenna_drive.calibration.search import Candidate, Found
+from antenna_drive.calibration.problem import CalibrationProblem
+from antenna_drive.calibration.search import FitCandidate, SearchResult
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.parameters.schema import nearest, ParameterError
 import numpy as np
@@ -57,9 +57,9 @@ class _Local:
     slopes: FloatArray
 
 
-def report(problem: Problem, found: Found, trade_offs: Sequence[str] = (),
+def report(problem: CalibrationProblem, found: SearchResult, trade_offs: Sequence[str] = (),
            progress: Callable[[float], None] | None = None,
-           also: Sequence[Candidate] = ()) -> dict[str, Any]:
+           also: Sequence[FitCandidate] = ()) -> dict[str, Any]:
     """
     Tell what was found and how far it is determined.
 
@@ -133,7 +133,8 @@ def report(problem: Problem, found: Found, trade_offs: Sequence[str] = (),
     }
 
 
-def _targets(problem: Problem, best: Candidate, start: Candidate) -> list[dict[str, Any]]:
+def _targets(problem: CalibrationProblem, best: FitCandidate, start: FitCandidate,
+             ) -> list[dict[str, Any]]:
     told = []
     for target in problem.targets:
         obtained = best.evaluation.figures[target.figure]
@@ -145,7 +146,7 @@ def _targets(problem: Problem, best: Candidate, start: Candidate) -> list[dict[s
     return told
 
 
-def _misses(problem: Problem, figures: Any) -> FloatArray:
+def _misses(problem: CalibrationProblem, figures: Any) -> FloatArray:
     """
     Return each target's miss in tolerances, with the sign, also where a bound is kept.
 
@@ -156,7 +157,8 @@ def _misses(problem: Problem, figures: Any) -> FloatArray:
                      for target in problem.targets])
 
 
-def _slopes(problem: Problem, best: Candidate, evaluated: Callable[[FloatArray], Any]) -> _Local:
+def _slopes(problem: CalibrationProblem, best: FitCandidate,
+            evaluated: Callable[[FloatArray], Any]) -> _Local:
     centre = np.array(best.shares)
     columns = []
     for i in range(centre.size):
@@ -189,7 +191,7 @@ def _spread(item: Any, share: float, uncertainty: float) -> list[float]:
     return [item.at(share - uncertainty), item.at(share + uncertainty)]
 
 
-def _profile(item: Any, i: int, best: Candidate, local: _Local,
+def _profile(item: Any, i: int, best: FitCandidate, local: _Local,
              evaluated: Callable[[FloatArray], Any]) -> list[list[float]]:
     """
     Return cost against one parameter, the others making up for it along the linear model.
@@ -210,7 +212,7 @@ def _profile(item: Any, i: int, best: Candidate, local: _Local,
     return sorted(points)
 
 
-def _trade_off(problem: Problem, candidates: Sequence[Candidate], figure: str,
+def _trade_off(problem: CalibrationProblem, candidates: Sequence[FitCandidate], figure: str,
                ) -> list[dict[str, Any]]:
     """
     Return what the other targets cost at best, for each level of one figure.

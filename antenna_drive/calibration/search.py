@@ -29,7 +29,7 @@ import math
 from pathlib import Path
 from typing import Any, TextIO
 
-from antenna_drive.calibration.problem import Evaluation, Problem
+from antenna_drive.calibration.problem import CalibrationProblem, Evaluation
 from antenna_drive.errors import UserError
 import cma
 import numpy as np
@@ -40,7 +40,7 @@ _GIVE_UP = 1.5
 
 
 @dataclass(frozen=True)
-class Candidate:
+class FitCandidate:
     """A candidate: its place between the bounds, and what it gives."""
 
     shares: tuple[float, ...]
@@ -48,7 +48,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """
     What a search found.
 
@@ -59,16 +59,16 @@ class Found:
 
     """
 
-    best: Candidate
-    candidates: tuple[Candidate, ...]
+    best: FitCandidate
+    candidates: tuple[FitCandidate, ...]
 
 
 class _Log:
     """The candidates of a search, on disk as they come."""
 
-    def __init__(self, path: Path, problem: Problem, seed: int) -> None:
+    def __init__(self, path: Path, problem: CalibrationProblem, seed: int) -> None:
         self._path = path
-        self.read: list[Candidate] = []
+        self.read: list[FitCandidate] = []
         head = {'problem': _digest(problem), 'seed': seed}
         if path.exists():
             self._read(head)
@@ -94,13 +94,13 @@ class _Log:
         return self._path.open('a', encoding='utf-8')
 
 
-def _candidate(line: str) -> Candidate:
+def _candidate(line: str) -> FitCandidate:
     entry = json.loads(line)
-    return Candidate(tuple(entry['shares']),
-                     Evaluation(entry['cost'], entry['figures'], entry['complete']))
+    return FitCandidate(tuple(entry['shares']),
+                        Evaluation(entry['cost'], entry['figures'], entry['complete']))
 
 
-def read_log(path: Path) -> list[Candidate]:
+def read_log(path: Path) -> list[FitCandidate]:
     """
     Return the candidates of any search's log.
 
@@ -120,15 +120,15 @@ def read_log(path: Path) -> list[Candidate]:
         raise UserError(f'{path}: is not the log of a search: {error}') from error
 
 
-def _digest(problem: Problem) -> str:
+def _digest(problem: CalibrationProblem) -> str:
     """Return what tells one problem from another."""
     said = repr((problem.free, problem.targets, problem.population, problem.spread,
                  problem.parameters(problem.start())))
     return hashlib.sha256(said.encode()).hexdigest()[:16]
 
 
-def search(problem: Problem, count: int, *, seed: int = 1, log: Path | None = None,
-           progress: Callable[[int, Candidate], None] | None = None) -> Found:
+def search(problem: CalibrationProblem, count: int, *, seed: int = 1, log: Path | None = None,
+           progress: Callable[[int, FitCandidate], None] | None = None) -> SearchResult:
     """
     Look for the parameters that cost least.
 
@@ -152,7 +152,7 @@ def search(problem: Problem, count: int, *, seed: int = 1, log: Path | None = No
     """
     known = _Log(log, problem, seed) if log is not None else None
     start = problem.start()
-    candidates = [Candidate(tuple(start), problem.evaluate(start))]
+    candidates = [FitCandidate(tuple(start), problem.evaluate(start))]
     random = np.random.default_rng(seed)
     strategy = cma.CMAEvolutionStrategy(start, problem.spread, {
         'bounds': [0.0, 1.0], 'popsize': problem.population, 'verbose': -9, 'seed': math.nan,
@@ -171,8 +171,8 @@ def search(problem: Problem, count: int, *, seed: int = 1, log: Path | None = No
                         raise UserError(f'{log}: does not repeat (another version of a library?), '
                                         'remove it to start anew')
                 else:
-                    candidate = Candidate(tuple(map(float, shares)),
-                                          problem.evaluate(shares, limit))
+                    candidate = FitCandidate(tuple(map(float, shares)),
+                                             problem.evaluate(shares, limit))
                     if stream:
                         _write(stream, candidate)
                 candidates.append(candidate)
@@ -184,15 +184,15 @@ def search(problem: Problem, count: int, *, seed: int = 1, log: Path | None = No
     finally:
         if stream:
             stream.close()
-    return Found(_best(candidates), tuple(candidates))
+    return SearchResult(_best(candidates), tuple(candidates))
 
 
-def _best(candidates: list[Candidate]) -> Candidate:
+def _best(candidates: list[FitCandidate]) -> FitCandidate:
     return min((item for item in candidates if item.evaluation.complete),
                key=lambda item: item.evaluation.cost)
 
 
-def _write(stream: TextIO, candidate: Candidate) -> None:
+def _write(stream: TextIO, candidate: FitCandidate) -> None:
     evaluation = candidate.evaluation
     stream.write(json.dumps({
         'shares': candidate.shares, 'cost': evaluation.cost, 'complete': evaluation.complete,

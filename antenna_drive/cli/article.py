@@ -36,7 +36,7 @@ from typing import Any
 
 from antenna_drive import cli
 from antenna_drive.article.contradictions import Contradiction, contradictions
-from antenna_drive.article.experiments import Experiment
+from antenna_drive.article.experiments import DriveExperiment
 from antenna_drive.article.measures import Results, with_circuits
 from antenna_drive.article.rows import Row, rows
 from antenna_drive.cli.output import (
@@ -89,11 +89,11 @@ def run(arguments: argparse.Namespace) -> int:
     return cli.OK if all(row.passed for row in found) else cli.NEGATIVE
 
 
-def _through_nodes(configuration: list[str]) -> Callable[[Experiment, Drive], Run]:
+def _through_nodes(configuration: list[str]) -> Callable[[DriveExperiment, Drive], Run]:
     """Return what runs some experiments in five processes, and the others in this one."""
     from antenna_drive.lockstep.sampling import sample_processes
 
-    def run_one(experiment: Experiment, drive: Drive) -> Run:
+    def run_one(experiment: DriveExperiment, drive: Drive) -> Run:
         if experiment.name not in THROUGH_NODES:
             return simulate(drive, experiment.duration)
         settings: dict[str, dict[str, Any]] = {}

@@ -24,7 +24,7 @@ from collections.abc import Iterator, Sequence
 import dataclasses
 from typing import Any
 
-from antenna_drive.trial.effect import Effect
+from antenna_drive.trial.effect import Defect
 from antenna_drive.trial.effects import CATALOGUE
 from antenna_drive.trial.machine import (
     apply_tolerances, draw_tolerances, Machine, reference_machine,
@@ -33,7 +33,7 @@ from antenna_drive.trial.outside import OUTSIDE
 from antenna_drive.trial.programme import draw_sheets
 from antenna_drive.trial.real_antenna import FloatArray, simulate
 from antenna_drive.trial.sensors import record, sample_instants
-from antenna_drive.trial.sheet import SensorGrade, TestSheet
+from antenna_drive.trial.sheet import CaseSheet, SensorGrade
 import numpy as np
 
 MIX = {'single': 0.55, 'pair': 0.15, 'none': 0.15, 'outside': 0.15}
@@ -78,7 +78,7 @@ def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float =
     truths = []
     for number, kind in enumerate(kinds, start=1):
         own = np.random.default_rng([seed, number])
-        effects: list[tuple[Effect, float]] = []
+        effects: list[tuple[Defect, float]] = []
         if kind == 'single':
             effects = [(next(singles), next(sizes['single']))]
         elif kind == 'outside':
@@ -106,7 +106,7 @@ def _kinds(count: int) -> list[str]:
             for _ in range(high - low)]
 
 
-def _turns(effects: Sequence[Effect], random: np.random.Generator) -> Iterator[Effect]:
+def _turns(effects: Sequence[Defect], random: np.random.Generator) -> Iterator[Defect]:
     while True:
         for k in random.permutation(len(effects)):
             yield effects[k]
@@ -118,7 +118,7 @@ def _even_sizes(count: int, random: np.random.Generator) -> list[float]:
     return [float(s) for s in (slices + random.uniform(0.0, 1.0, count)) / max(count, 1)]
 
 
-def _compatible(first: Effect, second: Effect) -> bool:
+def _compatible(first: Defect, second: Defect) -> bool:
     """Tell whether two effects are two: neither the same nor one inside the other."""
     place_1, name_1 = first.key.split('.')
     place_2, name_2 = second.key.split('.')
@@ -154,13 +154,13 @@ def build_machine(truth: Truth, recording: int) -> Machine:
     return machine
 
 
-def sheet_of(truth: Truth, recording: int) -> TestSheet:
+def sheet_of(truth: Truth, recording: int) -> CaseSheet:
     """Return the test sheet of one recording of a case."""
     plain = dict(truth['sheets'][recording])
     plain.pop('start')
     plain['sensors'] = SensorGrade(**plain['sensors'])
-    known = {field.name for field in dataclasses.fields(TestSheet)}
-    return TestSheet(**{name: value for name, value in plain.items() if name in known})
+    known = {field.name for field in dataclasses.fields(CaseSheet)}
+    return CaseSheet(**{name: value for name, value in plain.items() if name in known})
 
 
 def make_recording(truth: Truth, recording: int) -> dict[str, FloatArray]:

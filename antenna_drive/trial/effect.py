@@ -77,7 +77,7 @@ PHASE = Quantity('phase', 'rad', 0.0, 2.0 * math.pi, 'even')
 
 
 @dataclass(frozen=True)
-class Effect:
+class Defect:
     """
     An effect: its name, its numbers, the form it takes in the real antenna.
 

@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from antenna_drive.trial.sheet import SensorGrade, TestSheet
+from antenna_drive.trial.sheet import CaseSheet, SensorGrade
 import numpy as np
 
 RECORDINGS = ('rec_a', 'rec_b', 'rec_c')
@@ -33,7 +33,7 @@ SOURCE_BIAS_V = (4.1, 8.3)      # 10 to 20 percent of the motors' largest curren
 
 
 def draw_sheets(tolerance: float, duration: float,
-                random: np.random.Generator) -> tuple[TestSheet, ...]:
+                random: np.random.Generator) -> tuple[CaseSheet, ...]:
     """
     Draw the test sheets of one case, one for each name in RECORDINGS.
 
@@ -59,7 +59,7 @@ def draw_sheets(tolerance: float, duration: float,
         (_fast_triangle(random), cold if random.uniform() < 0.5 else circuit),
         (_broad_band(duration, random), circuit))
     return tuple(
-        TestSheet(circuit=fitted, filter_1=fitted, bias=bias, waveform=shape,
+        CaseSheet(circuit=fitted, filter_1=fitted, bias=bias, waveform=shape,
                   elevation_deg=float(elevation), sensors=SensorGrade(),
                   parameter_tolerance=tolerance)
         for (shape, bias), elevation in zip(tests, elevations))

@@ -27,7 +27,7 @@ import math
 from antenna_drive.trial import equations, integrator, waveform
 from antenna_drive.trial.equations import MOTOR_AT, MOTOR_SIZE
 from antenna_drive.trial.machine import Machine
-from antenna_drive.trial.sheet import TestSheet
+from antenna_drive.trial.sheet import CaseSheet
 import numpy as np
 from numpy.typing import NDArray
 
@@ -75,7 +75,7 @@ class History:
     switchings: int
 
 
-def start_state(machine: Machine, sheet: TestSheet, place: tuple[float, float]) -> FloatArray:
+def start_state(machine: Machine, sheet: CaseSheet, place: tuple[float, float]) -> FloatArray:
     """
     Return the state at rest, shape (equations.STATES,).
 
@@ -118,7 +118,7 @@ def _sizes(machine: Machine) -> FloatArray:
     return size
 
 
-def simulate(machine: Machine, sheet: TestSheet, times: FloatArray,
+def simulate(machine: Machine, sheet: CaseSheet, times: FloatArray,
              place: tuple[float, float] = (0.0, 0.0),
              tolerance: float = TOLERANCE) -> History:
     """

@@ -48,7 +48,7 @@ class SensorGrade:
 
 
 @dataclass(frozen=True)
-class TestSheet:
+class CaseSheet:
     """
     One test: what was commanded, how the bias was made, what the sensors can do.
 
@@ -62,8 +62,6 @@ class TestSheet:
     parameter_tolerance : how far the machine may be from the reference, unit 1
 
     """
-
-    __test__ = False    # not a test case, whatever pytest makes of the name
 
     circuit: str
     filter_1: str

@@ -33,7 +33,7 @@ class VerdictError(ValueError):
 
 
 @dataclass(frozen=True)
-class Entry:
+class VerdictLine:
     """One line of 'which': ids that act together, and how probable that is."""
 
     effects: frozenset[str]
@@ -56,7 +56,7 @@ class Verdict:
     """
 
     verdict: str
-    which: tuple[Entry, ...]
+    which: tuple[VerdictLine, ...]
     confusable: tuple[frozenset[str], ...]
     explained_fraction: float
     seconds: float
@@ -147,7 +147,7 @@ def parse_verdict(content: Any) -> Verdict:
                    _number_or_nan(value), _number_or_nan(content.get('seconds')))
 
 
-def _entry(content: Any) -> Entry:
+def _entry(content: Any) -> VerdictLine:
     if not isinstance(content, dict):
         raise VerdictError('which: an entry is not a JSON object')
     effects, probability = content.get('effects'), content.get('probability')
@@ -157,7 +157,7 @@ def _entry(content: Any) -> Entry:
     if isinstance(probability, bool) or not isinstance(probability, (int, float)) or not (
             0.0 <= probability <= 1.0):
         raise VerdictError(f'which.probability: {probability!r}, not a number from 0 to 1')
-    return Entry(frozenset(effects), float(probability))
+    return VerdictLine(frozenset(effects), float(probability))
 
 
 def _number_or_nan(value: Any) -> float:
