@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-The article's figures, drawn anew from runs: its axes, its units, black on white for print.
+The article's figures, drawn from new runs with the article's axes and units.
 
-Figures 4 to 7 and 14 are block diagrams; of Figs. 8 to 13 the simulated side is drawn. The
-article's pictures are not copied: only what its text and captions tell is followed.
+Figures 4 to 7 and 14 are block diagrams and are left out. Of Figs. 8 to 13 the simulated side is
+drawn. The drawings follow the article's text and captions; its pictures are not copied.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 import numpy as np
 
-# Two columns of A4 hold 7 inches; fonts as in a journal's figures.
+# Width of two columns on A4 [inch].
 _WIDTH = 6.6
 _STYLE: dict[str, Any] = {
     'font.size': 9.0, 'axes.grid': True, 'grid.linewidth': 0.4, 'grid.color': '0.85',
@@ -277,7 +277,7 @@ def _of(draw: Callable[[Results, str], Figure], name: str) -> Callable[[Results]
     return lambda results: draw(results, name)
 
 
-# Number, caption, and what draws it.
+# Number, caption and drawing function.
 FIGURES: tuple[tuple[int, str, Callable[[Results], Figure]], ...] = (
     (1, 'The backlash function, Eq. (1), b = 1 deg, k = 20 N m/deg.', backlash),
     (2, 'Motor torque versus axial torque for a 10, 20 and 30 percent torque bias, existing '
@@ -318,7 +318,7 @@ def draw_all(results: Results, progress: Callable[[int, int], None] | None = Non
     results
         of the parameter set
     progress
-        told how many figures are done, of how many
+        called with the number of figures done and their total
 
     Returns
     -------
@@ -339,8 +339,8 @@ def draw_all(results: Results, progress: Callable[[int, int], None] | None = Non
 
 
 def _page(parts: Sequence[tuple[int, str, bytes]]) -> str:
-    """Return one page with all figures in it, for the screen and for print."""
-    # as pictures, not as part of the page: ids within one drawing are not those of another
+    """Return one HTML page with all figures, for screen and print."""
+    # embedded as images: the ids inside the drawings would clash in one page
     figures = '\n'.join(
         f'<figure id="fig_{number:02d}"><img alt="Fig. {number}" src="data:image/svg+xml;base64,'
         f'{b64encode(drawing).decode()}"><figcaption><b>Fig. {number}.</b> {escape(caption)}'
@@ -349,7 +349,7 @@ def _page(parts: Sequence[tuple[int, str, bytes]]) -> str:
 <html lang="en">
 <head>
 <meta charset="utf-8">
-<title>The article's figures, drawn anew</title>
+<title>The article's figures, redrawn</title>
 <style>
 body {{ font: 11pt/1.4 serif; max-width: 17cm; margin: 1cm auto; color: #111 }}
 figure {{ margin: 0 0 1cm; break-inside: avoid }}
@@ -358,7 +358,7 @@ figcaption {{ font-size: 10pt }}
 </style>
 </head>
 <body>
-<h1>The article's figures, drawn anew</h1>
+<h1>The article's figures, redrawn</h1>
 {figures}
 </body>
 </html>

@@ -37,7 +37,7 @@ class Row:
     unit : of all three
     passed : whether the obtained figure is within the tolerance
     basis : 'published', 'derived', 'fitted' or 'predicted'; see published.py
-    note : where it is in the article, and how it is read off
+    note : where it is in the article, and how it is evaluated
 
     """
 

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-The search for the best fit: CMA-ES, seeded, with a log that it can go on from.
+The search for the best fit: seeded CMA-ES with a log from which it can resume.
 
-The log holds one line of JSON for the problem and one for every candidate. Whoever starts the
-same search again gets the same candidates, and those in the log are not simulated anew: an
-interrupted search goes on where it stopped, and ends where it would have ended.
+The log has one line of JSON for the problem and one for every candidate. The same search tries
+the same candidates, and those in the log are not simulated again. An interrupted search
+therefore resumes where it stopped and gives the same result.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from antenna_drive.errors import UserError
 import cma
 import numpy as np
 
-# A candidate is given up once it costs more than this times the worst of the last generation's
-# better half, from which the search goes on.
+# A candidate is given up once it costs more than this times the worst candidate of the better half
+# of the last generation.
 _GIVE_UP = 1.5
 
 
 @dataclass(frozen=True)
 class FitCandidate:
-    """A candidate: its place between the bounds, and what it gives."""
+    """A candidate: its parameters as shares of the bounds, and its evaluation."""
 
     shares: tuple[float, ...]
     evaluation: Evaluation
@@ -50,12 +50,12 @@ class FitCandidate:
 @dataclass(frozen=True)
 class SearchResult:
     """
-    What a search found.
+    The result of a search.
 
     Attributes
     ----------
     best : the best candidate
-    candidates : all of them, in their order
+    candidates : all of them in order; the first is the start
 
     """
 
@@ -64,7 +64,7 @@ class SearchResult:
 
 
 class _Log:
-    """The candidates of a search, on disk as they come."""
+    """The candidates of a search, written to disk one by one."""
 
     def __init__(self, path: Path, problem: CalibrationProblem, seed: int) -> None:
         self._path = path
@@ -87,7 +87,7 @@ class _Log:
         except (ValueError, KeyError, TypeError) as error:
             raise UserError(f'{self._path}: is not the log of a search: {error}') from error
         if len(whole) < len(lines) - 1:
-            # the line that an interruption cut short is simulated anew
+            # drop a line that an interruption cut short; its candidate is simulated again
             self._path.write_text(''.join([lines[0], *whole]), encoding='utf-8')
 
     def open(self) -> TextIO:  # noqa: A003
@@ -121,7 +121,7 @@ def read_log(path: Path) -> list[FitCandidate]:
 
 
 def _digest(problem: CalibrationProblem) -> str:
-    """Return what tells one problem from another."""
+    """Return a digest that identifies the problem."""
     said = repr((problem.free, problem.targets, problem.population, problem.spread,
                  problem.parameters(problem.start())))
     return hashlib.sha256(said.encode()).hexdigest()[:16]
@@ -130,20 +130,20 @@ def _digest(problem: CalibrationProblem) -> str:
 def search(problem: CalibrationProblem, count: int, *, seed: int = 1, log: Path | None = None,
            progress: Callable[[int, FitCandidate], None] | None = None) -> SearchResult:
     """
-    Look for the parameters that cost least.
+    Search for the parameters of least cost.
 
     Parameters
     ----------
     problem
-        what is free, what is aimed at, and from where
+        the fit
     count
         candidates to try; the search ends with a whole generation
     seed
         the same seed gives the same search
     log
-        where candidates are kept as they come; a search that finds its log goes on from it
+        file for the candidates; the search resumes from it if it exists
     progress
-        told the number of candidates so far, and the best one
+        called with the number of candidates so far and the best one
 
     Raises
     ------
