@@ -14,10 +14,10 @@
 """
 The catalogue's effects in this program's own forms, with the range of each.
 
-The smallest sizes are just detectable on the standard test programme through noise and
-tolerances (docs/trial.md says how that was measured), the largest would send a crew up the
-antenna. A tachometer sits inside the rate loop; current, encoder and bias errors touch the
-recording only.
+The smallest sizes are just detectable in the standard test programme through noise and
+tolerances (docs/trial.md explains the measurement); the largest would call for a repair. A
+tachometer is inside the rate loop; errors of current, encoder and bias affect the recording
+only.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def _cycles(low: int, high: int) -> Quantity:
     return Quantity('cycles', '1/rev', low, high, 'whole')
 
 
-# Motors: each effect for either motor alone and for both alike.
+# Motors: each effect for one motor alone and for both together.
 
 def _motor_field(field: str, quantity: str) -> Callable[[slice], Change]:
     def at(which: slice) -> Change:

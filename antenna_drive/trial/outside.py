@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Effects that no catalogue names: what a diagnosis has to answer with 'unknown'.
+Effects outside the catalogue, which a diagnosis must answer with 'unknown'.
 
-Each is strong enough at its smallest size to leave a gap that the tolerances cannot explain.
+Even at its smallest size each leaves a gap that the tolerances cannot explain.
 """
 
 from __future__ import annotations
