@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-How far the lock-step is from the converged reference, on the article's experiments.
+Error of the lock-step against a converged run, on the article's experiments.
 
-The reference is the same drive at a macro-step of `FINE_STEP`. Measured is the rms distance of
-every signal of T1 to T4, as a share of that signal's rms. `stability` measures the other thing
-that the exchange between units may change: the gain at which the torque bias becomes unstable.
+The reference is the same drive at a macro-step of `FINE_STEP`. The error of a signal is the rms
+difference in T1 to T4, as a share of the signal's rms. `stability` measures the effect of the
+exchange between units on the stability limit of the torque bias.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
-from antenna_drive.article.experiments import Experiment, experiments
+from antenna_drive.article.experiments import DriveExperiment, experiments
 from antenna_drive.emulator.run import FINE_STEP, Run, simulate
 import numpy as np
 
 STEPS = (5e-4, 1e-3, 2e-3, 4e-3)
-# Signals that are compared; a missed impulse is a correction of one scheme, not a signal.
+# Signals that are not compared; a missed impulse is a correction of one scheme, not a signal.
 _LEFT_OUT = ('test_signal/external_torque', 'missed_impulse')
 # Both runs are compared at these times [s]: a multiple of every macro-step above.
 _GRID = 4e-3
@@ -38,7 +38,7 @@ _GRID = 4e-3
 
 @dataclass(frozen=True)
 class Distance:
-    """The rms distance of a signal from the reference, as a share of the signal's rms."""
+    """The rms difference between a signal and its reference, as a share of the signal's rms."""
 
     experiment: str
     signal: str
@@ -50,7 +50,7 @@ def _reference(name: str) -> Run:
     return _kept(experiments()[name], FINE_STEP)
 
 
-def _kept(experiment: Experiment, step_s: float) -> Run:
+def _kept(experiment: DriveExperiment, step_s: float) -> Run:
     return simulate(experiment.drive(), experiment.duration, step_s,
                     every=round(_GRID / step_s))
 
@@ -58,16 +58,16 @@ def _kept(experiment: Experiment, step_s: float) -> Run:
 def distances(step_s: float, names: Iterable[str] | None = None,
               progress: Callable[[str], None] | None = None) -> list[Distance]:
     """
-    Measure the distance of every signal of the experiments at a macro-step.
+    Return the error of every signal of the experiments at a macro-step.
 
     Parameters
     ----------
     step_s
-        macro-step [s], a whole part of 4 ms
+        macro-step [s]; must divide 4 ms
     names
-        of the experiments, all of T1 to T4 if left out
+        of the experiments; all of T1 to T4 if None
     progress
-        told the name of each experiment as it begins
+        called with the name of each experiment before it runs
 
     """
     found = []

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-The article's figures, drawn anew from runs: its axes, its units, black on white for print.
+The article's figures, drawn from new runs with the article's axes and units.
 
-Figures 4 to 7 and 14 are block diagrams; of Figs. 8 to 13 the simulated side is drawn. The
-article's pictures are not copied: only what its text and captions tell is followed.
+Figures 4 to 7 and 14 are block diagrams and are left out. Of Figs. 8 to 13 the simulated side is
+drawn. The drawings follow the article's text and captions; its pictures are not copied.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 import numpy as np
 
-# Two columns of A4 hold 7 inches; fonts as in a journal's figures.
+# Width of two columns on A4 [inch].
 _WIDTH = 6.6
 _STYLE: dict[str, Any] = {
     'font.size': 9.0, 'axes.grid': True, 'grid.linewidth': 0.4, 'grid.color': '0.85',
@@ -277,7 +277,7 @@ def _of(draw: Callable[[Results, str], Figure], name: str) -> Callable[[Results]
     return lambda results: draw(results, name)
 
 
-# Number, caption, and what draws it.
+# Number, caption and drawing function.
 FIGURES: tuple[tuple[int, str, Callable[[Results], Figure]], ...] = (
     (1, 'The backlash function, Eq. (1), b = 1 deg, k = 20 N m/deg.', backlash),
     (2, 'Motor torque versus axial torque for a 10, 20 and 30 percent torque bias, existing '
@@ -318,7 +318,7 @@ def draw_all(results: Results, progress: Callable[[int, int], None] | None = Non
     results
         of the parameter set
     progress
-        told how many figures are done, of how many
+        called with the number of figures done and their total
 
     Returns
     -------
@@ -335,6 +335,6 @@ def draw_all(results: Results, progress: Callable[[int, int], None] | None = Non
             files[f'fig_{number:02d}.svg'] = drawing.getvalue()
             parts.append((number, caption, b64encode(drawing.getvalue()).decode()))
     files['figures.html'] = render(
-        'figures.html', title="The article's figures, drawn anew",
+        'figures.html', title="The article's figures, redrawn",
         lead='Each figure is also a file of its own.', figures=parts).encode()
     return files

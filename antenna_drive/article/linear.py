@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-The drive without what is not linear, as matrices: where the torque bias becomes unstable (T4c).
+The linear part of the drive as matrices, and the stability limit of the torque bias (T4c).
 
-Written from the equations of docs/model.md, apart from the compiled physics, so that each
-checks the other. No gap (the teeth stay in contact), no limit; static friction either holds the
-rotors or there is none.
+The matrices are written from the equations of docs/model.md, independently of the compiled
+physics, so that each checks the other. The teeth stay in contact and nothing saturates. Static
+friction either holds the rotors or is absent.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-# The stability limit is sought between these gains k' of Filter 1 [1/s].
+# Gains k' of Filter 1 between which the stability limit is searched for [1/s].
 _GAINS = (1.0, 1e4)
 
 
 def bias_loop(drive: Drive, gain: float, pole: float, *, rotors_held: bool) -> FloatArray:
     """
-    Return the matrix of the loop through Filter 1, in which the motors move against each other.
+    Return the matrix of the loop through Filter 1, in which the motors move in opposition.
 
-    The states are those of motor 2, of which motor 1 is the mirror image: x_F [V], integral and
+    The states are those of motor 2; motor 1 is its mirror image. They are x_F [V], integral and
     lagged demand of amplifier 1 [article A], current [article A], and with free rotors also rate
-    [rad/s] and angle [rad]. The axis feels nothing of it.
+    [rad/s] and angle [rad]. The axis does not move.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def bias_loop(drive: Drive, gain: float, pole: float, *, rotors_held: bool) -> F
 
 def rate_loop(drive: Drive) -> tuple[FloatArray, FloatArray]:
     """
-    Return matrix and input of the rate loop, in which both motors move alike; no friction.
+    Return matrix and input of the rate loop, in which both motors move together; no friction.
 
     The states are: command voltage [V], integral and lagged demand of amplifier 1 [article A],
     current [article A], motor rate [rad/s] and angle [rad], then rate and angle of the hub and
@@ -122,7 +122,7 @@ def _current_slope(drive: Drive, demand: FloatArray, current: FloatArray, rate: 
 
 
 def growth(matrix: FloatArray) -> float:
-    """Return the real part of the eigenvalue furthest to the right [1/s]; above 0 is unstable."""
+    """Return the largest real part of the eigenvalues [1/s]; above 0 is unstable."""
     return float(np.linalg.eigvals(matrix).real.max())
 
 
@@ -141,7 +141,7 @@ def stability_limit(drive: Drive, pole: float, *, rotors_held: bool = True) -> f
 
     Returns
     -------
-    gain [1/s]; NaN if the loop is unstable at once, or nowhere
+    gain [1/s]; NaN if the loop is unstable at every gain or at none
 
     """
     def rightmost(gain: float) -> float:
@@ -154,7 +154,7 @@ def stability_limit(drive: Drive, pole: float, *, rotors_held: bool = True) -> f
 
 def step_response(drive: Drive, time: FloatArray) -> FloatArray:
     """
-    Return the motor rate after a step of the rate command, as a share of what is commanded [1].
+    Return the motor rate after a step of the rate command, as a share of the command [1].
 
     Parameters
     ----------

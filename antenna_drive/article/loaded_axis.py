@@ -14,15 +14,15 @@
 """
 Figs. 2 and 17 from the dynamic model: motor torque against axial torque, on a loaded axis.
 
-The rate command is zero; a torque on the axis rises and falls so slowly that the circuits
-follow. What Eq. (14) alone would give for the same load stands beside it.
+The rate command is zero. A torque on the axis rises and falls slowly enough for the circuits to
+follow. The torques by Eq. (14) alone, for the same load, are given for comparison.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from antenna_drive.article.experiments import Experiment
+from antenna_drive.article.experiments import DriveExperiment
 from antenna_drive.article.static_profile import bias_voltage
 from antenna_drive.emulator.run import MACRO_STEP, simulate
 from antenna_drive.emulator.unit import FloatArray
@@ -36,16 +36,16 @@ SHARES = (0.1, 0.2, 0.3)
 PERIOD = 400.0
 AMPLITUDE = 0.95
 _KEPT_EVERY = 50
-# Bias left of its value at rest where the fade-out begins and ends.
+# The fade-out begins and ends at these shares of the bias without load.
 _FADE_FROM, _FADE_TO = 0.9, 0.1
-# Less than so many percents of the greatest torque count as no load.
+# Below this the motors count as unloaded, percent of the greatest torque.
 _AT_NO_LOAD = 5
 
 
 @dataclass(frozen=True)
 class LoadedAxis:
     """
-    One loop of the load, from one extreme to the other and back.
+    One cycle of the load, from one extreme to the other and back.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class LoadedAxis:
 
 
 def greatest_axial_torque(drive: Drive) -> float:
-    """Return what both motors together can put on the axis [N m]."""
+    """Return the greatest torque of both motors together on the axis [N m]."""
     motor = drive.motor_1.motor
     return 2.0 * motor.current_limit * motor.torque_constant * drive.plant.axis.gear_ratio
 
@@ -85,7 +85,7 @@ def bias_pot(drive: Drive, share: float) -> float:
 
 def loaded(drive: Drive, circuit: str, share: float) -> LoadedAxis:
     """
-    Simulate the drive while the load goes up and down.
+    Simulate the drive while the load rises and falls.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def loaded(drive: Drive, circuit: str, share: float) -> LoadedAxis:
         torque bias at no load, as a share of the greatest torque
 
     """
-    experiment = Experiment(f'loaded axis {share:g}', 1.25 * PERIOD, circuit, {
+    experiment = DriveExperiment(f'loaded axis {share:g}', 1.25 * PERIOD, circuit, {
         'torque_share.circuit.bias_pot': bias_pot(drive, share),
         'torque_share.circuit.start': 'steady',
         'test_signal.torque.waveform': 'saw_tooth',
@@ -108,7 +108,7 @@ def loaded(drive: Drive, circuit: str, share: float) -> LoadedAxis:
     # the first quarter brings the load from zero to its greatest value
     loop = run.time >= 0.25 * PERIOD
     torques = np.column_stack([run[f'motor_{m}/current'][loop] for m in (1, 2)])
-    # the motors work against the load: both counted positive where they hold it
+    # the sign under which load and motor torque balance
     load = -run['test_signal/external_torque'][loop] / greatest_axial_torque(drive)
     return LoadedAxis(100.0 * load, 100.0 * torques / drive.motor_1.motor.current_limit,
                       np.asarray(np.gradient(load) > 0.0))
@@ -146,7 +146,7 @@ def bias_at_rest(axis: LoadedAxis) -> float:
 
 def fade_out(load: FloatArray, bias: FloatArray) -> tuple[float, float]:
     """
-    Return between which loads the bias fades from 90 to 10 percent of what it is at no load.
+    Return the loads between which the bias fades from 90 to 10 percent of its value at no load.
 
     Parameters
     ----------
@@ -156,8 +156,8 @@ def fade_out(load: FloatArray, bias: FloatArray) -> tuple[float, float]:
         difference of their torques, shape (n,)
 
     """
-    # the median in each percent of load: teeth that meet, and an axis that breaks away, swing
-    # the currents for a moment
+    # the median in each percent of load: the currents swing when teeth meet or the axis breaks
+    # away
     size = np.abs(load)
     bins = np.arange(0.0, size.max(), 1.0)
     place = np.digitize(size, bins)

@@ -12,11 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Figures read off runs, by name: what the article publishes, and what a calibration aims at.
+Figures by name: those that the article publishes and those that a calibration aims at.
 
-A `Reading` takes one experiment, a sum of its signals with weights, and a way to read it. A
-`Trend` looks at several figures in a row. A `ModelFigure` needs no run. `Results` runs each
-experiment once, however many figures are read off it.
+A `Reading` is taken from a weighted sum of one experiment's signals. A `Trend` compares several
+figures in order. A `ModelFigure` needs no run. `Results` runs each experiment only once.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from typing import Any, Protocol
 
 from antenna_drive.article import readings
 from antenna_drive.article.experiments import (
-    Experiment, experiments, filter_variants, GAINS, LAGS, rate_step, SAW_TOOTH, SQUARE,
+    DriveExperiment, experiments, filter_variants, GAINS, LAGS, rate_step, SAW_TOOTH, SQUARE,
     TAU_6_NEW, TAU_6_OLD,
 )
 from antenna_drive.article.linear import stability_limit
@@ -41,14 +40,14 @@ import numpy as np
 
 # The circuits in config/, of the article's Table 1.
 OLD_CIRCUIT, NEW_CIRCUIT = 'old_circuit', 'new_circuit'
-# Windows after each reversal of the square wave [s]: on the plateau, and from the first swings on.
+# Windows after each reversal of the square wave [s]: the plateau, and the swings before it.
 PLATEAU = (1.5, 3.0)
 CALM = (0.25, 2.0)
 
 
 class Results:
     """
-    What the experiments give for one parameter set: each is run when it is first asked for.
+    The runs of the experiments for one parameter set; each is simulated on first use.
 
     Parameters
     ----------
@@ -57,20 +56,20 @@ class Results:
     known
         the experiments, by name
     run
-        runs an experiment on its drive; the emulator in one process, unless said otherwise
+        runs an experiment on its drive; by default the emulator in one process
 
     """
 
     def __init__(self, drives: Mapping[str, Drive],
-                 known: Mapping[str, Experiment] | None = None,
-                 run: Callable[[Experiment, Drive], Run] | None = None) -> None:
-        """Take the parameters; run nothing yet."""
+                 known: Mapping[str, DriveExperiment] | None = None,
+                 run: Callable[[DriveExperiment, Drive], Run] | None = None) -> None:
+        """Store the parameters; nothing is run yet."""
         self.drives = drives
         self._known = known or article_experiments()
         self._simulate = run or _in_one_process
         self._runs: dict[str, Run] = {}
 
-    def experiment(self, name: str) -> Experiment:
+    def experiment(self, name: str) -> DriveExperiment:
         """Return an experiment; KeyError if there is none of that name."""
         return self._known[name]
 
@@ -83,7 +82,7 @@ class Results:
         return self._runs[name]
 
 
-def _in_one_process(experiment: Experiment, drive: Drive) -> Run:
+def _in_one_process(experiment: DriveExperiment, drive: Drive) -> Run:
     return simulate(drive, experiment.duration, MACRO_STEP)
 
 
@@ -93,14 +92,14 @@ def with_circuits(*configuration: str, circuits: Iterable[str] = (OLD_CIRCUIT, N
     return {circuit: load(*configuration, circuit) for circuit in circuits}
 
 
-def article_experiments() -> dict[str, Experiment]:
-    """Return every experiment that a figure of the article is read off, by name."""
+def article_experiments() -> dict[str, DriveExperiment]:
+    """Return every experiment that a figure of the article is taken from, by name."""
     step = rate_step()
     return {**experiments(), **filter_variants(), step.name: step}
 
 
 class Measure(Protocol):
-    """A figure: its name, its unit, and how it is found."""
+    """A figure: its name, its unit and its value for a parameter set."""
 
     @property
     def name(self) -> str:
@@ -117,16 +116,16 @@ class Measure(Protocol):
 @dataclass(frozen=True)
 class Reading:
     """
-    A figure read off the run of one experiment.
+    A figure taken from the run of one experiment.
 
     Attributes
     ----------
     name, unit : for people
     experiment : the run to read
-    kind : how to read it, a key of `readings.KINDS`
-    signal : weight of each signal in the sum that is read
-    arguments : of that way to read
-    compared_with : another experiment; the figure is then its change from there, as a share [1]
+    kind : how it is evaluated, a key of `readings.KINDS`
+    signal : weight of each signal in the sum
+    arguments : further arguments of the evaluation
+    compared_with : another experiment; the figure is then the relative change against it [1]
     scale : the figure is multiplied by it
 
     """
@@ -152,19 +151,19 @@ class Reading:
 
 
 def weighted(run: Run, signal: Mapping[str, float]) -> FloatArray:
-    """Return a sum of signals of a run, each times its weight, shape (n,)."""
+    """Return the weighted sum of signals of a run, shape (n,)."""
     return np.asarray(sum(weight * run[name] for name, weight in signal.items()), np.float64)
 
 
 @dataclass(frozen=True)
 class Trend:
     """
-    How far figures in a row are from a trend; below zero the trend holds strictly.
+    The largest violation of a trend by figures in order; below zero the trend holds strictly.
 
     Attributes
     ----------
     name, unit : for people
-    of : the figures in their order
+    of : the figures in order
     kind : 'falls', or 'falls then rises'
 
     """
@@ -182,7 +181,7 @@ class Trend:
 @dataclass(frozen=True)
 class ModelFigure:
     """
-    A figure that is not read off one of the experiments' runs.
+    A figure that does not come from the run of an experiment.
 
     Attributes
     ----------
@@ -209,7 +208,7 @@ def article_measures(drive: Drive) -> dict[str, Measure]:
     Parameters
     ----------
     drive
-        for the gear ratio and the greatest current, which figures are shares of
+        for the gear ratio and the greatest current, by which figures are scaled
 
     """
     ratio, most = drive.plant.axis.gear_ratio, drive.motor_1.motor.current_limit

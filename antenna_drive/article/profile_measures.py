@@ -30,7 +30,7 @@ from antenna_drive.parameters import Drive
 from antenna_drive.parameters.sets import changed, TorqueShare
 import numpy as np
 
-# The share of the greatest torque at which the two circuits' fade-out is compared.
+# The torque bias at which the fade-out of the circuits is compared, share of the greatest torque.
 _COMPARED_AT = 0.2
 CIRCUITS = {'old': OLD_CIRCUIT, 'new': NEW_CIRCUIT}
 
@@ -89,10 +89,10 @@ def profile_measures() -> dict[str, Measure]:
             for name, unit, figure, circuit in figures}
 
 
-# Six loops of one parameter set, and room for a second one.
+# Six cycles of one parameter set, and the same for a second one.
 @lru_cache(maxsize=12)
 def loaded_axis(drive: Drive, circuit: str, share: float) -> LoadedAxis:
-    """Return the loop of the load that figures and drawings have in common; see `loaded`."""
+    """Return the load cycle that figures and drawings share; see `loaded`."""
     return loaded(drive, circuit, share)
 
 

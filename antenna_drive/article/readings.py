@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""How the article's figures are read off a run: plateaus, overshoot, settling, time at zero."""
+"""Evaluation of a run: plateaus, overshoot, settling, time at zero."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def step_response(time: FloatArray, value: FloatArray, tail_s: float = 1.0) -> R
     value
         shape (n,)
     tail_s
-        the mean over this last stretch is the final value [s]
+        length of the end of the run whose mean is the final value [s]
 
     """
     final = float(value[time > time[-1] - tail_s].mean())
@@ -56,7 +56,7 @@ def step_response(time: FloatArray, value: FloatArray, tail_s: float = 1.0) -> R
 
 @dataclass(frozen=True)
 class BiasRange:
-    """The bias voltage of a run: least and greatest [V], share of the time at zero [1]."""
+    """The bias voltage of a run: minimum and maximum [V], share of the time at zero [1]."""
 
     low_V: float
     high_V: float
@@ -74,7 +74,7 @@ def bias_range(time: FloatArray, voltage: FloatArray, after_s: float) -> BiasRan
     voltage
         [V], shape (n,)
     after_s
-        what comes before is left out [s]
+        samples before this time are ignored [s]
 
     """
     kept = voltage[time >= after_s]
@@ -84,7 +84,7 @@ def bias_range(time: FloatArray, voltage: FloatArray, after_s: float) -> BiasRan
 def plateau(time: FloatArray, value: FloatArray, period: float, window: tuple[float, float],
             ) -> float:
     """
-    Return the mean of a square wave's response in a window after each reversal, first period out.
+    Return the mean of a response in a window after each reversal, without the first period.
 
     Parameters
     ----------
@@ -93,11 +93,11 @@ def plateau(time: FloatArray, value: FloatArray, period: float, window: tuple[fl
     period
         of the square wave [s]; it is positive in its first half
     window
-        from and to, after each reversal [s]
+        start and end after each reversal [s]
 
     Returns
     -------
-    the mean, with the sign of the command
+    mean of the signal times the sign of the command
 
     """
     sign, since = _half_periods(time, period)
@@ -121,7 +121,7 @@ def _half_periods(time: FloatArray, period: float) -> tuple[FloatArray, FloatArr
 
 
 def _mean(time: FloatArray, value: FloatArray, after: float = 0.0) -> float:
-    """Return the mean over whole periods: from a time on, the very last sample left out."""
+    """Return the mean from a time on, without the last sample, which begins another period."""
     return float(value[time >= after][:-1].mean())
 
 
@@ -130,18 +130,18 @@ def _largest_rise(values: Sequence[float]) -> float:
 
 
 def falls(values: Sequence[float]) -> float:
-    """Return the greatest step upwards in a row of figures: below zero if it falls strictly."""
+    """Return the largest rise between neighbours: below zero if the figures fall strictly."""
     return _largest_rise(values)
 
 
 def falls_then_rises(values: Sequence[float]) -> float:
-    """Return the greatest step against 'falls, then rises', at the turn that suits it best."""
+    """Return the largest step against 'falls, then rises', for the best turning point."""
     return min(max(_largest_rise(values[:turn + 1]),
                    _largest_rise([-value for value in values[turn:]]))
                for turn in range(1, len(values) - 1))
 
 
-# Ways to read one figure off a signal: (time, value, arguments) to a number.
+# Evaluations of a signal: (time, value, arguments) to a number.
 KINDS: dict[str, Callable[..., float]] = {
     'plateau': plateau,
     'deviation': deviation,

@@ -31,12 +31,13 @@ class Row:
     Attributes
     ----------
     id : 'T4a.overshoot'
-    published : the figure, or what is said; by origin where the article gives field and analysis
+    published : the figure or the words; a mapping where the article gives field and analysis
     obtained : what the model gives
-    tolerance : how far from the published figure (the analysis', if there are two) still passes
+    tolerance : allowed distance from the published figure, from the analysis' if there are two
     unit : of all three
-    passed : whether it does
-    note : where it is in the article, and how it is read off
+    passed : whether the obtained figure is within the tolerance
+    basis : 'published', 'derived', 'fitted' or 'predicted'; see published.py
+    note : where it is in the article, and how it is evaluated
 
     """
 
@@ -46,11 +47,12 @@ class Row:
     tolerance: float
     unit: str
     passed: bool
+    basis: str
     note: str
 
 
 def all_measures(results: Results) -> dict[str, Measure]:
-    """Return every figure that a row can be about, by name."""
+    """Return all figures that rows can refer to, by name."""
     return {**article_measures(results.drives[OLD_CIRCUIT]), **profile_measures(),
             **loaded_axis_measures()}
 
@@ -65,9 +67,9 @@ def rows(results: Results, experiments: Iterable[str] = (),
     results
         of the parameter set
     experiments
-        only rows of these, 'T3a'; all if there are none
+        only rows of these, as 'T3a'; all if empty
     progress
-        told how many rows are done, of how many
+        called with the number of rows done and their total
 
     """
     wanted = tuple(experiments)
@@ -81,5 +83,5 @@ def rows(results: Results, experiments: Iterable[str] = (),
         measure = measures[claim.measure]
         obtained = measure.value(results)
         found.append(Row(claim.measure, claim.says, obtained, claim.tolerance, measure.unit,
-                         claim.holds(obtained), claim.note))
+                         claim.holds(obtained), claim.basis, claim.note))
     return found

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Where the torque bias becomes unstable, by simulation: the sign of a small disturbance's growth.
+The stability limit of the torque bias by simulation: a small disturbance grows or decays.
 
-The amplitude of what follows is no measure: friction and limits bound it. `linear` gives the same
-limit from eigenvalues.
+Only the sign of the growth counts, since friction and limits bound the amplitude. `linear` gives
+the same limit from eigenvalues.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.parameters import Drive
 import numpy as np
 
-# A gain k' [1/s] at which the bias settles, on its way to the state that is then disturbed.
+# A stable gain k' [1/s], at which the bias settles before it is disturbed.
 _SETTLING_GAIN = 45.4
 # The disturbance [V], so small that static friction keeps on holding the rotors.
 _DISTURBANCE = 1e-3
-# The limit is sought this share to either side of the linear one, and to this width [1/s]. Far
-# beyond the limit the disturbance is grown up before it is watched.
+# The limit is searched for within this share of the linear one, down to this width [1/s]. Far
+# above the limit the disturbance is already large when the observation begins.
 _SHARE = 0.1
 _GAIN_WIDTH = 0.05
 
@@ -40,7 +40,7 @@ _GAIN_WIDTH = 0.05
 def growth_rate(drive: Drive, gain: float, pole: float, step_s: float = MACRO_STEP,
                 settled_s: float = 12.0, watched_s: float = 6.0) -> float:
     """
-    Return how fast a small disturbance of the steady torque bias grows [1/s].
+    Return the growth rate of a small disturbance of the steady torque bias [1/s].
 
     Parameters
     ----------
@@ -51,14 +51,14 @@ def growth_rate(drive: Drive, gain: float, pole: float, step_s: float = MACRO_ST
     step_s
         macro-step [s]
     settled_s
-        time given to the loop, at a gain that is stable, to become steady [s]
+        settling time at a stable gain before the disturbance [s]
     watched_s
-        time over which the disturbance is watched [s]
+        time over which the disturbance is observed [s]
 
     """
     emulator = Emulator(filter_variant(_SETTLING_GAIN, pole).applied_to(drive), step_s)
     emulator.advance(round(settled_s / step_s))
-    # the voltage at which the present state would be steady at the new gain
+    # the voltage that keeps the present state steady at the new gain
     difference_gain = drive.torque_share.filter_1.difference_gain
     counter_torque = emulator.now[emulator.names.index('torque_share/counter_torque'), 0]
     steady = (difference_gain * _difference(emulator, emulator.now[np.newaxis])[0]
@@ -68,7 +68,7 @@ def growth_rate(drive: Drive, gain: float, pole: float, step_s: float = MACRO_ST
     _, samples = emulator.advance(round(watched_s / step_s))
     difference = _difference(emulator, samples)
     swing = difference - difference.mean()
-    # the swing in the second and in the last third, once the quick transients are gone
+    # compare the second third with the last: the fast transients have decayed by then
     third = swing.size // 3
     middle, last = swing[third:2 * third], swing[2 * third:]
     if last.std() == 0.0:
@@ -97,7 +97,7 @@ def simulated_limit(drive: Drive, pole: float, step_s: float = MACRO_STEP) -> fl
 
     Returns
     -------
-    gain [1/s]; NaN if it is not within a tenth of the linear one
+    gain [1/s]; NaN if it is not within ten percent of the linear one
 
     """
     linear = stability_limit(drive, pole)

@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The torque bias of a load that does not change, Eq. (14) and Fig. 15, and its corners."""
+"""The torque bias at a constant load, Eq. (14) and Fig. 15, and the corners of the profile."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ TEXT_GAIN = 2.6
 NEW_GAIN = 1.617
 # The profile ends well before this current [article A].
 _CURRENT_LIMIT = 100.0
-# A bias this close to its greatest or to zero [V] is at the corner.
+# A bias this close to its maximum or to zero is at the corner [V].
 _NEAR = 1e-9
 
 
 @dataclass(frozen=True)
 class Corners:
-    """Where the bias leaves its greatest value, and where it is gone: |i| in article A."""
+    """Where the bias leaves its maximum and where it reaches zero: |i| in article A."""
 
     flat_A: float
     zero_A: float
@@ -52,7 +52,7 @@ def as_in_the_text(share: TorqueShare, gain: float = TEXT_GAIN,
     share
         the circuit, for transfer function 2 and the saturation
     gain
-        k_2 of Eq. (14), which Table 1 calls k_4 over k_2
+        k_2 of Eq. (14); Table 1 calls it k_4 over k_2
     fade_out_voltage
         f_o [V]
 
@@ -69,11 +69,11 @@ def bias_voltage(share: TorqueShare, current_sum: FloatArray) -> FloatArray:
 
 def corners(share: TorqueShare) -> Corners:
     """
-    Return the corners of the profile, found on the profile itself.
+    Return the corners of the profile, found numerically.
 
     Raises
     ------
-    ValueError : the profile has none, it is zero or greatest everywhere
+    ValueError : the profile has no corners; it is constant
 
     """
     record = record_of(share)[0]

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-The bare exchange: the drive's frames on the drive's graph, with nothing done to them.
+The bare exchange: the drive's frames on the drive's graph, without any processing.
 
-One process of it takes one frame of each peer, reads none of them, and publishes its own, which
-is always the same: no physics, no run, no step number, no check, no parameter, no report. It
-goes as low into rclpy as the lock-step does, with a wait set that lives as long as the process.
+Each process takes one frame of each peer without reading it, and publishes a constant frame of its
+own. There is no physics, run, step number, check, parameter or report. The process uses the same
+low level of rclpy as the lock-step, with one wait set for its lifetime.
 
 python -m antenna_drive.bench.bare_node UNIT FILE LAST STEP_S PACE --ros-args ...
 """
@@ -37,7 +37,7 @@ _NEVER_NS = -1
 
 
 def peers_of(unit: str) -> list[str]:
-    """Return the units that one waits for at every step, as in the lock-step."""
+    """Return the units that a unit waits for at every step, as in the lock-step."""
     if unit == TEST_SIGNAL:
         return [name for name in UNITS if name != unit]
     peers = dict.fromkeys(source.partition('/')[0] for source in INPUTS[unit])

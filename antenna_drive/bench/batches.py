@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Batches: many variants of the saw-tooth test, through an executor that the caller hands in.
+Batches: many variants of the saw-tooth test in an executor of the caller.
 
-A task is a group of variants, told as plain numbers, and answers with statistics alone; so it can
-be sent to a thread, to another process or to another machine. `main` runs one task by itself
-and says how much memory it took.
+A task is a group of variants as plain numbers, and its result is statistics alone. It can run in
+a thread, in another process or on another machine. `main` runs one task and prints its peak
+memory.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ import numpy as np
 
 TEST = 'T3a'
 DURATION_S = 20.0
-# Varied by up to a tenth, in both motors alike.
+# Varied by up to ten percent, with the same factor in both motors.
 _VARIED = ('gearbox.half_gap', 'gearbox.stiffness', 'motor.coulomb_torque', 'motor.rotor_inertia')
 _SEED = 20260
 VARIANTS, QUICK_VARIANTS = 1000, 60
-# As many variants make one task, so that sending a task costs little beside doing it.
+# Variants in one task: enough for the cost of sending it to be negligible.
 _GROUP = 10
 
 
@@ -67,7 +67,7 @@ class Task:
 
 def statistics(task: Task) -> FloatArray:
     """
-    Run a group of variants and keep statistics alone.
+    Run a group of variants and return statistics alone.
 
     Returns
     -------
@@ -107,7 +107,7 @@ def _statistics(drive: Drive, duration_s: float) -> FloatArray:
 
 
 def tasks(variants: int, duration_s: float = DURATION_S) -> list[Task]:
-    """Return so many variants as tasks; the same ones every time."""
+    """Return a number of variants as tasks; always the same ones."""
     scales = 1.0 + 0.1 * np.random.default_rng(_SEED).uniform(-1.0, 1.0,
                                                               (variants, len(_VARIED)))
     return [Task(scales[first:first + _GROUP].tolist(), duration_s)
@@ -121,12 +121,12 @@ def run(work: list[Task], executor: Executor) -> FloatArray:
 
 def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> dict[str, Any]:
     """
-    Measure how time and memory grow, and what a second core and a cluster bring.
+    Measure the growth of time and memory, and the gain from more cores and a cluster.
 
     Returns
     -------
     two_core_speedup; wall times by variants, duration and executor; peak memory by duration;
-    what was left out and why
+    omitted measurements with the reason
 
     """
     variants = QUICK_VARIANTS if quick else VARIANTS
@@ -168,7 +168,7 @@ def _dask(work: list[Task], threads: Executor, cores: int, repetitions: int) -> 
     from dask.distributed import Client
 
     with Client(n_workers=cores, threads_per_worker=1, dashboard_address=None) as client:
-        # The one line that makes a cluster of it: Client('tcp://scheduler:8786').
+        # For a cluster, only this line changes: Client('tcp://scheduler:8786').
         cluster = client.get_executor()
         same = np.array_equal(run(work, cluster), run(work, threads))
         times = measuring.in_turn({'dask': lambda: run(work, cluster),
@@ -177,14 +177,14 @@ def _dask(work: list[Task], threads: Executor, cores: int, repetitions: int) -> 
 
 
 def peak_memory(duration_s: float) -> float:
-    """Return the greatest memory of a process of its own that runs one variant [MB]."""
+    """Return the peak memory of a process that runs one variant [MB]."""
     done = subprocess.run([sys.executable, '-m', __name__, repr(duration_s)],
                           capture_output=True, text=True, check=True)
     return float(json.loads(done.stdout)['peak_MB'])
 
 
 def main() -> None:
-    """Run one variant for the duration that is given and print the peak memory as JSON."""
+    """Run one variant for the given duration and print the peak memory as JSON."""
     import resource
 
     statistics(Task([[1.0] * len(_VARIED)], float(sys.argv[1])))

@@ -32,7 +32,7 @@ _SEED = 20261
 
 def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> dict[str, Any]:
     """
-    Measure the diagnosis of one case of a trial, three recordings of one antenna.
+    Measure the diagnosis of one case of a trial: three recordings of one antenna.
 
     Returns
     -------

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-The whole drive as one set of ordinary differential equations, as a user of a solver writes it.
+The drive as one set of ordinary differential equations, as a user of a solver would write it.
 
-Written from docs/model.md alone, in plain Python on plain arrays, and shared by every peer that
-the emulator is measured against, which all get it compiled. It knows nothing of units,
-macro-steps and effects: the equations are those of the article's model.
+The equations are written from docs/model.md alone, in plain Python on plain arrays. All peers that
+the emulator is compared with use them, compiled. They are those of the article's model, without
+units, macro-steps or effects.
 
 States: command voltage; of each motor integral, lagged demand, current, angle, rate; of the
 torque share x_3, x_2, x_F; hub angle and rate; angle and rate of each of three modes.
@@ -28,7 +28,7 @@ from collections.abc import Callable
 import math
 from typing import Any
 
-from antenna_drive.article.experiments import Experiment
+from antenna_drive.article.experiments import DriveExperiment
 from antenna_drive.parameters.sets import Drive
 import numpy as np
 from numpy.typing import NDArray
@@ -46,9 +46,9 @@ STATES = FIRST_MODE + 2 * MODES
 # Bodies with friction: both rotors and the hub.
 BODIES = 3
 
-# How far beyond its limit a demand still counts as being on it [article A].
+# A demand beyond its limit by less than this counts as being on it [article A].
 _ON_LIMIT = 1e-3
-# Share of the stiction torque by which a solver may miss the moment of breaking away.
+# Relative error of the stiction torque at which a solver locates a break-away.
 _ALMOST = 1e-9
 
 (K_COMMAND, TAU_1, RATE_GAIN, TACH_GAIN, BIAS_GAIN, T_2, LAG, LIMIT, CENTRE, GAIN_SUM, KAPPA,
@@ -63,8 +63,8 @@ def constants(drive: Drive) -> FloatArray:
     """
     Return the constants of the equations as one array.
 
-    Both motors must be alike but for the sign of their counter torque, and every effect that
-    the article's model does not have must be neutral.
+    The motors must be equal except for the sign of their counter torque, and all effects that the
+    article's model does not have must be neutral.
     """
     motor, share, axis = drive.motor_1, drive.torque_share, drive.plant.axis
     amplifier, armature = motor.amplifier, motor.armature
@@ -96,7 +96,7 @@ def constants(drive: Drive) -> FloatArray:
 
 
 def initial_state(drive: Drive) -> FloatArray:
-    """Return the state at rest, shape (STATES,); the torque share has settled if it says so."""
+    """Return the state at rest, shape (STATES,), with a settled torque share if so configured."""
     x = np.zeros(STATES)
     circuit = drive.torque_share.circuit
     if circuit.start == 'steady':
@@ -112,19 +112,19 @@ def equations(compiler: Callable[[Any], Any] = lambda function: function,
     Parameters
     ----------
     compiler
-        what becomes of each function: numba.njit compiles it
+        applied to each function; numba.njit compiles it
 
     Returns
     -------
     rates : (x, r, slip, threshold, p, dx): writes the time derivative of x at a rate command r
-        [rad/s]; slip says of each body whether it slips forward or backward (+1, -1) or sticks
-        (0), where it is 2 the body's rate decides, Eq. (2), and counts as zero within threshold
-        [rad/s, of a motor; at the hub divided by the gear ratio]
-    guards : (x, slip, p, g): writes for each body what falls through zero when it stops or breaks
-        away, shape (BODIES,)
-    settle : (x, slip, body, breaks, p): lets a body that has stopped stick, and one that
-        cannot be held slip; or, if breaks is true, one that sticks slip in any case, as when the
-        torque jumps past what can be held and the moment before the jump is given
+        [rad/s]. The slip of a body is +1 or -1 if it slips forward or backward, and 0 if it
+        sticks. With 2 its rate decides, Eq. (2); a rate within threshold counts as zero [rad/s
+        of a motor; at the hub divided by the gear ratio]
+    guards : (x, slip, p, g): writes a function for each body that falls through zero when the body
+        stops or breaks away, shape (BODIES,)
+    settle : (x, slip, body, breaks, p): a body that has stopped sticks unless friction cannot hold
+        it. If breaks is true a sticking body slips in any case; this is needed where the torque
+        jumps beyond stiction and x is the state before the jump
 
     """
     @compiler
@@ -217,7 +217,7 @@ def equations(compiler: Callable[[Any], Any] = lambda function: function,
             way = 1.0 if error > 0.0 else -1.0
             excess = way * (demand - centre) - p[LIMIT]
             if excess > 0.0:
-                # the integral must not wind up: it keeps the demand on its limit
+                # anti-windup: the integral keeps the demand on its limit
                 slope = p[RATE_GAIN] * (dx[0] - p[TACH_GAIN] * turning
                                         + (2.0 * m - 1.0) * p[BIAS_GAIN] * dx[X_F])
                 needed = way * (p[CENTRE] * turning - slope) if excess < _ON_LIMIT else 0.0
@@ -240,7 +240,7 @@ def equations(compiler: Callable[[Any], Any] = lambda function: function,
     @compiler
     def guards(x, slip, p, g):  # type: ignore[no-untyped-def]
         for body in range(3):
-            # all rates at the motors' shafts, so that one size of zero serves
+            # all rates at the motor shafts, so that they have the same scale
             rate = (p[RATIO] * x[HUB_RATE] if body == 2
                     else x[1 + MOTOR_STATES * body + RATE])
             if slip[body] != 0:
@@ -263,7 +263,7 @@ def equations(compiler: Callable[[Any], Any] = lambda function: function,
             slip[body] = 1 if torque > 0.0 else -1
             return
         slip[body] = 0
-        # who locates the moment of breaking away does so only almost
+        # a solver locates the break-away only within its tolerance
         if torque >= (1.0 - _ALMOST) * stiction:
             slip[body] = 1
         elif torque <= -(1.0 - _ALMOST) * stiction:
@@ -272,9 +272,9 @@ def equations(compiler: Callable[[Any], Any] = lambda function: function,
     return rates, guards, settle
 
 
-def pieces(experiment: Experiment) -> list[tuple[float, float, float, float]]:
+def pieces(experiment: DriveExperiment) -> list[tuple[float, float, float, float]]:
     """
-    Return the rate command piece by piece, between its jumps and corners.
+    Return the pieces of the rate command between its jumps and corners.
 
     Returns
     -------
@@ -310,7 +310,7 @@ def pieces(experiment: Experiment) -> list[tuple[float, float, float, float]]:
 
 
 READ = (1 + CURRENT, 1 + MOTOR_STATES + CURRENT, 1 + RATE, 1 + MOTOR_STATES + RATE, HUB_ANGLE)
-# the states that the signals below are made of
+# states from which the signals below are computed
 READ_STATES = (*READ, X_2)
 SIGNALS = ('motor_1/current', 'motor_2/current', 'motor_1/tach_rate', 'motor_2/tach_rate',
            'plant/encoder', 'torque_share/bias_voltage')

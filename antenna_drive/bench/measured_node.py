@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-One of the drive's nodes as it is, with a watch on its steps.
+One of the drive's nodes, unchanged except that it records the times of its steps.
 
 python -m antenna_drive.bench.measured_node UNIT FILE LAST --ros-args ...
 """
@@ -27,7 +27,7 @@ from antenna_drive.lockstep.processes import MODULES
 
 
 def main() -> int:
-    """Run the node of UNIT and note its steps; return its exit code."""
+    """Run the node of UNIT and record its steps; return its exit code."""
     from antenna_drive.emulator.unit import FloatArray
     from antenna_drive.lockstep import node
 

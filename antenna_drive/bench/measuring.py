@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Measurements taken in turn, so that whatever else the machine does falls on all alike."""
+"""Interleaved measurements, so that other load on the machine affects all of them equally."""
 
 from __future__ import annotations
 
@@ -29,26 +29,26 @@ Figure = dict[str, Any]
 
 
 def figure(values: Sequence[float], unit: str = '1') -> Figure:
-    """Return median, least and greatest of what was measured, and every single value."""
+    """Return median, minimum, maximum and the single values of a measurement."""
     return {'median': float(np.median(values)), 'min': float(min(values)),
             'max': float(max(values)), 'unit': unit, 'values': [float(v) for v in values]}
 
 
 def ratio(above: Sequence[float], below: Sequence[float]) -> Figure:
-    """Return the figure of the ratios, each of two values of the same turn."""
+    """Return the figure of the ratios of two values from the same turn."""
     return figure([a / b for a, b in zip(above, below, strict=True)])
 
 
 def in_turn(work: Mapping[str, Callable[[], object]], repetitions: int) -> dict[str, list[float]]:
     """
-    Time each piece of work once in each turn, A B A B, after one turn that does not count.
+    Time each piece of work once per turn, A B A B, after one warm-up turn.
 
     Parameters
     ----------
     work
         by name
     repetitions
-        turns
+        number of turns
 
     Returns
     -------
@@ -68,7 +68,7 @@ def in_turn(work: Mapping[str, Callable[[], object]], repetitions: int) -> dict[
 
 
 def machine() -> dict[str, Any]:
-    """Return what a reader must know of the machine, and how busy it was just now."""
+    """Return processor, system, versions and present load of the machine."""
     from importlib import metadata
 
     versions = {}

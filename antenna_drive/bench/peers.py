@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-What a user would pick instead of the emulator, each set up as its own documents advise.
+The alternatives to the emulator, each set up as its own documentation advises.
 
-All of them are given the same compiled equations (`bench.equations`) and run the same piece of
-the command at a time, so that none of them steps over a jump. Where a solver locates events,
-those of the friction are located, and the body then sticks or slips; where it does not, the rate
-decides, within a threshold that is swept like the tolerance.
+All use the same compiled equations (`bench.equations`) and run one piece of the command at a time,
+so that none steps over a jump. A solver that locates events locates the stops and break-aways of
+the bodies. For the others the rate decides between stick and slip, within a threshold that is
+swept like the tolerance.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from antenna_drive.article.experiments import Experiment
+from antenna_drive.article.experiments import DriveExperiment
 from antenna_drive.bench import equations
 from antenna_drive.bench.equations import BODIES, FloatArray, IntArray, STATES
 from antenna_drive.parameters.records import record_of
 import numpy as np
 
-# 200 Hz, as drives are recorded: what every run puts out, its own steps may be shorter or longer.
+# Output interval of every run, 200 Hz as drives are recorded; the solver's steps are its own [s].
 GRID_S = 5e-3
-# The rates decide: see `equations`.
+# The rate decides between stick and slip; see `equations`.
 BY_RATE = 2
-# A guard that falls below zero within this time has jumped there: no smaller step comes closer.
+# A guard that falls below zero within this time has jumped; smaller steps do not help [s].
 _JUMP_S = 1e-7
 # Sizes of the states, for absolute tolerances: V; A, A, A, rad, rad/s; V; rad, rad/s.
 _SIZES = np.array([1.0, *2 * (1.0, 1.0, 1.0, 1.0, 1.0), 1.0, 1.0, 1.0, *4 * (1e-4, 1e-4)])
@@ -46,11 +46,11 @@ _SIZES = np.array([1.0, *2 * (1.0, 1.0, 1.0, 1.0, 1.0), 1.0, 1.0, 1.0, *4 * (1e-
 @dataclass(frozen=True)
 class Setting:
     """
-    How a peer is set.
+    The settings of a peer.
 
     Attributes
     ----------
-    method : the peer's own name of the integrator
+    method : the peer's name of the integrator
     tolerance : relative; absolute ones are this times the size of each state
     threshold : rate of a rotor that counts as zero [rad/s]; 0 to locate stops as events
 
@@ -61,16 +61,16 @@ class Setting:
     threshold: float = 0.0
 
     def __str__(self) -> str:
-        """Return the setting in a few words."""
+        """Return the setting as text."""
         friction = f'|w| < {self.threshold:g} sticks' if self.threshold else 'stops located'
         return f'{self.method}, tolerance {self.tolerance:g}, {friction}'
 
 
 class Problem:
-    """An experiment as a problem for solvers: equations, constants, command, friction's modes."""
+    """An experiment for solvers: equations, constants, command and modes of the friction."""
 
-    def __init__(self, experiment: Experiment, compile_equations: bool = True) -> None:
-        """Prepare the experiment; its equations are compiled unless they are to stay Python."""
+    def __init__(self, experiment: DriveExperiment, compile_equations: bool = True) -> None:
+        """Prepare the experiment, with compiled or plain Python equations."""
         self.experiment = experiment
         self.drive = drive = experiment.drive()
         self.p = equations.constants(drive)
@@ -95,9 +95,9 @@ class Problem:
         self.slip[:] = 0
 
     def begin(self, setting: Setting) -> FloatArray:
-        """Put every body at rest and return the state to begin with."""
+        """Put every body at rest and return the initial state."""
         self.threshold = setting.threshold
-        # a rate of a rotor [rad/s] as good as none, when another body stops
+        # rate of a rotor that counts as zero when another body stops [rad/s]
         self.close = setting.tolerance
         self.slip[:] = BY_RATE if setting.threshold else 0
         return self.start.copy()
@@ -115,13 +115,13 @@ class Problem:
         return f
 
     def guard(self, body: int, x: FloatArray) -> float:
-        """Return what falls through zero when a body stops or breaks away."""
+        """Return the function that falls through zero when a body stops or breaks away."""
         self.guards(x, self.slip, self.p, self._g)
         return float(self._g[body])
 
     def switch(self, x: FloatArray, bodies: set[int], breaks: bool = False) -> None:
         """
-        Let the bodies stick or slip anew, and any other that is there at the same moment.
+        Update stick and slip of the bodies, and of others that stop at the same moment.
 
         Parameters
         ----------
@@ -130,7 +130,7 @@ class Problem:
         bodies
             those whose guard has fallen through zero
         breaks
-            whether one of them that sticks slips although x does not say that it must
+            whether a sticking body slips even if x does not require it
 
         """
         self.guards(x, self.slip, self.p, self._g)
@@ -139,7 +139,7 @@ class Problem:
                 self.settle(x, self.slip, body, breaks and body in bodies, self.p)
 
     def _beginning(self, x: FloatArray, body: int) -> bool:
-        # one that has just begun to slip has no rate yet, and is not to be stopped for that
+        # a body that has just begun to slip has no rate yet, and must not be stopped for that
         rate = x[equations.HUB_RATE] if body == 2 else x[
             1 + equations.MOTOR_STATES * body + equations.RATE]
         return bool(self.slip[body] != 0 and rate == 0.0)
@@ -269,7 +269,7 @@ def pathsim(problem: Problem, setting: Setting) -> FloatArray:
     def turn(t: float) -> None:
         piece[0] = min(piece[0] + 1, len(problem.pieces) - 1)
 
-    # a schedule makes the simulation end a step at each jump of the command
+    # the schedule ends a step at each jump of the command
     if len(problem.pieces) > 1:
         first, period = problem.pieces[0][1], problem.pieces[1][1] - problem.pieces[1][0]
         events.append(Schedule(t_start=first, t_period=period, func_act=turn, tolerance=1e-9))
@@ -306,7 +306,7 @@ def pathsim(problem: Problem, setting: Setting) -> FloatArray:
 
 
 def _on_grid(grid: FloatArray, times: FloatArray, states: FloatArray) -> FloatArray:
-    # a scope's sample may come a moment after it was due, when a step ended otherwise
+    # a scope may sample slightly late if a step ends elsewhere
     if len(times) == len(grid) and np.allclose(times, grid, atol=1e-9):
         return states
     return np.array([np.interp(grid, times, row) for row in states])
@@ -325,7 +325,7 @@ def drake(problem: Problem, setting: Setting) -> FloatArray:
     piece = problem.pieces[0]
     dx = np.empty(STATES)
 
-    class Drive(LeafSystem):  # type: ignore[misc]
+    class DriveSystem(LeafSystem):  # type: ignore[misc]
         def __init__(self) -> None:
             super().__init__()
             self.DeclareContinuousState(STATES)
@@ -355,7 +355,7 @@ def drake(problem: Problem, setting: Setting) -> FloatArray:
                   value + slope * (context.get_time() - start), slip, threshold, p, dx)
             derivatives.get_mutable_vector().SetFromVector(dx)
 
-    system = Drive()
+    system = DriveSystem()
     simulator = Simulator(system)
     ApplySimulatorConfig(SimulatorConfig(
         integration_scheme=setting.method, max_step_size=0.1, accuracy=setting.tolerance,

@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""When a node made which step, and what processor time it took: kept in memory till the end."""
+"""Times of a node's steps and its processor time, kept in memory until the end of the run."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-# Steps of a run before the measurement begins: caches fill, Python specialises its bytecode.
+# Warm-up steps before the measurement: caches fill and Python specialises its bytecode.
 WARM_STEPS = 300
 
 
 class Stamps:
     """
-    The times at which one process made its steps, on the clock that all processes share.
+    The times of one process' steps, on the clock that all processes share.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Stamps:
     """
 
     def __init__(self, path: str | os.PathLike[str], last: int) -> None:
-        """Prepare to write to `path` once step `last` has been made."""
+        """Prepare to write to `path` after step `last`."""
         self._path = Path(path)
         self._last = last
         self._times = np.zeros(last + 1, np.int64)
@@ -48,9 +48,9 @@ class Stamps:
 
     def note(self, step: int) -> None:
         """
-        Note that `step` is made and about to be published.
+        Record that `step` is complete and about to be published.
 
-        Before it is published: then no peer can have made of it what is noted as earlier.
+        Recorded before it is published, it is never later than a peer's step that depends on it.
         """
         if step > self._last:
             return
@@ -69,12 +69,12 @@ class Stamps:
 
 class Stamped(NamedTuple):
     """
-    What one process noted.
+    The records of one process.
 
     Attributes
     ----------
-    times : when each step was made, shape (last + 1,) [s]
-    cpu_s : processor time of the process from the end of the warm steps to the last [s]
+    times : of each step, shape (last + 1,) [s]
+    cpu_s : processor time of the process from the end of the warm-up to the last step [s]
     due_s : when step 0 was due, NaN if this process did not pace the run [s]
 
     """
@@ -85,6 +85,6 @@ class Stamped(NamedTuple):
 
 
 def read(path: Path) -> Stamped:
-    """Return what `Stamps` has written."""
+    """Return the records that `Stamps` has written."""
     with np.load(path) as found:
         return Stamped(found['times'] * 1e-9, float(found['cpu_s']), float(found['due_s']))

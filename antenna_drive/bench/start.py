@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""What a user waits for: the import, the first step, the demo."""
+"""Times that a user waits for: the import, the first step, the demo."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ _SAY_WHEN = '; import time; print(time.time())'
 
 def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> dict[str, Any]:
     """
-    Measure starts of processes of their own, in turn.
+    Measure the starts of separate processes, interleaved.
 
     Returns
     -------
-    from the start of the process to the import of what, or to the end of the first step [s]:
+    times from the start of the process to the end of the import or of the first step [s]:
     interpreter_s, libraries_s, import_s, second_first_step_s (compiled before) and
     first_first_step_s (nothing compiled yet); second_over_libraries, and demo_s
 
@@ -53,7 +53,7 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
     for turn in range(repetitions + 1):
         for name, code in _STARTS.items():
             took = _until_said(code)
-            if turn:  # the first compiles and fills the disk's cache, if need be
+            if turn:  # the first turn may compile and fill the cache
                 values[name].append(took)
     result: dict[str, Any] = {}
     if quick:

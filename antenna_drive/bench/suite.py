@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The groups of the benchmark, one after another, and their figures as a table."""
+"""The groups of the benchmark, run one after another, and their figures as a table."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from antenna_drive.errors import UserError
 _MODULES = {'transport': 'transport', 'simulation': 'simulation', 'batch': 'batches',
             'diagnosis': 'diagnosis', 'start': 'start'}
 
-# What each headline figure is to be: at least (+) or at most (-) the number.
+# Goals of the headline figures: at least (+) or at most (-) the number.
 GOALS: dict[str, tuple[str, float]] = {
     'transport.ratio_to_bare': ('+', 0.8),
     'transport.rtf_1ms': ('+', 2.0),
@@ -52,16 +52,16 @@ def measure(groups: Iterable[str], repetitions: int, quick: bool,
     groups
         names of groups
     repetitions
-        turns of which each median is taken
+        turns over which each median is taken
     quick
         shorter runs and fewer settings
     progress
-        told what is being done
+        called with a description of the present measurement
 
     Returns
     -------
-    the machine, and for each group its figures; a group that cannot be measured here has instead
-    an entry `left_out` that says why
+    the machine, and the figures of each group; a group that cannot be measured here has an entry
+    `left_out` with the reason instead
 
     """
     result: dict[str, Any] = {'machine': machine(), 'quick': quick, 'repetitions': repetitions}
@@ -84,7 +84,7 @@ def _told(progress: Callable[[str], None], group: str, doing: str) -> None:
 
 
 def table(result: Mapping[str, Any]) -> str:
-    """Return every figure of a result, one on a line, with the goal where there is one."""
+    """Return the figures of a result, one per line, with their goals."""
     lines = [f'{"figure":<52} {"median":>10} {"least":>10} {"greatest":>10}  goal']
     for name, item in figures(result):
         goal = ''
@@ -101,7 +101,7 @@ def table(result: Mapping[str, Any]) -> str:
 
 
 def reached(name: str, value: float) -> bool:
-    """Return whether a headline figure is what it is to be."""
+    """Return whether a headline figure reaches its goal."""
     sign, bound = GOALS[name]
     return value >= bound if sign == '+' else value <= bound
 

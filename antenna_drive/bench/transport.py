@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The exchange between five processes: the drive's own and the bare one, run by run in turn."""
+"""The exchange between five processes: the drive's and the bare one, in alternating runs."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ from antenna_drive.lockstep.processes import DriveProcesses, Parameter
 import numpy as np
 
 STEP_S = 1e-3
-# How long five processes may take to begin, and then for a step [s].
+# Time limits for the start of five processes and for a step [s].
 _BEGIN_PATIENCE_S = 60.0
 _STEP_PATIENCE_S = 0.05
 
-# `own` and `bare` as a function of steps and pace.
+# The type of `own` and `bare`.
 Run = Callable[..., 'Exchange']
 
 _PERCENTILES = (50.0, 99.0, 99.9)
@@ -45,7 +45,7 @@ _PERCENTILES = (50.0, 99.0, 99.9)
 @dataclass(frozen=True)
 class Exchange:
     """
-    What five processes noted in one run.
+    The records of five processes in one run.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Exchange:
 
     @property
     def rate(self) -> float:
-        """Return the steps per second after the warm ones."""
+        """Return the steps per second after the warm-up."""
         times = self.nodes[TEST_SIGNAL].times[WARM_STEPS:]
         return float((times.size - 1) / (times[-1] - times[0]))
 
@@ -74,7 +74,7 @@ class Exchange:
 
     @property
     def latencies(self) -> Any:
-        """Return, from each step of the conductor, when all others have made their next [s]."""
+        """Return the time from each step of the conductor until all others made their next [s]."""
         others = [node.times for unit, node in self.nodes.items() if unit != TEST_SIGNAL]
         done = np.max([times[WARM_STEPS + 1:] for times in others], axis=0)
         return done - self.nodes[TEST_SIGNAL].times[WARM_STEPS:-1]
@@ -86,19 +86,19 @@ class Exchange:
 
     @property
     def delays(self) -> Any:
-        """Return how long after it was due the conductor made each step from step 1 on [s]."""
+        """Return the delay of each of the conductor's steps from step 1 on [s]."""
         conductor = self.nodes[TEST_SIGNAL]
         due = conductor.due_s + np.arange(conductor.times.size) * (self.step_s / self.pace)
         return (conductor.times - due)[1:]
 
     def late(self) -> Any:
-        """Return of each step whether it came more than a step's time after it was due."""
+        """Return for each step whether it was late by more than one step."""
         return self.delays > self.step_s / self.pace
 
 
 def own(steps: int, step_s: float = STEP_S, pace: float = 0.0, publish_rate: float = 0.0,
         ) -> Exchange:
-    """Run the drive's five nodes for so many steps; publish_rate is that of their readings."""
+    """Run the drive's five nodes for some steps; publish_rate is that of their readings [Hz]."""
     parameters: dict[str, dict[str, Parameter]] = {
         unit: {'publish_rate': publish_rate} for unit in UNITS}
     parameters[TEST_SIGNAL].update({
@@ -107,7 +107,7 @@ def own(steps: int, step_s: float = STEP_S, pace: float = 0.0, publish_rate: flo
 
 
 def bare(steps: int, step_s: float = STEP_S, pace: float = 0.0) -> Exchange:
-    """Run the bare exchange for so many steps."""
+    """Run the bare exchange for some steps."""
     return _run('antenna_drive.bench.bare_node', steps, step_s, pace,
                 {TEST_SIGNAL: {'run.pace': pace}}, (repr(step_s), repr(pace)))
 
@@ -121,7 +121,7 @@ def _run(module: str, steps: int, step_s: float, pace: float,
         patience = _BEGIN_PATIENCE_S + steps * max(
             _STEP_PATIENCE_S, 2.0 * step_s / pace if pace else 0.0)
         began = time.monotonic()
-        # A namespace of its own: whatever drive runs on this machine is not met.
+        # An own namespace keeps other drives on this machine apart.
         with DriveProcesses(parameters, commands=commands,
                             namespace=f'/bench_{os.getpid()}') as processes:
             while not all(path.exists() for path in files.values()):
@@ -144,10 +144,10 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
 
     Raises
     ------
-    ModuleNotFoundError : there is no ROS 2
+    ModuleNotFoundError : ROS 2 is not installed
 
     """
-    import rclpy  # noqa: F401  told at once, not by five processes
+    import rclpy  # noqa: F401  fail here and not in five processes
 
     steps = 1500 if quick else 5000
     result: dict[str, Any] = {'steps': steps, 'step_s': STEP_S}
@@ -186,7 +186,7 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
 
 
 def _paced(repetitions: int, steps: int, progress: Callable[[str], None]) -> dict[str, Any]:
-    """Measure both at real-time pace: how long a step takes when nothing hurries it."""
+    """Measure the latency of both exchanges at real-time pace."""
     paced: dict[str, list[Exchange]] = {'own': [], 'bare': []}
     for turn in range(repetitions):
         progress(f'at real-time pace, turn {turn + 1} of {repetitions}')

@@ -11,4 +11,4 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Fitting parameters to published or measured figures, and telling what these determine."""
+"""Fitting parameters to published or measured figures, and how well these determine them."""

@@ -19,18 +19,18 @@ from collections.abc import Mapping, Sequence
 import io
 from typing import Any
 
-from antenna_drive.calibration.problem import Problem
+from antenna_drive.calibration.problem import CalibrationProblem
 from antenna_drive.parameters.loading import find
 from antenna_drive.parameters.plain_yaml import read_yaml
 import yaml
 
-# More digits than any figure determines, and few enough to read.
+# Significant digits: more than any figure determines.
 _DIGITS = 7
 
 
-def configuration(problem: Problem, shares: Sequence[float], start: str) -> str:
+def configuration(problem: CalibrationProblem, shares: Sequence[float], start: str) -> str:
     """
-    Return a candidate as a configuration file that lies over what the fit started from.
+    Return a candidate as a configuration file that overrides the start of the fit.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def configuration(problem: Problem, shares: Sequence[float], start: str) -> str:
     shares
         the candidate, as shares of the bounds
     start
-        configuration that the fit started from; what it says of other parameters is kept
+        configuration that the fit started from; its other parameters are kept
 
     """
     content: dict[str, Any] = {}
@@ -61,7 +61,7 @@ def _rounded(value: float) -> float:
 
 
 def as_yaml(content: Mapping[str, Any]) -> str:
-    """Return a configuration as YAML, one entry a line, exponents as YAML 1.1 reads them."""
+    """Return a configuration as YAML, one entry per line, with exponents that YAML 1.1 reads."""
     text = io.StringIO()
     for section, body in content.items():
         if not isinstance(body, dict):

@@ -12,15 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-What is to be fitted, as data: free parameters with bounds, targets with weights.
+The definition of a fit: free parameters with bounds, targets with weights.
 
-A file of targets holds
+A target file has these sections:
 
   free:         section.entry of a configuration file, or section.list[0], with low, high and
                 scale (linear or log)
   targets:      name of a figure, with value, at_least or at_most, and tolerance and weight
-  figures:      figures of one's own; those of the article are known by name
-  experiments:  experiments of one's own
+  figures:      additional figures; those of the article are known by name
+  experiments:  additional experiments
   search:       population and spread of the first generation
 """
 
@@ -34,7 +34,7 @@ import re
 from typing import Any
 
 from antenna_drive.article import readings
-from antenna_drive.article.experiments import Experiment
+from antenna_drive.article.experiments import DriveExperiment
 from antenna_drive.article.measures import (
     article_experiments, article_measures, Measure, OLD_CIRCUIT, Reading, Results,
 )
@@ -44,10 +44,10 @@ from antenna_drive.parameters.plain_yaml import read_yaml
 from antenna_drive.parameters.schema import Entry, nearest
 from antenna_drive.parameters.sets import changed, entries, values
 
-# The circuit of an experiment that lays none over the configuration.
+# The circuit of an experiment that uses the configuration's own.
 NO_CIRCUIT = 'none'
 KINDS = ('value', 'at_least', 'at_most')
-# What a figure that cannot be read counts as, in tolerances.
+# The miss of a figure that cannot be evaluated, in tolerances.
 _UNREADABLE = 100.0
 _LIST_ITEM = re.compile(r'(?P<key>.+)\[(?P<index>\d+)\]')
 _OWN_SECTIONS = {'axis': 'plant.axis', 'encoder': 'plant.encoder',
@@ -75,14 +75,14 @@ class Free:
     unit: str
 
     def at(self, share: float) -> float:
-        """Return the value at a share of the way from low to high, 0 to 1."""
+        """Return the value at a share of the range, 0 at low and 1 at high."""
         share = min(max(share, 0.0), 1.0)
         if self.log:
             return float(self.low * (self.high / self.low) ** share)
         return self.low + share * (self.high - self.low)
 
     def share(self, value: float) -> float:
-        """Return where a value is between low and high, 0 to 1; beyond them the nearer end."""
+        """Return the share of the range at a value; values outside give 0 or 1."""
         if self.log:
             share = math.log(max(value, self.low) / self.low) / math.log(self.high / self.low)
         else:
@@ -91,13 +91,13 @@ class Free:
 
     @property
     def key(self) -> str:
-        """Return 'section.entry' without the place in a list."""
+        """Return 'section.entry' without the index of a list."""
         item = _LIST_ITEM.fullmatch(self.name)
         return item['key'] if item else self.name
 
     @property
     def index(self) -> int | None:
-        """Return the place in a list, None for a single number."""
+        """Return the index in a list, None for a single number."""
         item = _LIST_ITEM.fullmatch(self.name)
         return int(item['index']) if item else None
 
@@ -105,15 +105,15 @@ class Free:
 @dataclass(frozen=True)
 class Target:
     """
-    What one figure ought to be.
+    The aim for one figure.
 
     Attributes
     ----------
     figure : its name
     kind : value, at_least or at_most
-    number : the figure aimed at, in its unit
-    tolerance : a miss of this size costs as much as any other target's tolerance
-    weight : times this
+    number : the aim, in the figure's unit
+    tolerance : the miss that costs as much as any other target's tolerance
+    weight : factor on the cost
 
     """
 
@@ -124,7 +124,7 @@ class Target:
     weight: float = 1.0
 
     def residual(self, obtained: float) -> float:
-        """Return the miss in tolerances, zero where a bound is kept."""
+        """Return the miss in tolerances, zero if a bound is kept."""
         if not math.isfinite(obtained):
             return _UNREADABLE
         miss = (obtained - self.number) / self.tolerance
@@ -135,34 +135,35 @@ class Target:
         return max(-_UNREADABLE, min(miss, _UNREADABLE))
 
     def cost(self, obtained: float) -> float:
-        """Return what the miss costs: its square while small, its size where large."""
+        """Return the cost of the miss: quadratic for a small one, linear for a large one."""
         return self.weight * 2.0 * (math.hypot(1.0, self.residual(obtained)) - 1.0)
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What a candidate gives: its cost, and the figures, as far as they were needed."""
+    """The cost of a candidate and the figures that were evaluated for it."""
 
     cost: float
     figures: Mapping[str, float]
     complete: bool
 
 
-class Problem:
+class CalibrationProblem:
     """
-    A fit: free parameters, targets, and the configuration that everything else is taken from.
+    A fit: free parameters, targets, and the configuration for everything else.
 
     Attributes
     ----------
     free : the free parameters, tuple of Free
     targets : tuple of Target
-    population, spread : of the search: candidates in a generation, and the first generation's
-        standard deviation as a share of the bounds
+    population : candidates in a generation
+    spread : standard deviation of the first generation, as a share of the bounds
 
     """
 
     def __init__(self, free: Sequence[Free], targets: Sequence[Target], *,
-                 start: Sequence[str] = (), experiments: Mapping[str, Experiment] | None = None,
+                 start: Sequence[str] = (),
+                 experiments: Mapping[str, DriveExperiment] | None = None,
                  figures: Mapping[str, Measure] | None = None, population: int = 16,
                  spread: float = 0.1) -> None:
         """Load the configuration with every circuit that an experiment needs."""
@@ -180,7 +181,7 @@ class Problem:
             if target.figure not in self._figures:
                 raise ParameterError(f'targets.{target.figure}: no such figure'
                                      f'{nearest(target.figure, tuple(self._figures))}')
-        # what a circuit's file says of a parameter stays: it is not the candidate's to change
+        # parameters that a circuit's file sets are not changed by a candidate
         self._fixed = {
             name: {key for (key, _, own), (_, _, base) in zip(values(drive), values(self._base))
                    if own != base}
@@ -191,7 +192,7 @@ class Problem:
         return self._figures[name]
 
     def start(self) -> list[float]:
-        """Return the configuration's own values as shares of the bounds."""
+        """Return the configuration's values as shares of the bounds."""
         own = {name: value for name, _, value in values(self._base)}
         shares = []
         for item in self.free:
@@ -200,7 +201,7 @@ class Problem:
         return shares
 
     def parameters(self, shares: Sequence[float]) -> dict[str, Any]:
-        """Return the candidate's values by 'section.entry', lists whole."""
+        """Return the candidate's values by 'section.entry', with complete lists."""
         own = {name: value for name, _, value in values(self._base)}
         found: dict[str, Any] = {}
         for item, share in zip(self.free, shares):
@@ -213,7 +214,7 @@ class Problem:
         return found
 
     def results(self, shares: Sequence[float]) -> Results:
-        """Return the candidate's results, nothing run yet."""
+        """Return the candidate's results; nothing is run yet."""
         changes = {name: value for key, value in self.parameters(shares).items()
                    for name in drive_names(key)}
         drives: dict[str, Drive] = {}
@@ -225,15 +226,14 @@ class Problem:
 
     def evaluate(self, shares: Sequence[float], give_up_at: float = math.inf) -> Evaluation:
         """
-        Simulate a candidate and weigh its figures.
+        Simulate a candidate and return its cost and figures.
 
         Parameters
         ----------
         shares
             of the bounds, one for each free parameter
         give_up_at
-            once the cost exceeds this the rest is not simulated; targets are looked
-            at in their order
+            stop once the cost exceeds this; targets are evaluated in their order
 
         """
         results = self.results(shares)
@@ -248,7 +248,7 @@ class Problem:
 
 
 def read(figure: Measure, results: Results) -> float:
-    """Return a figure, or NaN where a wild candidate has none."""
+    """Return a figure, or NaN if it cannot be evaluated."""
     try:
         return figure.value(results)
     except (ArithmeticError, ValueError, IndexError):
@@ -263,20 +263,20 @@ def drive_names(key: str) -> list[str]:
     return [f'{_OWN_SECTIONS[section]}.{entry}']
 
 
-def read_problem(source: str | Path, start: Sequence[str] = ()) -> Problem:
+def read_problem(source: str | Path, start: Sequence[str] = ()) -> CalibrationProblem:
     """
-    Read a file of targets; see this module's own description for its form.
+    Read a target file; the module's docstring describes its form.
 
     Parameters
     ----------
     source
         path, or name of a file in config/
     start
-        configuration files, from which the fit starts and everything fixed is taken
+        configuration files that give the start of the fit and all fixed parameters
 
     Raises
     ------
-    ParameterError : the file cannot be read or says something that is not allowed; one line
+    ParameterError : the file cannot be read or has an entry that is not allowed; one line
         names file and entry
 
     """
@@ -291,7 +291,7 @@ def read_problem(source: str | Path, start: Sequence[str] = ()) -> Problem:
         figures = {str(name): _figure(str(name), body, known)
                    for name, body in (content.get('figures') or {}).items()}
         search = _table('search', content.get('search') or {}, ('population', 'spread'))
-        return Problem(
+        return CalibrationProblem(
             [_free(str(name), body) for name, body in _filled(content, 'free')],
             [_target(str(name), body) for name, body in _filled(content, 'targets')],
             start=start, experiments=experiments, figures=figures,
@@ -357,7 +357,7 @@ def _target(name: str, body: Any) -> Target:
                   _number(f'{key}.weight', table.get('weight', 1.0), 0.0))
 
 
-def _experiment(name: str, body: Any) -> Experiment:
+def _experiment(name: str, body: Any) -> DriveExperiment:
     key = f'experiments.{name}'
     table = _table(key, body, ('duration', 'circuit', 'settings', 'bias_share'))
     settings = {str(path): value for path, value in (table.get('settings') or {}).items()}
@@ -368,9 +368,10 @@ def _experiment(name: str, body: Any) -> Experiment:
                                  f'{nearest(path, tuple(known))}')
         settings[path] = known[path].check(f'{key}.settings.{path}', value)
     share = table.get('bias_share')
-    return Experiment(name, _number(f'{key}.duration', table.get('duration'), 1e-3, 1e5),
-                      str(table.get('circuit', NO_CIRCUIT)), settings,
-                      None if share is None else _number(f'{key}.bias_share', share, -1.0, 1.0))
+    return DriveExperiment(
+        name, _number(f'{key}.duration', table.get('duration'), 1e-3, 1e5),
+        str(table.get('circuit', NO_CIRCUIT)), settings,
+        None if share is None else _number(f'{key}.bias_share', share, -1.0, 1.0))
 
 
 def _figure(name: str, body: Any, experiments: set[str]) -> Reading:

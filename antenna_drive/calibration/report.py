@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-What a fit determines and what it leaves open: sensitivity, correlation, profile, trade-off.
+How well a fit determines its parameters: sensitivity, correlation, profile, trade-off.
 
 Near the best candidate each target's miss, in tolerances, is taken as linear in the
-parameters. A parameter is determined as far as the targets would be missed by a tolerance if it
-moved alone (conditional) or with all others making up for it as well as they can (marginal).
+parameters. The uncertainty of a parameter is the move that makes the targets miss by one
+tolerance: alone (conditional), or while all other parameters compensate for it (marginal).
 """
 
 from __future__ import annotations
@@ -26,53 +26,52 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
-from antenna_drive.calibration.problem import Problem
-from antenna_drive.calibration.search import Candidate, Found
+from antenna_drive.calibration.problem import CalibrationProblem
+from antenna_drive.calibration.search import FitCandidate, SearchResult
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.parameters.schema import nearest, ParameterError
 import numpy as np
 
-# Half the distance between the two candidates that a sensitivity is taken from, as a share of
-# the bounds: wide enough to step over the jumps that settling times have.
+# Half the step of the difference quotient, as a share of the bounds; wider than the jumps of
+# settling times.
 _HALF_STEP = 0.01
-# Where the profile is taken, as shares of the bounds away from the best candidate.
+# Distances of the profile's points from the best candidate, as shares of the bounds.
 _PROFILE = (-0.1, -0.05, -0.02, 0.02, 0.05, 0.1)
-# A direction in which the targets change by less than this many tolerances over the whole range
-# is not determined at all; it would only make the others look undetermined.
+# A direction is flat if the targets change by fewer tolerances than this over the whole range.
 _FLAT = 0.3
 # Marginal uncertainty, as a share of the bounds, up to which a parameter counts as determined.
 _DETERMINED = 0.05
-# Correlations that are worth telling.
+# Correlations from this size on are reported.
 _CORRELATED = 0.8
 _TRADE_OFF_POINTS = 12
-# Others that cost this many times the least are left out of a trade-off.
+# Candidates that cost this many times the least are left out of a trade-off.
 _HOPELESS = 30.0
 
 
 @dataclass(frozen=True)
 class _Local:
-    """The misses near the best candidate: at it, and their slopes per share of the bounds."""
+    """The misses at the best candidate, and their slopes per share of the bounds."""
 
     misses: FloatArray
     slopes: FloatArray
 
 
-def report(problem: Problem, found: Found, trade_offs: Sequence[str] = (),
+def report(problem: CalibrationProblem, found: SearchResult, trade_offs: Sequence[str] = (),
            progress: Callable[[float], None] | None = None,
-           also: Sequence[Candidate] = ()) -> dict[str, Any]:
+           also: Sequence[FitCandidate] = ()) -> dict[str, Any]:
     """
-    Tell what was found and how far it is determined.
+    Report the best candidate and how well its parameters are determined.
 
     Parameters
     ----------
     problem
         the fit
     found
-        what the search found
+        result of the search
     trade_offs
-        figures of targets whose price in the other targets is to be shown
+        target figures for which to show the cost of the other targets
     progress
-        told the share that is done
+        called with the share that is done, 0 to 1
     also
         candidates of other searches with the same figures, for the trade-offs
 
@@ -82,7 +81,7 @@ def report(problem: Problem, found: Found, trade_offs: Sequence[str] = (),
 
     Raises
     ------
-    ParameterError : a trade-off is asked for a figure that is no target
+    ParameterError : a trade-off names a figure that is not a target
 
     """
     known = tuple(target.figure for target in problem.targets)
@@ -133,7 +132,8 @@ def report(problem: Problem, found: Found, trade_offs: Sequence[str] = (),
     }
 
 
-def _targets(problem: Problem, best: Candidate, start: Candidate) -> list[dict[str, Any]]:
+def _targets(problem: CalibrationProblem, best: FitCandidate, start: FitCandidate,
+             ) -> list[dict[str, Any]]:
     told = []
     for target in problem.targets:
         obtained = best.evaluation.figures[target.figure]
@@ -145,18 +145,18 @@ def _targets(problem: Problem, best: Candidate, start: Candidate) -> list[dict[s
     return told
 
 
-def _misses(problem: Problem, figures: Any) -> FloatArray:
+def _misses(problem: CalibrationProblem, figures: Any) -> FloatArray:
     """
-    Return each target's miss in tolerances, with the sign, also where a bound is kept.
+    Return each target's signed miss in tolerances, times the root of its weight.
 
-    A kept bound carries no information as long as it stays kept; it counts with its weight only
-    near the bound.
+    A bound that is kept counts as no miss.
     """
     return np.array([math.sqrt(target.weight) * target.residual(figures[target.figure])
                      for target in problem.targets])
 
 
-def _slopes(problem: Problem, best: Candidate, evaluated: Callable[[FloatArray], Any]) -> _Local:
+def _slopes(problem: CalibrationProblem, best: FitCandidate,
+            evaluated: Callable[[FloatArray], Any]) -> _Local:
     centre = np.array(best.shares)
     columns = []
     for i in range(centre.size):
@@ -177,7 +177,7 @@ def _uncertainties(local: _Local) -> tuple[FloatArray, FloatArray, FloatArray, F
     strengths = np.pad(strengths, (0, size - strengths.size))
     norms = np.linalg.norm(local.slopes, axis=0)
     conditional = 1.0 / np.maximum(norms, 1.0)
-    # along a direction that the targets do not feel, the bounds are all that is known
+    # only the bounds limit a direction that does not affect the targets
     variance = 1.0 / np.maximum(strengths, 1.0) ** 2
     covariance = (directions.T * variance) @ directions
     marginal = np.sqrt(np.diag(covariance))
@@ -189,12 +189,12 @@ def _spread(item: Any, share: float, uncertainty: float) -> list[float]:
     return [item.at(share - uncertainty), item.at(share + uncertainty)]
 
 
-def _profile(item: Any, i: int, best: Candidate, local: _Local,
+def _profile(item: Any, i: int, best: FitCandidate, local: _Local,
              evaluated: Callable[[FloatArray], Any]) -> list[list[float]]:
     """
-    Return cost against one parameter, the others making up for it along the linear model.
+    Return cost against one parameter while the others compensate by the linear model.
 
-    Each point is a simulation; the others follow in one damped step, not in a search.
+    Each point is one simulation, after one damped step of the other parameters.
     """
     points = [[item.at(best.shares[i]), best.evaluation.cost]]
     others = [j for j in range(len(best.shares)) if j != i]
@@ -210,12 +210,12 @@ def _profile(item: Any, i: int, best: Candidate, local: _Local,
     return sorted(points)
 
 
-def _trade_off(problem: Problem, candidates: Sequence[Candidate], figure: str,
+def _trade_off(problem: CalibrationProblem, candidates: Sequence[FitCandidate], figure: str,
                ) -> list[dict[str, Any]]:
     """
-    Return what the other targets cost at best, for each level of one figure.
+    Return the least cost of the other targets for each level of one figure.
 
-    Taken from everything that was tried: the more, the closer to the true curve.
+    The curve is an upper bound from all candidates tried; more candidates lower it.
     """
     others = [target for target in problem.targets if target.figure != figure]
     wanted = {target.figure for target in problem.targets}
@@ -224,7 +224,7 @@ def _trade_off(problem: Problem, candidates: Sequence[Candidate], figure: str,
              and math.isfinite(item.evaluation.figures[figure])]
     costs = np.array([sum(target.cost(figures[target.figure]) for target in others)
                       for figures in tried])
-    # levels at which the others are hopeless say nothing, and would stretch the curve
+    # hopeless levels would only stretch the curve
     usable = np.flatnonzero(costs <= _HOPELESS * max(1.0, costs.min()))
     levels = np.array([tried[k][figure] for k in usable])
     edges = np.linspace(levels.min(), levels.max(), _TRADE_OFF_POINTS + 1)

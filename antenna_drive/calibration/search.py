@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-The search for the best fit: CMA-ES, seeded, with a log that it can go on from.
+The search for the best fit: seeded CMA-ES with a log from which it can resume.
 
-The log holds one line of JSON for the problem and one for every candidate. Whoever starts the
-same search again gets the same candidates, and those in the log are not simulated anew: an
-interrupted search goes on where it stopped, and ends where it would have ended.
+The log has one line of JSON for the problem and one for every candidate. The same search tries
+the same candidates, and those in the log are not simulated again. An interrupted search
+therefore resumes where it stopped and gives the same result.
 """
 
 from __future__ import annotations
@@ -29,46 +29,46 @@ import math
 from pathlib import Path
 from typing import Any, TextIO
 
-from antenna_drive.calibration.problem import Evaluation, Problem
+from antenna_drive.calibration.problem import CalibrationProblem, Evaluation
 from antenna_drive.errors import UserError
 import cma
 import numpy as np
 
-# A candidate is given up once it costs more than this times the worst of the last generation's
-# better half, from which the search goes on.
+# A candidate is given up once it costs more than this times the worst candidate of the better half
+# of the last generation.
 _GIVE_UP = 1.5
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """A candidate: its place between the bounds, and what it gives."""
+class FitCandidate:
+    """A candidate: its parameters as shares of the bounds, and its evaluation."""
 
     shares: tuple[float, ...]
     evaluation: Evaluation
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """
-    What a search found.
+    The result of a search.
 
     Attributes
     ----------
     best : the best candidate
-    candidates : all of them, in their order
+    candidates : all of them in order; the first is the start
 
     """
 
-    best: Candidate
-    candidates: tuple[Candidate, ...]
+    best: FitCandidate
+    candidates: tuple[FitCandidate, ...]
 
 
 class _Log:
-    """The candidates of a search, on disk as they come."""
+    """The candidates of a search, written to disk one by one."""
 
-    def __init__(self, path: Path, problem: Problem, seed: int) -> None:
+    def __init__(self, path: Path, problem: CalibrationProblem, seed: int) -> None:
         self._path = path
-        self.read: list[Candidate] = []
+        self.read: list[FitCandidate] = []
         head = {'problem': _digest(problem), 'seed': seed}
         if path.exists():
             self._read(head)
@@ -87,20 +87,20 @@ class _Log:
         except (ValueError, KeyError, TypeError) as error:
             raise UserError(f'{self._path}: is not the log of a search: {error}') from error
         if len(whole) < len(lines) - 1:
-            # the line that an interruption cut short is simulated anew
+            # drop a line that an interruption cut short; its candidate is simulated again
             self._path.write_text(''.join([lines[0], *whole]), encoding='utf-8')
 
     def open(self) -> TextIO:  # noqa: A003
         return self._path.open('a', encoding='utf-8')
 
 
-def _candidate(line: str) -> Candidate:
+def _candidate(line: str) -> FitCandidate:
     entry = json.loads(line)
-    return Candidate(tuple(entry['shares']),
-                     Evaluation(entry['cost'], entry['figures'], entry['complete']))
+    return FitCandidate(tuple(entry['shares']),
+                        Evaluation(entry['cost'], entry['figures'], entry['complete']))
 
 
-def read_log(path: Path) -> list[Candidate]:
+def read_log(path: Path) -> list[FitCandidate]:
     """
     Return the candidates of any search's log.
 
@@ -120,30 +120,30 @@ def read_log(path: Path) -> list[Candidate]:
         raise UserError(f'{path}: is not the log of a search: {error}') from error
 
 
-def _digest(problem: Problem) -> str:
-    """Return what tells one problem from another."""
+def _digest(problem: CalibrationProblem) -> str:
+    """Return a digest that identifies the problem."""
     said = repr((problem.free, problem.targets, problem.population, problem.spread,
                  problem.parameters(problem.start())))
     return hashlib.sha256(said.encode()).hexdigest()[:16]
 
 
-def search(problem: Problem, count: int, *, seed: int = 1, log: Path | None = None,
-           progress: Callable[[int, Candidate], None] | None = None) -> Found:
+def search(problem: CalibrationProblem, count: int, *, seed: int = 1, log: Path | None = None,
+           progress: Callable[[int, FitCandidate], None] | None = None) -> SearchResult:
     """
-    Look for the parameters that cost least.
+    Search for the parameters of least cost.
 
     Parameters
     ----------
     problem
-        what is free, what is aimed at, and from where
+        the fit
     count
         candidates to try; the search ends with a whole generation
     seed
         the same seed gives the same search
     log
-        where candidates are kept as they come; a search that finds its log goes on from it
+        file for the candidates; the search resumes from it if it exists
     progress
-        told the number of candidates so far, and the best one
+        called with the number of candidates so far and the best one
 
     Raises
     ------
@@ -152,7 +152,7 @@ def search(problem: Problem, count: int, *, seed: int = 1, log: Path | None = No
     """
     known = _Log(log, problem, seed) if log is not None else None
     start = problem.start()
-    candidates = [Candidate(tuple(start), problem.evaluate(start))]
+    candidates = [FitCandidate(tuple(start), problem.evaluate(start))]
     random = np.random.default_rng(seed)
     strategy = cma.CMAEvolutionStrategy(start, problem.spread, {
         'bounds': [0.0, 1.0], 'popsize': problem.population, 'verbose': -9, 'seed': math.nan,
@@ -171,8 +171,8 @@ def search(problem: Problem, count: int, *, seed: int = 1, log: Path | None = No
                         raise UserError(f'{log}: does not repeat (another version of a library?), '
                                         'remove it to start anew')
                 else:
-                    candidate = Candidate(tuple(map(float, shares)),
-                                          problem.evaluate(shares, limit))
+                    candidate = FitCandidate(tuple(map(float, shares)),
+                                             problem.evaluate(shares, limit))
                     if stream:
                         _write(stream, candidate)
                 candidates.append(candidate)
@@ -184,15 +184,15 @@ def search(problem: Problem, count: int, *, seed: int = 1, log: Path | None = No
     finally:
         if stream:
             stream.close()
-    return Found(_best(candidates), tuple(candidates))
+    return SearchResult(_best(candidates), tuple(candidates))
 
 
-def _best(candidates: list[Candidate]) -> Candidate:
+def _best(candidates: list[FitCandidate]) -> FitCandidate:
     return min((item for item in candidates if item.evaluation.complete),
                key=lambda item: item.evaluation.cost)
 
 
-def _write(stream: TextIO, candidate: Candidate) -> None:
+def _write(stream: TextIO, candidate: FitCandidate) -> None:
     evaluation = candidate.evaluation
     stream.write(json.dumps({
         'shares': candidate.shares, 'cost': evaluation.cost, 'complete': evaluation.complete,

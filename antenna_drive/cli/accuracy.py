@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Measure how far the lock-step at a macro-step is from the converged reference.
+Measure the error of the lock-step against a converged run, by macro-step.
 
-For each macro-step: the rms distance of the worst signal of each of the article's experiments,
-as a share of that signal's rms, and the gain k' of Filter 1 at which the torque bias becomes
-unstable, which a delay in the exchange between the units would lower (145.4 when converged).
+For each macro-step the command shows the rms error of the worst signal in each of the article's
+experiments, in percent of the signal's rms. It also shows the gain k' of Filter 1 at which the
+torque bias becomes unstable: 145.4 when converged, less with a delay between the units.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _DEFAULT_STEPS = (5e-4, 1e-3, 2e-3, 4e-3)
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     parser.add_argument('--step', type=float, action='append', metavar='S',
-                        help='macro-step [s], a whole part of 4 ms; may be repeated '
+                        help='macro-step [s]; must divide 4 ms; may be repeated '
                              '(default: 0.5, 1, 2 and 4 ms)')
     add_json_option(parser)
 
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     for step_s in steps:
         parts = 4e-3 / step_s if step_s > 0.0 else 0.0
         if parts < 0.5 or abs(parts - round(parts)) > 1e-6:
-            raise UserError(f'--step {step_s:g}: allowed is a whole part of 0.004 s')
+            raise UserError(f'--step {step_s:g}: 0.004 s must be a multiple of it')
     names = list(experiments())
     drive = load('old_circuit')
     pole = drive.torque_share.filter_1.pole
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         write_json({'reference_step_s': _reference_step(), 'steps': table}, args.json)
         return 0
-    print("worst signal, rms distance in percent of its rms; limit of k' [1/s]")
+    print("rms error of the worst signal in percent of its rms; limit of k' [1/s]")
     print(f'{"step [ms]":>9}  ' + '  '.join(f'{name:>6}' for name in names) + '   limit')
     for row in table:
         print(f'{1e3 * row["step_s"]:9.2f}  '

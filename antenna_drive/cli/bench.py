@@ -12,19 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Measure speed: every figure a ratio of two things taken in turn, in one run.
+Measure speed: headline figures are ratios of two interleaved measurements in one run.
 
 Groups:
   transport   five processes against the bare exchange of the same frames
   simulation  one process against solve_ivp, python-control, PathSim and Drake at equal accuracy,
               and against the same loop in C
-  batch       many variants on all cores, through an executor of the caller's
+  batch       many variants on all cores, in an executor of the caller
   diagnosis   wall time and memory of a diagnosis
   start       import, first step, demo
 
-Peers that are not installed are left out, and the result says so: pip install
-'antenna_drive[bench]' has them all. Each figure is a median of at least five with least and
-greatest; the single values are in the JSON. Leave the machine alone while it measures.
+Peers that are not installed are left out, and the result names them; pip install
+'antenna_drive[bench]' installs all. Each figure is a median with minimum and maximum; the JSON
+has the single values. Do not use the machine for other work meanwhile.
 
 For example:
   antenna-drive bench --quick
@@ -45,16 +45,16 @@ GROUPS = ('start', 'simulation', 'batch', 'diagnosis', 'transport')
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     parser.add_argument('--quick', action='store_true',
-                        help='shorter runs and fewer settings: within five minutes')
+                        help='shorter runs and fewer settings; takes up to five minutes')
     parser.add_argument('--only', action='append', choices=GROUPS, metavar='GROUP',
                         help=f'one of {", ".join(GROUPS)}; may be repeated (default: all)')
     parser.add_argument('--repetitions', type=int, default=5, metavar='N',
-                        help='turns, of which the median is taken (default: %(default)s)')
+                        help='number of measurements for each median (default: %(default)s)')
     add_json_option(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Measure, and print the table or write the JSON; 0 whatever the figures."""
+    """Measure, and print the table or write the JSON; always 0."""
     from antenna_drive.bench import suite
     from antenna_drive.errors import UserError
 

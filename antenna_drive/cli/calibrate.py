@@ -12,15 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Fit parameters to published or measured figures, and say what these figures determine.
+Fit parameters to published or measured figures, and report how well these determine them.
 
   antenna-drive calibrate article --out fitted.yaml
   antenna-drive calibrate my_antenna.yaml --start my_drive.yaml --out fitted.yaml --log fit.log
 
-TARGETS names the free parameters with their bounds, and the figures aimed at with tolerances
-and weights; docs/calibration.md tells its form. The search is global, and repeats with its
-seed; with --log an interrupted one goes on where it stopped. The exit code is 1 if a target
-is missed by more than its tolerance.
+TARGETS lists the free parameters with their bounds, and the target figures with tolerances
+and weights; docs/calibration.md describes its form. The search is global and repeatable: the
+same seed tries the same candidates. With --log an interrupted search resumes. The exit code is
+1 if a target is missed by more than its tolerance.
 """
 
 from __future__ import annotations
@@ -46,21 +46,22 @@ COUNT = 2000
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument('targets', metavar='TARGETS',
-                        help='what is free and what is aimed at: a file, or a name in '
+                        help='free parameters and target figures: a file, or a name in '
                              'config/calibration/')
     parser.add_argument('--start', metavar='CONFIG', default='reference',
                         help='configuration to start from (default: %(default)s)')
     parser.add_argument('--out', metavar='FILE', type=Path, required=True,
                         help='configuration to write')
     parser.add_argument('--log', metavar='FILE', type=Path,
-                        help='keep every candidate in FILE, and go on from it if it is there')
+                        help='write every candidate to FILE, and resume from it if it exists')
     parser.add_argument('--seed', type=int, default=1, help='default: %(default)s')
     parser.add_argument('--count', type=int, default=COUNT,
                         help='candidates to try (default: %(default)s)')
     parser.add_argument('--trade-off', metavar='FIGURE', nargs='+', default=[],
-                        help='also show what each of these figures costs the others')
+                        help='show the least cost of the other targets by the level of each '
+                             'FIGURE')
     parser.add_argument('--also', metavar='LOG', nargs='+', type=Path, default=[],
-                        help='logs of earlier searches whose candidates count in trade-offs')
+                        help='logs of earlier searches, used for the trade-offs')
     add_json_option(parser)
 
 
@@ -73,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
                        progress=lambda done, best: shown.update(done))
     with replaced(arguments.out) as stream:
         stream.write(configuration(problem, found.best.shares, arguments.start).encode())
-    with Progress('what is determined', 1.0) as shown:
+    with Progress('uncertainties', 1.0) as shown:
         told = report(problem, found, arguments.trade_off, shown.update, also)
     if arguments.json is not None:
         write_json(told, arguments.json)
@@ -83,7 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _find(targets: str) -> str | Path:
-    """Return a file of targets as it is, or the one of that name in config/calibration/."""
+    """Return the path given, or the file of that name in config/calibration/."""
     shipped = config_dir() / 'calibration' / f'{targets}.yaml'
     return shipped if not Path(targets).exists() and shipped.is_file() else targets
 
@@ -102,11 +103,11 @@ def _write(told: dict[str, Any]) -> None:
         lines.append(_PARAMETER.format(
             '' if item['determined'] else 'OPEN', item['name'], f'{item["value"]:.5g}',
             _range(item['conditional']), _range(item['marginal'])))
-    lines += ['', 'moves of one parameter that others can make up for:']
+    lines += ['', 'parameters that can compensate for each other, with their correlation:']
     lines += [f'  {item["first"]} and {item["second"]}: {item["correlation"]:+.2f}'
               for item in told['correlations']] or ['  none']
     for figure, curve in told['trade_offs'].items():
-        lines += ['', f'what the other targets cost at best, by {figure}:']
+        lines += ['', f'least cost of the other targets, by {figure}:']
         lines += [f'  {point["level"]:>10.4g}  {point["cost_of_the_others"]:<10.4g}'
                   f'{"misses " + ", ".join(point["missed"]) if point["missed"] else ""}'
                   for point in curve]

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Measure which effects a test can tell apart, and which tests separate most: before the antenna.
+Predict which effects a planned test can separate, before going to the antenna.
 
-A test is a test sheet (YAML), or one of the built-in ones. For each effect the least size that
-shows is given, and the groups of effects that pass for each other. With --each every test is
-judged by itself as well.
+A test is a test sheet (YAML) or one of the built-in tests. For each effect the command shows the
+smallest size that is detectable, and the effects that look alike. With --each every test is also
+judged alone, to find the tests that separate most.
 
 For example:
 
@@ -42,9 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         default=['square', 'triangle', 'multisine'],
                         help='test sheets, or square, triangle, multisine, chirp '
                              '(default: square triangle multisine)')
-    parser.add_argument('--each', action='store_true', help='judge each test by itself, too')
+    parser.add_argument('--each', action='store_true', help='also judge each test alone')
     parser.add_argument('--config', action='append', default=[], metavar='FILE',
-                        help='configuration of the model; may be given several times')
+                        help='configuration of the model; may be repeated')
     parser.add_argument('--duration', type=float, default=30.0, metavar='S',
                         help='length of each test (default: 30)')
     parser.add_argument('--rate', type=float, default=200.0, metavar='HZ',
@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Analyse the tests and say what they can tell."""
+    """Analyse the tests and print which effects they separate."""
     from antenna_drive.machines.antenna.planned_tests import BUILT_IN, confusability_of, planned
     from antenna_drive.parameters.loading import load
     from antenna_drive.recording.sheet import load_sheet
@@ -69,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
         if sheet is None:
             path = Path(name)
             if not path.is_file():
-                raise UserError(f'--excitation: {name}: no such test sheet, and no built-in test; '
+                raise UserError(f'--excitation: {name}: no such test sheet or built-in test; '
                                 f'built in are {", ".join(BUILT_IN)}')
             sheet = load_sheet(path)
             if sheet.waveform is None:
@@ -94,11 +94,11 @@ def run(arguments: argparse.Namespace) -> int:
             'alike': item.alike} for name, item in found.items()}, arguments.json)
     out = sys.stderr if arguments.json == STANDARD_OUTPUT else sys.stdout
     whole = next(iter(found.values()))
-    print('least size that shows, and what passes for it', file=out)
+    print('smallest detectable size, and the effects that look alike', file=out)
     for i, effect in enumerate(whole.effects):
         print(f'  {effect:36s} {whole.detectable[i]:10.3g} {whole.units[i]:12s} '
               + ', '.join(whole.passing_for(i, 3)), file=out)
     for name, item in found.items():
-        print(f'{name}: {100.0 * item.separated():.1f} % of all pairs of effects told apart, '
+        print(f'{name}: {100.0 * item.separated():.1f} % of all pairs of effects are separated; '
               f'{len(item.groups())} groups are not', file=out)
     return 0

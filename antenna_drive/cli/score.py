@@ -14,11 +14,11 @@
 """
 Score the verdicts of a trial against its truths.
 
-Reads DIR/case_*/verdict.json, as `antenna-drive diagnose --json` writes it, and the truths of
-the trial, each checked against its seal. A case whose diagnosis failed counts as wrong; one
-that was not diagnosed yet is left out and counted as pending.
+Reads DIR/case_*/verdict.json, which `antenna-drive diagnose --json` writes, and the truths of the
+trial, and checks each truth against its seal. A case whose diagnosis failed counts as wrong. A
+case that was not diagnosed yet is pending and not scored.
 
-docs/trial.md defines every figure. Exit code 1: there is no verdict to score.
+docs/trial.md defines every figure. The exit code is 1 if there is no verdict to score.
 
 For example:
   antenna-drive score trial7
@@ -36,7 +36,7 @@ from antenna_drive.cli.output import add_json_option, STANDARD_OUTPUT, write_jso
 from antenna_drive.errors import UserError
 from antenna_drive.trial.scorecard import read_cases, score
 
-# The figures in the order in which people read them, with what issue of quality they aim at.
+# The figures in the order of the table, with their targets.
 TARGETS = {
     'cases': '', 'failures': '0', 'pending': '0', 'top1': '>= 0.90', 'top3': '>= 0.97',
     'within_set': '', 'pairs_both': '>= 0.75', 'no_gap_on_none': '>= 0.97',

@@ -12,13 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 r"""
-Say what the model of an ordinary servo lacks, and prove it on tests that were withheld.
+Find the effects that a servo's model lacks, and test the result on withheld logs.
 
 DIR holds logs of a position-controlled servo with a pendulum, as the BAM project records them
-(JSON). The model begins as a motor with Coulomb and viscous friction. For each two gains, and
-each two trajectories, the diagnosis finds in their logs what is missing; then the servo is run
-free over the other logs, beside BAM's friction models m1 to m6 refitted to the same logs with
-the same effort. Errors are mean absolute position errors over whole runs, in milliradians.
+(JSON). The initial model is a motor with Coulomb and viscous friction. For each pair of gains and
+each pair of trajectories, the diagnosis uses only their logs to find the missing effects. The
+resulting model then predicts the other logs in open loop. BAM's friction models m1 to m6, refitted
+to the same logs with the same effort, do the same. The error is the mean absolute position error
+over whole runs, in milliradians. The exit code is 1 if one of BAM's models is better in a split.
 
 For example:
 
@@ -42,23 +43,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     parser.add_argument('directory', metavar='DIR', help='folder with the logs, *.json')
     parser.add_argument('--split', choices=('gain', 'trajectory', 'both'), default='both',
-                        help='what is withheld (default: both, one after the other)')
+                        help='what the logs are split by (default: both, one after the other)')
     parser.add_argument('--without', action='append', default=[], metavar='EFFECT',
-                        help='leave an effect out of the catalogue; may be given several times')
+                        help='leave an effect out of the catalogue; may be repeated')
     parser.add_argument('--runs', type=int, default=2400, metavar='N',
-                        help='runs of all fitted logs for each fit (default: 2400; fewer are '
-                             'faster and worse for every model)')
+                        help='simulations of the fitted logs per fit (default: 2400); fewer are '
+                             'faster but worse for every model')
     parser.add_argument('--jobs', type=int, default=1, metavar='N',
-                        help='processes at once (default: 1)')
+                        help='parallel processes (default: 1)')
     parser.add_argument('--keep', metavar='FOLDER',
-                        help="keep each direction's result in FOLDER; a run that was interrupted "
-                             'goes on from there')
+                        help='write the result of each split to FOLDER; an interrupted run '
+                             'resumes from there')
     add_json_option(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Compare; 0 if the diagnosis has the lower withheld error in every split, else 1."""
-    # the compiled physics takes a while to load: not before it is needed
+    # the compiled physics loads slowly, so it is imported only here
     from antenna_drive.machines.servo.log import ServoLog
     from antenna_drive.machines.servo.rounds import Effort
     from antenna_drive.machines.servo.study import directions, SPLITS, study, text

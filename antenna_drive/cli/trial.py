@@ -14,20 +14,20 @@
 """
 Make a trial of the diagnosis: sealed cases from an independent 'real antenna'.
 
-The antenna is a second program for the same drive. It shares no code with the emulator, and
-has its own integrator and its own form of every effect. Each case is one antenna, whose
-parameters are off by up to --tolerance, with three recordings through noisy sensors. Of all
-cases 55 percent have one effect of the catalogue, 15 percent two, 15 percent none, and 15
-percent one that no catalogue names.
+The antenna is a second program for the same drive. It shares no code with the emulator and has
+its own integrator and its own form of every effect. Each case is one antenna, whose parameters
+deviate by up to --tolerance, with three recordings through noisy sensors. 55 percent of the
+cases have one effect of the catalogue, 15 percent two, 15 percent none, and 15 percent one that
+is not in the catalogue.
 
   DIR/manifest.json              settings, and a salted hash of the truth of each case
-  DIR/truth/case_0001.json       what is wrong with that antenna; no diagnosis reads it
-  DIR/case_0001/rec_a.csv .yaml  recording and test sheet; rec_b and rec_c alike
+  DIR/truth/case_0001.json       the effects of that antenna; no diagnosis reads it
+  DIR/case_0001/rec_a.csv .yaml  recording and test sheet; also rec_b and rec_c
 
-The hash of the manifest is printed before any recording is made: note it down, and anyone can
-check later that no truth was changed. With --diagnose each case is diagnosed as well, and the
-verdict written to DIR/case_0001/verdict.json; `antenna-drive score DIR` then tells how good the
-verdicts are. Interrupted, the same command goes on where it stopped.
+The hash of the manifest is printed before any recording is made. Note it down to prove later
+that no truth was changed. With --diagnose each case is diagnosed too, and the verdict is written
+to DIR/case_0001/verdict.json; `antenna-drive score DIR` scores the verdicts. The same command
+resumes an interrupted trial.
 
 For example:
   antenna-drive trial --cases 200 --seed 7 --out trial7 --diagnose && antenna-drive score trial7
@@ -53,30 +53,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--cases', type=int, required=True, metavar='N',
                         help='number of cases')
     parser.add_argument('--seed', type=int, required=True, metavar='S',
-                        help='what the cases are drawn from; a published figure wants a seed '
-                             'that nothing was tuned on')
+                        help='seed of the cases; for a published figure use one that nothing '
+                             'was tuned on')
     parser.add_argument('--out', type=Path, required=True, metavar='DIR',
                         help='folder of the trial')
     parser.add_argument('--tolerance', type=float, default=0.02, metavar='T',
-                        help='how far each parameter may be from the reference, 0 to '
-                             f'{LARGEST_TOLERANCE} (default %(default)s)')
+                        help='largest relative deviation of each parameter from the reference, '
+                             f'0 to {LARGEST_TOLERANCE} (default %(default)s)')
     parser.add_argument('--sample-rate', type=float, default=200.0, metavar='HZ',
                         help='mean sample rate of the recordings, 50 to 500 '
                              '(default %(default)s)')
     parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
-                        help='processes at once (default: one for each core, %(default)s here)')
+                        help='parallel processes (default: one per core, %(default)s here)')
     parser.add_argument('--diagnose', action='store_true',
-                        help='have each case diagnosed as well')
+                        help='diagnose each case as well')
     parser.add_argument('--diagnose-options', default='', metavar='TEXT',
-                        help="more options for the diagnosis, e.g. '--config my.yaml'")
+                        help="further options for the diagnosis, e.g. '--config my.yaml'")
     parser.add_argument('--time-limit', type=float, default=900.0, metavar='S',
-                        help='seconds after which a diagnosis counts as failed '
+                        help='time limit of a diagnosis, after which it counts as failed '
                              '(default %(default)s)')
     parser.add_argument('--quiet', action='store_true', help='show no progress')
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Make the cases, and have them diagnosed if asked for; 1 if a diagnosis failed."""
+    """Make the cases and diagnose them if requested; 1 if a diagnosis failed."""
     _check(arguments)
     folder = arguments.out
     manifest = batch.prepare(folder, arguments.cases, arguments.seed, arguments.tolerance,
@@ -92,13 +92,13 @@ def run(arguments: argparse.Namespace) -> int:
     with Progress('diagnoses', arguments.cases, quiet=arguments.quiet) as progress:
         failures = batch.diagnose_cases(
             folder, manifest, arguments.jobs,
-            # the cores that diagnoses side by side leave to each
+            # each diagnosis gets its share of the cores
             ['--jobs', str(max(1, (os.cpu_count() or 1) // arguments.jobs)),
              *shlex.split(arguments.diagnose_options)],
             arguments.time_limit, lambda done, total: progress.update(done))
     if failures:
         print(f'{folder}: {failures} diagnoses failed, see {batch.FAILURE} in their folders; '
-              'the same command tries them again')
+              'run the same command to try them again')
     return 1 if failures else 0
 
 

@@ -14,7 +14,7 @@
 """
 A trial of the diagnosis: an independent 'real antenna', sealed cases, and a scorecard.
 
-The real antenna is a second program for the same machine: its own equations in code, its
-own integrator, its own form of every effect. Nothing here may import the emulator, its
-physics or its parameters; a test keeps it so.
+The 'real antenna' is a second program for the same drive, with its own equations, integrator
+and form of every effect. Nothing here may import the emulator, its physics or its parameters;
+a test checks this.
 """

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Make the recordings of a trial, and have them diagnosed, as batches that can be taken up again.
+Make and diagnose the recordings of a trial in batches that can be resumed.
 
-What is complete is left alone: a case's folder appears under its name only when all its
-recordings are in it, a verdict only when the diagnosis has ended well.
+Complete parts are kept. The folder of a case gets its name only once all its recordings are in
+it, and a verdict only once the diagnosis has succeeded.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ import yaml
 VERDICT = 'verdict.json'
 FAILURE = 'failure.txt'
 DURATION_S = 30.0
-# Exact enough for every digit that a sensor gives, and short.
+# Formats that keep every digit of the sensors.
 FORMATS = {'time_s': '%.6f', 'rate_command_rad_s': '%.12g', 'encoder_rad': '%.12g'}
 USUAL_FORMAT = '%.9g'
 Done = Callable[[int, int], None]
@@ -53,7 +53,7 @@ Done = Callable[[int, int], None]
 def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: float,
             duration: float) -> dict[str, Any]:
     """
-    Draw and seal the truths of a trial, or find them already sealed.
+    Draw and seal the truths of a trial, unless they are sealed already.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
             differing = [f'{key} {old.get(key)}, not {value}'
                          for key, value in settings.items() if old.get(key) != value]
             raise UserError(f'{folder}: holds a trial with {"; ".join(differing)}; '
-                            'give the same settings to go on with it, or another --out')
+                            'give the same settings to resume it, or another --out')
         return manifest
     truths = draw_truths(count, seed, tolerance, sample_rate=sample_rate, duration=duration)
     return sealing.seal(folder, settings, truths)
@@ -124,7 +124,7 @@ def make_case(folder: Path, truth: Truth) -> None:
 def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
                done: Done = lambda part, total: None) -> None:
     """
-    Make all cases that are not there yet.
+    Make all cases that do not exist yet.
 
     Parameters
     ----------
@@ -133,9 +133,9 @@ def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
     manifest
         of the trial
     jobs
-        how many processes
+        number of processes
     done
-        is told how many cases are complete, and of how many
+        called with the number of complete cases and their total
 
     """
     _sweep(folder)
@@ -144,7 +144,7 @@ def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
     truths = [sealing.open_truth(folder, name, manifest) for name in wanted]
     complete = len(names) - len(wanted)
     done(complete, len(names))
-    # The first case compiles the equations, if need be, for all processes to come.
+    # The first case compiles the equations for the processes that follow.
     if truths:
         make_case(folder, truths[0])
         complete += 1
@@ -163,13 +163,13 @@ def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
 
 
 def _sweep(folder: Path) -> None:
-    """Remove what an interrupted run has left behind half-made."""
+    """Remove incomplete cases of an interrupted run."""
     for draft in folder.glob('.case_*'):
         shutil.rmtree(draft, ignore_errors=True)
 
 
 def _finished(futures: Sequence[Future[Any]]) -> Iterator[Any]:
-    """Give results as they come; on an error start nothing more."""
+    """Yield results as they complete; cancel the rest after an error."""
     try:
         for future in as_completed(futures):
             yield future.result()
@@ -180,20 +180,20 @@ def _finished(futures: Sequence[Future[Any]]) -> Iterator[Any]:
 
 def diagnose_case(case: Path, options: Sequence[str], limit: float) -> bool:
     """
-    Have one case diagnosed in a process of its own, which is told the recordings only.
+    Diagnose one case in a process of its own, which gets only the recordings.
 
     Parameters
     ----------
     case
         folder of the case
     options
-        more options for the diagnosis
+        further options for the diagnosis
     limit
-        seconds after which it counts as failed
+        time limit, after which the case counts as failed [s]
 
     Returns
     -------
-    True if there is a verdict; else the reason lies in FAILURE
+    True if there is a verdict; otherwise FAILURE holds the reason
 
     """
     draft = case / f'.{VERDICT}'
@@ -224,7 +224,7 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
                    options: Sequence[str] = (), limit: float = math.inf,
                    done: Done = lambda part, total: None) -> int:
     """
-    Have all cases diagnosed that have no verdict yet; failed ones are tried again.
+    Diagnose all cases that have no verdict yet, including those that failed before.
 
     Parameters
     ----------
@@ -233,13 +233,13 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
     manifest
         of the trial
     jobs
-        how many diagnoses at once
+        diagnoses at a time
     options
-        more options for the diagnosis
+        further options for the diagnosis
     limit
-        seconds after which one diagnosis counts as failed
+        time limit of one diagnosis, after which it counts as failed [s]
     done
-        is told how many cases are through, and of how many
+        called with the number of finished cases and their total
 
     Returns
     -------
@@ -247,7 +247,7 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
 
     Raises
     ------
-    UserError : there is no diagnosis in this installation
+    UserError : this installation has no diagnosis
 
     """
     if importlib.util.find_spec('antenna_drive.cli.diagnose') is None:

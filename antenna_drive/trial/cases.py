@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-The cases of a trial: what is wrong with each antenna, drawn once and written down.
+The cases of a trial: the effects of each antenna, drawn once and recorded.
 
-Everything about a case follows from its truth, noise included, so that a case can be made
-again at any time and comes out the same.
+A case follows entirely from its truth, including the noise. It can be made again at any time with
+the same result.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from collections.abc import Iterator, Sequence
 import dataclasses
 from typing import Any
 
-from antenna_drive.trial.effect import Effect
+from antenna_drive.trial.effect import Defect
 from antenna_drive.trial.effects import CATALOGUE
 from antenna_drive.trial.machine import (
     apply_tolerances, draw_tolerances, Machine, reference_machine,
@@ -33,11 +33,11 @@ from antenna_drive.trial.outside import OUTSIDE
 from antenna_drive.trial.programme import draw_sheets
 from antenna_drive.trial.real_antenna import FloatArray, simulate
 from antenna_drive.trial.sensors import record, sample_instants
-from antenna_drive.trial.sheet import SensorGrade, TestSheet
+from antenna_drive.trial.sheet import CaseSheet, SensorGrade
 import numpy as np
 
 MIX = {'single': 0.55, 'pair': 0.15, 'none': 0.15, 'outside': 0.15}
-SMALLEST_IN_PAIR = 0.25     # of the range of sizes: both members have to leave a trace
+SMALLEST_IN_PAIR = 0.25     # of the range of sizes: both effects must show
 Truth = dict[str, Any]
 
 
@@ -51,15 +51,15 @@ def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float =
     """
     Draw all cases of a trial.
 
-    Kinds come in the proportions of MIX in random order; effects take turns, so that each
-    comes up as often as any other; sizes are spread evenly over their range.
+    Kinds have the proportions of MIX and a random order. Effects take turns, so that all are
+    equally frequent. Sizes are spread evenly over their range.
 
     Parameters
     ----------
     count
         number of cases
     seed
-        of everything
+        of all random draws
     tolerance
         largest relative deviation of any parameter from the reference, unit 1
     sample_rate
@@ -78,7 +78,7 @@ def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float =
     truths = []
     for number, kind in enumerate(kinds, start=1):
         own = np.random.default_rng([seed, number])
-        effects: list[tuple[Effect, float]] = []
+        effects: list[tuple[Defect, float]] = []
         if kind == 'single':
             effects = [(next(singles), next(sizes['single']))]
         elif kind == 'outside':
@@ -100,26 +100,26 @@ def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float =
 
 
 def _kinds(count: int) -> list[str]:
-    """Return the kinds in the proportions of MIX, rounded so that they add up."""
+    """Return the kinds in the proportions of MIX, rounded to a total of `count`."""
     bounds = np.round(np.cumsum([0.0, *MIX.values()]) * count).astype(int)
     return [kind for kind, low, high in zip(MIX, bounds[:-1], bounds[1:])
             for _ in range(high - low)]
 
 
-def _turns(effects: Sequence[Effect], random: np.random.Generator) -> Iterator[Effect]:
+def _turns(effects: Sequence[Defect], random: np.random.Generator) -> Iterator[Defect]:
     while True:
         for k in random.permutation(len(effects)):
             yield effects[k]
 
 
 def _even_sizes(count: int, random: np.random.Generator) -> list[float]:
-    """Return sizes one in each of `count` equal slices of 0 to 1, in random order."""
+    """Return one size from each of `count` equal slices of 0 to 1, in random order."""
     slices = random.permutation(count)
     return [float(s) for s in (slices + random.uniform(0.0, 1.0, count)) / max(count, 1)]
 
 
-def _compatible(first: Effect, second: Effect) -> bool:
-    """Tell whether two effects are two: neither the same nor one inside the other."""
+def _compatible(first: Defect, second: Defect) -> bool:
+    """Return whether two effects are distinct: neither contains the other."""
     place_1, name_1 = first.key.split('.')
     place_2, name_2 = second.key.split('.')
     if 'motors' in (place_1, place_2) and place_1.startswith('motor') and (
@@ -130,14 +130,14 @@ def _compatible(first: Effect, second: Effect) -> bool:
 
 def build_machine(truth: Truth, recording: int) -> Machine:
     """
-    Build the antenna of a case as it was during one recording.
+    Build the antenna of a case for one recording.
 
     Parameters
     ----------
     truth
         of the case
     recording
-        0 for the first; wind and bad contacts are another draw in each
+        its number, from 0; wind and bad contacts are drawn anew for each
 
     """
     sheet = truth['sheets'][recording]
@@ -154,13 +154,13 @@ def build_machine(truth: Truth, recording: int) -> Machine:
     return machine
 
 
-def sheet_of(truth: Truth, recording: int) -> TestSheet:
+def sheet_of(truth: Truth, recording: int) -> CaseSheet:
     """Return the test sheet of one recording of a case."""
     plain = dict(truth['sheets'][recording])
     plain.pop('start')
     plain['sensors'] = SensorGrade(**plain['sensors'])
-    known = {field.name for field in dataclasses.fields(TestSheet)}
-    return TestSheet(**{name: value for name, value in plain.items() if name in known})
+    known = {field.name for field in dataclasses.fields(CaseSheet)}
+    return CaseSheet(**{name: value for name, value in plain.items() if name in known})
 
 
 def make_recording(truth: Truth, recording: int) -> dict[str, FloatArray]:

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Compile the real antenna's kernels, and keep them on disk only while every source is unchanged.
+Compile the real antenna's kernels and cache them on disk while their sources are unchanged.
 
-numba's own disk cache looks at the file of the outermost function alone, so that a corrected
-equation in another file could go unnoticed. Here the cache folder is named after a hash of all
-sources of this package.
+numba's own cache checks only the file of the outermost function and would miss a change of an
+equation in another file. The cache folder is therefore named after a hash of all sources of this
+package.
 """
 
 from __future__ import annotations
@@ -47,11 +47,17 @@ CACHE_FOLDER = _cache_folder()
 
 
 def compiled(function: Function) -> Function:
-    """Compile a function of numbers and arrays; divisions by zero give infinity, not errors."""
+    """Compile a function of numbers and arrays; a division by zero gives infinity."""
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(CACHE_FOLDER)
     try:
         kernel: Function = numba.njit(cache=True, error_model='numpy')(function)
     finally:
         numba.config.CACHE_DIR = before
+    return kernel
+
+
+def inner(function: Function) -> Function:
+    """Compile a function that only compiled functions call: it becomes a part of each."""
+    kernel: Function = numba.njit(forceinline=True, error_model='numpy', _nrt=False)(function)
     return kernel

@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-How plainly an effect shows through noise and tolerances: what the ranges of sizes rest on.
+How clearly an effect shows through noise and tolerances; the ranges of sizes are based on it.
 
-The effect's change of the recorded signals, in standard deviations of noise, less whatever
-the tolerances, the starting places and the sensors' offsets could imitate (to first order,
-each held to its prior by a ridge). Run `python -m antenna_drive.trial.detectability` for the
-table of docs/trial.md.
+The measure is the effect's change of the recorded signals in standard deviations of noise, less
+the part that tolerances, initial positions and sensor offsets can imitate. That part is a
+first-order fit in which a ridge keeps each of them near its prior. Run
+`python -m antenna_drive.trial.detectability` for the table of docs/trial.md.
 """
 
 from __future__ import annotations
@@ -37,25 +37,25 @@ from antenna_drive.trial.sheet import SensorGrade
 import numpy as np
 
 RECORDINGS = 3
-PROBE = 0.1         # of a prior's spread, for the derivatives
-# Uniform within +-tolerance has this standard deviation, in units of the tolerance.
+PROBE = 0.1         # step of the derivatives, as a share of a prior's spread
+# Standard deviation of a uniform distribution within +-1.
 UNIFORM_SPREAD = 1.0 / math.sqrt(3.0)
 RATE_HZ, DURATION_S = 200.0, 30.0
 
 
-# Sensors without noise or digits: the study puts both in by their statistics.
+# Sensors without noise and quantisation: the study adds both by their statistics.
 PERFECT = SensorGrade(current_noise_A=0.0, current_step_A=0.0, tach_noise_rad_s=0.0,
                       tach_noise_relative=0.0, tach_step_rad_s=0.0, encoder_bits=40,
                       bias_noise_V=0.0, bias_step_V=0.0)
 
 
 class Study:
-    """The standard programme on the reference antenna, and what tolerances do to it."""
+    """The standard programme on the reference antenna, and its derivatives by tolerances."""
 
     def __init__(self, tolerance: float = 0.02, seed: int = 1,
                  report: Callable[[float], None] = lambda part: None) -> None:
         """
-        Simulate the derivatives by every tolerance, starting place and offset.
+        Simulate the derivatives by every tolerance, initial position and offset.
 
         Parameters
         ----------
@@ -64,7 +64,7 @@ class Study:
         seed
             of the programme
         report
-            is told the done part, 0 to 1
+            called with the share that is done, 0 to 1
 
         """
         truth = next(t for t in draw_truths(40, seed, tolerance) if t['kind'] == 'none')
@@ -112,7 +112,7 @@ class Study:
 
     def _signals(self, tolerances: Tolerances, place: tuple[float, float],
                  effect: tuple[str, dict[str, float]] | None) -> FloatArray:
-        """Return all recorded signals in standard deviations of noise, one after the other."""
+        """Return all recorded signals in standard deviations of noise, concatenated."""
         parts = []
         truth = dict(self._truth)
         if effect is not None:
@@ -142,18 +142,18 @@ class Study:
 
     def of(self, effect_id: str, values: dict[str, float]) -> tuple[float, float]:
         """
-        Return how far an effect moves the signals: in all, and beyond what tolerances imitate.
+        Return the change of the signals by an effect: in all, and beyond the tolerances.
 
         Parameters
         ----------
         effect_id
-            of the catalogue or outside it
+            in the catalogue or outside it
         values
             the effect's numbers
 
         Returns
         -------
-        both as root of the sum of squares, in standard deviations of noise
+        both as the root of the sum of squares, in standard deviations of noise
 
         """
         neutral = draw_tolerances(0.0, np.random.default_rng(0))
@@ -164,7 +164,7 @@ class Study:
 
 
 def main() -> None:
-    """Print the table: every effect at its smallest, middle and largest size."""
+    """Print the table: each effect at its smallest, middle and largest size."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--tolerance', type=float, default=0.02)
     parser.add_argument('--only', default='', help='part of the ids to print')

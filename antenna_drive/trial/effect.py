@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""What an unmodelled effect is here: how large it may be, and how it changes a machine."""
+"""A defect of the real antenna: its range of sizes, and how it changes a machine."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ Parameters = Mapping[str, float]
 @dataclass(frozen=True)
 class Quantity:
     """
-    One number of an effect and its plausible range.
+    A number of a defect and its plausible range.
 
     Attributes
     ----------
     name, unit : 'torque', 'N m'
     low, high : range of the size, both more than 0 unless `spacing` is 'even'
     spacing : 'log', 'even' or 'whole' (whole numbers)
-    turned : '' or what chance may do to the size: 'sign' (negative as likely as positive),
+    turned : '' or a random change of the size: 'sign' (negative as likely as positive),
         'inverse' (1 / size as likely as size, for factors)
 
     """
@@ -49,7 +49,7 @@ class Quantity:
 
     def at(self, part: float, random: np.random.Generator) -> float:
         """
-        Return the value at `part` of the range, 0 to 1, turned by chance.
+        Return the value at `part` of the range, 0 to 1, turned at random.
 
         Parameters
         ----------
@@ -77,16 +77,16 @@ PHASE = Quantity('phase', 'rad', 0.0, 2.0 * math.pi, 'even')
 
 
 @dataclass(frozen=True)
-class Effect:
+class Defect:
     """
-    An effect: its name, its numbers, the form it takes in the real antenna.
+    An effect as the real antenna has it: its name, its numbers and its form.
 
     Attributes
     ----------
     key : 'component.effect', as the diagnosis names it
     form : the form in this program, for people
-    quantities : the first one is the effect's size, the others are drawn evenly
-    change : sets the imperfection in a machine
+    quantities : the first one is the size, the others are drawn uniformly
+    change : applies the effect to a machine
 
     """
 
@@ -104,11 +104,11 @@ class Effect:
         size
             0 for just detectable, 1 for strong
         random
-            source of everything else
+            source of all other numbers
 
         Returns
         -------
-        value by name of each quantity
+        value of each quantity by name
 
         """
         first, *others = self.quantities

@@ -14,10 +14,10 @@
 """
 The catalogue's effects in this program's own forms, with the range of each.
 
-The smallest sizes are just detectable on the standard test programme through noise and
-tolerances (docs/trial.md says how that was measured), the largest would send a crew up the
-antenna. A tachometer sits inside the rate loop; current, encoder and bias errors touch the
-recording only.
+The smallest sizes are just detectable in the standard test programme through noise and
+tolerances (docs/trial.md explains the measurement); the largest would call for a repair. A
+tachometer is inside the rate loop; errors of current, encoder and bias affect the recording
+only.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from __future__ import annotations
 from collections.abc import Callable
 import math
 
-from antenna_drive.trial.effect import Effect, Parameters, PHASE, Quantity
+from antenna_drive.trial.effect import Defect, Parameters, PHASE, Quantity
 from antenna_drive.trial.machine import GUST_WAVES, Machine
 import numpy as np
 
@@ -41,7 +41,7 @@ def _cycles(low: int, high: int) -> Quantity:
     return Quantity('cycles', '1/rev', low, high, 'whole')
 
 
-# Motors: each effect for either motor alone and for both alike.
+# Motors: each effect for one motor alone and for both together.
 
 def _motor_field(field: str, quantity: str) -> Callable[[slice], Change]:
     def at(which: slice) -> Change:
@@ -129,16 +129,16 @@ def _mesh_error(which: int) -> Change:
     return change
 
 
-def _gearbox_effects(name: str, which: int) -> tuple[Effect, ...]:
+def _gearbox_effects(name: str, which: int) -> tuple[Defect, ...]:
     return (
-        Effect(f'{name}.gap', 'gap times a factor', (_factor(1.15, 3.5),),
+        Defect(f'{name}.gap', 'gap times a factor', (_factor(1.15, 3.5),),
                _gear_factor('half_gap', which)),
-        Effect(f'{name}.stiffness', 'stiffness times a factor', (_factor(1.08, 2.5),),
+        Defect(f'{name}.stiffness', 'stiffness times a factor', (_factor(1.08, 2.5),),
                _gear_factor('stiffness', which)),
-        Effect(f'{name}.hysteresis', 'elastic torque times 1 + share z, '
+        Defect(f'{name}.hysteresis', 'elastic torque times 1 + share z, '
                "z' = (v - |v| z) / 0.03 rad, v the rate of deflection",
                (Quantity('share', '1', 0.012, 0.5),), _gear_hysteresis(which)),
-        Effect(f'{name}.transmission_error', 'rounded saw-tooth of the motor angle, '
+        Defect(f'{name}.transmission_error', 'rounded saw-tooth of the motor angle, '
                'sum of sin(n a) / (n 2^(n-1)), added to the deflection',
                (Quantity('angle', 'rad', 0.002, 0.1), _cycles(1, 16), PHASE),
                _mesh_error(which)))
@@ -158,15 +158,15 @@ def _fade_out(machine: Machine, values: Parameters) -> None:
 
 
 _TORQUE_SHARE = (
-    Effect('torque_share.bias_pot', 'k_p times a factor', (_factor(1.07, 1.5),),
+    Defect('torque_share.bias_pot', 'k_p times a factor', (_factor(1.07, 1.5),),
            _circuit_factor('bias_pot')),
-    Effect('torque_share.fade_out_voltage', 'f_o shifted',
+    Defect('torque_share.fade_out_voltage', 'f_o shifted',
            (Quantity('shift', 'V', 0.5, 5.0, turned='sign'),), _fade_out),
-    Effect('torque_share.share_filter', 'speed of transfer functions 2 to 4 times a factor, '
+    Defect('torque_share.share_filter', 'speed of transfer functions 2 to 4 times a factor, '
            'steady gains unchanged', (_factor(1.12, 3.0),), _circuit_factor('k_2', 's_2', 'k_3')),
-    Effect('torque_share.filter_1_gain', "k' times a factor", (_factor(1.12, 2.0),),
+    Defect('torque_share.filter_1_gain', "k' times a factor", (_factor(1.12, 2.0),),
            _circuit_factor('filter_gain')),
-    Effect('torque_share.filter_1_pole', "p times a factor, k' unchanged",
+    Defect('torque_share.filter_1_pole', "p times a factor, k' unchanged",
            (_factor(1.12, 3.0),), _circuit_factor('filter_pole')),
 )
 
@@ -221,39 +221,39 @@ def _extra_mode(machine: Machine, values: Parameters) -> None:
 
 
 _AXIS = (
-    Effect('axis.coulomb_friction', 'kinetic and static level times a factor',
+    Defect('axis.coulomb_friction', 'kinetic and static level times a factor',
            (_factor(1.07, 2.0),), _structure_factor('coulomb')),
-    Effect('axis.viscous_friction', 'drag of a lubricant that thins under shear: '
+    Defect('axis.viscous_friction', 'drag of a lubricant that thins under shear: '
            'c w (1 + (w / 1.3 mrad/s)^2)^-0.075',
            (Quantity('coefficient', 'N m s/rad', 8e5, 3e7),),
            _structure_field('viscous', 'coefficient')),
-    Effect('axis.stribeck_friction', 'hyperbola over Coulomb: rise / (1 + |w| / half_rate); '
+    Defect('axis.stribeck_friction', 'hyperbola over Coulomb: rise / (1 + |w| / half_rate); '
            'stiction rises too',
            (Quantity('rise', 'N m', 1e4, 1.5e5), Quantity('half_rate', 'rad/s', 4e-5, 4e-4)),
            _axis_stribeck),
-    Effect('axis.position_dependent_friction', 'tight spots: level times '
+    Defect('axis.position_dependent_friction', 'tight spots: level times '
            '1 + share (2 exp(2 cos(a) - 2) - 0.617), a one turn per pitch',
            (Quantity('share', '1', 0.02, 0.6), Quantity('pitch', 'rad', 0.002, 0.015), PHASE),
            _bumps),
-    Effect('axis.gravity_imbalance', 'torque at the horizon times the cosine of elevation',
+    Defect('axis.gravity_imbalance', 'torque at the horizon times the cosine of elevation',
            (Quantity('torque', 'N m', 5e3, 2e5, turned='sign'),),
            _structure_field('gravity', 'torque')),
-    Effect('axis.wind_steady', 'constant torque',
+    Defect('axis.wind_steady', 'constant torque',
            (Quantity('torque', 'N m', 3e3, 1.5e5, turned='sign'),),
            _structure_field('wind', 'torque')),
-    Effect('axis.wind_gust', "24 sines with Davenport's spectrum, another draw per recording",
+    Defect('axis.wind_gust', "24 sines with Davenport's spectrum, another draw per recording",
            (Quantity('rms', 'N m', 1.5e3, 6e4), Quantity('corner', 'Hz', 0.1, 0.5),
             Quantity('seed', '1', 1, 1000000, 'whole')), _gust),
-    Effect('axis.inertia', 'hub inertia times a factor', (_factor(1.08, 1.8),),
+    Defect('axis.inertia', 'hub inertia times a factor', (_factor(1.08, 1.8),),
            _structure_factor('inertia')),
-    Effect('axis.mode_frequency', 'frequency of one of the three modes times a factor',
+    Defect('axis.mode_frequency', 'frequency of one of the three modes times a factor',
            (_factor(1.06, 1.5), Quantity('mode', '1', 1, 3, 'whole')), _one_mode),
-    Effect('axis.mode_damping', 'damping of all modes times a factor',
+    Defect('axis.mode_damping', 'damping of all modes times a factor',
            (_factor(1.4, 15.0, up_only=True),), _structure_factor('mode_damping')),
-    Effect('axis.extra_mode', 'a fourth appendage on the hub',
+    Defect('axis.extra_mode', 'a fourth appendage on the hub',
            (Quantity('inertia', 'kg m^2', 5e4, 2.5e6), Quantity('frequency', 'Hz', 1.2, 8.0),
             Quantity('damping_ratio', '1', 0.005, 0.03)), _extra_mode),
-    Effect('axis.bull_gear_backlash', 'both gaps wider by one half gap, '
+    Defect('axis.bull_gear_backlash', 'both gaps wider by one half gap, '
            'which wear changes by a fifth along the bull gear',
            (Quantity('half_gap', 'rad at the motor', 0.01, 0.4),),
            _structure_field('bull_gap', 'half_gap')),
@@ -282,47 +282,47 @@ def _tach_ripple(which: slice) -> Change:
     return change
 
 
-def _channel_effects(number: int) -> tuple[Effect, ...]:
+def _channel_effects(number: int) -> tuple[Defect, ...]:
     which = slice(number - 1, number)
     return (
-        Effect(f'tach_{number}.gain', 'relative error, inside the loop',
+        Defect(f'tach_{number}.gain', 'relative error, inside the loop',
                (Quantity('error', '1', 0.006, 0.2, turned='sign'),),
                _motor_field('tach_error', 'error')(which)),
-        Effect(f'tach_{number}.offset', 'inside the loop',
+        Defect(f'tach_{number}.offset', 'inside the loop',
                (Quantity('offset', 'rad/s', 0.015, 2.0, turned='sign'),),
                _motor_field('tach_offset', 'offset')(which)),
-        Effect(f'tach_{number}.ripple', 'commutation: a rectified wave with rounded feet, '
+        Defect(f'tach_{number}.ripple', 'commutation: a rectified wave with rounded feet, '
                'in proportion to the rate, inside the loop',
                (Quantity('share', '1', 0.003, 0.2), _cycles(2, 24), PHASE),
                _tach_ripple(which)),
-        Effect(f'current_{number}.gain', 'relative error of the recorder',
+        Defect(f'current_{number}.gain', 'relative error of the recorder',
                (Quantity('error', '1', 0.04, 0.4, turned='sign'),),
                _sensor_field(f'current_error_{number}', 'error')),
-        Effect(f'current_{number}.offset', 'of the recorder',
+        Defect(f'current_{number}.offset', 'of the recorder',
                (Quantity('offset', 'A', 0.04, 0.6, turned='sign'),),
                _sensor_field(f'current_offset_{number}', 'offset')))
 
 
 _SENSORS = (
     *_channel_effects(1), *_channel_effects(2),
-    Effect('encoder.quantisation', 'digits of this size instead of those on the sheet',
+    Defect('encoder.quantisation', 'digits of this size instead of those on the sheet',
            (Quantity('step', 'rad', 1.5e-5, 5e-4),), _sensor_field('encoder_step', 'step')),
-    Effect('encoder.cyclic_error', 'two harmonics, the second a quarter of the first',
+    Defect('encoder.cyclic_error', 'two harmonics, the second a quarter of the first',
            (Quantity('angle', 'rad', 5e-6, 2e-4), _cycles(600, 6000), PHASE), _cyclic_error),
-    Effect('encoder.offset', 'constant',
+    Defect('encoder.offset', 'constant',
            (Quantity('offset', 'rad', 6e-5, 2e-3, turned='sign'),),
            _sensor_field('encoder_offset', 'offset')),
-    Effect('bias_voltage.gain', 'relative error of the recorder',
+    Defect('bias_voltage.gain', 'relative error of the recorder',
            (Quantity('error', '1', 0.04, 0.4, turned='sign'),),
            _sensor_field('bias_error', 'error')),
 )
 _LOOP = (
-    Effect('loop.delay', 'of the rate error of both motors, as a [3/4] Pade approximant',
+    Defect('loop.delay', 'of the rate error of both motors, as a [3/4] Pade approximant',
            (Quantity('delay', 's', 8e-4, 7e-3),), _motor_field('delay', 'delay')(slice(0, 2))),
 )
 
-CATALOGUE: dict[str, Effect] = {effect.key: effect for effect in (
-    *(Effect(f'{motor}.{name}', form, quantities, change(which))
+CATALOGUE: dict[str, Defect] = {effect.key: effect for effect in (
+    *(Defect(f'{motor}.{name}', form, quantities, change(which))
       for motor, which in MOTORS.items() for name, form, quantities, change in _MOTOR_EFFECTS),
     *_gearbox_effects('gearbox_1', 0), *_gearbox_effects('gearbox_2', 1),
     *_TORQUE_SHARE, *_AXIS, *_SENSORS, *_LOOP)}

@@ -14,9 +14,9 @@
 """
 The equations of motion of the real antenna between two switchings, compiled.
 
-Everything that switches (tooth contact, stick and slip, clamps) is held in `mode`; within one
-mode the equations are smooth, and `margin` says for each switch how far its mode still holds.
-Symbols and equation numbers are the article's; the equations are those of the reference model.
+`mode` holds the state of all switches: tooth contact, stick and slip, clamps. Within one mode the
+equations are smooth. `margin` is positive for each switch as long as its state is valid. Symbols
+and equation numbers are the article's; the equations are those of the reference model.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from antenna_drive.trial.compiled import compiled
+from antenna_drive.trial.compiled import compiled, inner
 from antenna_drive.trial.machine import DROPOUTS, GUST_WAVES, Machine
 from antenna_drive.trial.waveform import command
 import numpy as np
@@ -48,12 +48,12 @@ ENCODER, ENCODER_RATE = MODES_AT + 8, MODES_AT + 9
 DAHL = MODES_AT + 10
 STATES = DAHL + 1
 
-# Switches: for the motors one entry each, in the order motor 1, motor 2.
+# Switches; those of the motors have one entry each, in the order motor 1, motor 2.
 CONTACT, FRICTION, CLAMP, VOLTAGE = 0, 2, 4, 6   # each -1, 0 or +1
 AXIS_FRICTION, SATURATION, LOAD_SIGN = 8, 9, 10  # LOAD_SIGN is the sign of x_3: -1 or +1
 SWITCHES = 11
 
-UNDER = 0.05       # [A] over which the clamp fades the integrator out; the clamp itself is hard
+UNDER = 0.05       # range over which the clamp fades the integrator out [A]; the clamp is hard
 MAINS = 2.0 * math.pi * 50.0
 
 
@@ -79,7 +79,7 @@ def gear_deflection(motor: Any, structure: Any, theta: float, w: float, theta_a:
         x_rate += bump * 40.0 * math.sin(angle) * w / motor.tooth_ratio
     half_gap = motor.half_gap
     if structure.bull_gap != 0.0:
-        # Wear differs along the bull gear: here by a fifth, twenty times per radian.
+        # Wear varies along the bull gear by a fifth, in twenty cycles per turn.
         half_gap += structure.bull_gap * (1.0 + 0.2 * math.cos(20.0 * theta_a))
     return x, x_rate, half_gap
 
@@ -100,14 +100,14 @@ def viscous_torque(coefficient: float, rate: float, knee: float) -> float:
 
 @compiled
 def stribeck_torque(rise: float, rate: float, half_rate: float) -> float:
-    """Return the friction above Coulomb's at low rate, falling as a hyperbola [N m]."""
+    """Return the friction above Coulomb's at low rate, a hyperbola of the rate [N m]."""
     return rise / (1.0 + abs(rate) / half_rate)
 
 
 @compiled
 def motor_friction(motor: Any, rate: float, direction: float, gear: float,
                    middle: float) -> tuple[float, float]:
-    """Return kinetic friction (its size) and stiction of a motor in one direction [N m]."""
+    """Return the size of kinetic friction and the stiction of a motor in one direction [N m]."""
     level = motor.coulomb * (1.0 + motor.asymmetry * direction)
     if motor.load_friction != 0.0:
         level += motor.load_friction * (math.sqrt(gear * gear + 0.25) - 0.5)
@@ -119,7 +119,7 @@ def motor_friction(motor: Any, rate: float, direction: float, gear: float,
 
 @compiled
 def axis_friction(structure: Any, angle: float, rate: float, t: float) -> tuple[float, float]:
-    """Return kinetic friction (its size) and stiction of the axis, without Dahl's part [N m]."""
+    """Return the size of kinetic friction and the stiction of the axis, without Dahl's [N m]."""
     level = structure.coulomb * (1.0 - structure.dahl)
     if structure.bump != 0.0:
         phase = 2.0 * math.pi * angle / structure.bump_pitch + structure.bump_phase
@@ -148,7 +148,7 @@ def load_torque(structure: Any, angle: float, t: float, middle: float,
 
 @compiled
 def tach_reading(motor: Any, y: FloatArray, at: int, t: float, middle: float) -> float:
-    """Return what the tachometer gives to the loop and to the recorder [rad/s]."""
+    """Return the tachometer's reading for loop and recorder [rad/s]."""
     rate = y[at + TACH] if motor.coupling_frequency > 0.0 else y[at + W]
     reading = (1.0 + motor.tach_error) * rate + motor.tach_offset
     if motor.tach_ripple != 0.0:
@@ -168,7 +168,7 @@ def tach_reading(motor: Any, y: FloatArray, at: int, t: float, middle: float) ->
 
 @compiled
 def delayed(y: FloatArray, dy: FloatArray, at: int, value: float, delay: float) -> float:
-    """Pass a value through the [3/4] Pade approximant of a delay; its states start at `at`."""
+    """Return a value after the [3/4] Pade approximant of a delay; its states start at `at`."""
     s = 1.0 / delay
     dy[at] = s * y[at + 1]
     dy[at + 1] = s * y[at + 2]
@@ -180,7 +180,7 @@ def delayed(y: FloatArray, dy: FloatArray, at: int, value: float, delay: float) 
 
 @compiled
 def bias_voltage(circuit: Any, test: Any, x_2: float, middle: float, switch: int) -> float:
-    """Return v_b of Eq. (9), or of the source that replaces the share circuit [V]."""
+    """Return v_b of Eq. (9), or the voltage of the source that replaces the circuit [V]."""
     if test.bias_source > 0.0:
         return test.bias_voltage if middle >= test.bias_at else 0.0
     if switch == 0:
@@ -188,17 +188,12 @@ def bias_voltage(circuit: Any, test: Any, x_2: float, middle: float, switch: int
     return circuit.bias_pot * (circuit.ceiling if switch > 0 else 0.0)
 
 
-@compiled
-def motor_derivative(motor: Any, machine: Machine, y: FloatArray, dy: FloatArray, at: int,
-                     which: int, t: float, middle: float, mode: ModeArray,
-                     margin: FloatArray) -> float:
-    """Fill the derivatives and margins of one motor with its gear; return its gear torque."""
-    structure = machine.structure[0]
-    circuit = machine.circuit[0]
-    xi, v, i, w, theta = y[at + XI], y[at + V], y[at + I], y[at + W], y[at + THETA]
-
-    # Gearbox
-    x, x_rate, gap = gear_deflection(motor, structure, theta, w, y[THETA_A], y[W_A])
+@inner
+def gear_derivative(motor: Any, structure: Any, y: FloatArray, dy: FloatArray, at: int,
+                    which: int, mode: ModeArray, margin: FloatArray) -> float:
+    """Return the gear torque; fill the derivative of its hysteresis and its margin [N m]."""
+    x, x_rate, gap = gear_deflection(motor, structure, y[at + THETA], y[at + W], y[THETA_A],
+                                     y[W_A])
     lag = y[at + LAG_Z]
     up = contact_torque(motor, x - gap, x_rate, lag)
     down = contact_torque(motor, -x - gap, -x_rate, -lag)
@@ -212,8 +207,14 @@ def motor_derivative(motor: Any, machine: Machine, y: FloatArray, dy: FloatArray
     dy[at + LAG_Z] = 0.0
     if motor.hysteresis != 0.0:
         dy[at + LAG_Z] = (x_rate - abs(x_rate) * lag) / 0.03
+    return gear
 
-    # Amplifier 1: PI on the rate error, clamped about the rate's own voltage
+
+@inner
+def amplifier_derivative(motor: Any, circuit: Any, y: FloatArray, dy: FloatArray, at: int,
+                         which: int, t: float, middle: float, mode: ModeArray,
+                         margin: FloatArray) -> None:
+    """Fill the derivatives of amplifier 1: PI on the rate error, clamped about the back-EMF."""
     reading = tach_reading(motor, y, at, t, middle)
     error = motor.rate_gain * (
         y[V_C] - motor.tach_gain * reading
@@ -223,8 +224,9 @@ def motor_derivative(motor: Any, machine: Machine, y: FloatArray, dy: FloatArray
     else:
         for k in range(4):
             dy[at + DELAY_AT + k] = 0.0
+    xi, v = y[at + XI], y[at + V]
     wish = error + xi
-    centre = motor.clamp_slope * w
+    centre = motor.clamp_slope * y[at + W]
     above = wish - (centre + motor.current_limit)
     below = (centre - motor.current_limit) - wish
     clamp = mode[CLAMP + which]
@@ -248,7 +250,12 @@ def motor_derivative(motor: Any, machine: Machine, y: FloatArray, dy: FloatArray
     else:
         dy[at + V] = (demand - v) / motor.lag
 
-    # Amplifier 2 and armature
+
+@inner
+def armature_derivative(motor: Any, y: FloatArray, dy: FloatArray, at: int, which: int,
+                        mode: ModeArray, margin: FloatArray) -> float:
+    """Fill the derivatives of amplifier 2, armature and warmth; return the magnet's strength."""
+    v, i, w = y[at + V], y[at + I], y[at + W]
     if motor.dead_zone > 0.0:
         v -= motor.dead_zone * math.tanh(v / motor.dead_zone)
     if motor.bridge_error != 0.0:
@@ -267,11 +274,18 @@ def motor_derivative(motor: Any, machine: Machine, y: FloatArray, dy: FloatArray
     dy[at + WARMTH] = (i * i - warmth) / motor.warming_time
     dy[at + I] = (voltage / motor.ampere_scale - resistance * i
                   - strength * motor.back_emf * w) / motor.inductance
+    return strength
 
-    # Rotor
-    torque = motor.torque_constant * strength * i
+
+@inner
+def rotor_derivative(motor: Any, y: FloatArray, dy: FloatArray, at: int, which: int,
+                     middle: float, gear: float, strength: float, mode: ModeArray,
+                     margin: FloatArray) -> None:
+    """Fill the derivatives of rotor and tachometer; `gear` is the gear torque [N m]."""
+    w = y[at + W]
+    torque = motor.torque_constant * strength * y[at + I]
     if motor.ripple != 0.0 or motor.current_ripple != 0.0:
-        angle = motor.ripple_cycles * theta + motor.ripple_phase
+        angle = motor.ripple_cycles * y[at + THETA] + motor.ripple_phase
         shape = (math.sin(angle) + 0.3 * math.sin(2.0 * angle + 1.0)) / 1.044
         torque += motor.ripple * shape + motor.current_ripple * torque * shape
     applied = torque - gear
@@ -293,6 +307,17 @@ def motor_derivative(motor: Any, machine: Machine, y: FloatArray, dy: FloatArray
         pull = motor.coupling_frequency
         dy[at + TACH] = y[at + TACH_SLOPE]
         dy[at + TACH_SLOPE] = pull * pull * (w - y[at + TACH]) - 0.1 * pull * y[at + TACH_SLOPE]
+
+
+@compiled
+def motor_derivative(motor: Any, machine: Machine, y: FloatArray, dy: FloatArray, at: int,
+                     which: int, t: float, middle: float, mode: ModeArray,
+                     margin: FloatArray) -> float:
+    """Fill the derivatives and margins of one motor with its gear; return its gear torque."""
+    gear = gear_derivative(motor, machine.structure[0], y, dy, at, which, mode, margin)
+    amplifier_derivative(motor, machine.circuit[0], y, dy, at, which, t, middle, mode, margin)
+    strength = armature_derivative(motor, y, dy, at, which, mode, margin)
+    rotor_derivative(motor, y, dy, at, which, middle, gear, strength, mode, margin)
     return gear
 
 
@@ -354,8 +379,8 @@ def derivative(t: float, middle: float, y: FloatArray, mode: ModeArray, machine:
     t
         time [s]
     middle
-        any time strictly inside the present stretch between two jumps of an input [s];
-        it says on which side of a jump the inputs are to be taken
+        a time strictly inside the present interval between two jumps of an input [s]; it
+        selects the side of a jump
     y
         state, shape (STATES,)
     mode
@@ -367,7 +392,7 @@ def derivative(t: float, middle: float, y: FloatArray, mode: ModeArray, machine:
     dy
         result, shape (STATES,)
     margin
-        result, shape (SWITCHES,); negative where a switch has to be thrown
+        result, shape (SWITCHES,); negative where a switch must be thrown
 
     """
     circuit = machine.circuit[0]
@@ -402,7 +427,7 @@ def derivative(t: float, middle: float, y: FloatArray, mode: ModeArray, machine:
 def readings(times: FloatArray, middles: FloatArray, states: FloatArray, machine: Machine,
              test: Any, commands: FloatArray, biases: FloatArray, tachs: FloatArray) -> None:
     """
-    Fill what follows from the state without being part of it.
+    Fill the signals that follow from the states.
 
     Parameters
     ----------

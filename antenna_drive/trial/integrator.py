@@ -12,20 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Dormand and Prince's 5(4) pair, with its dense output, stopped at every switching.
+Dormand and Prince's 5(4) pair with dense output, stopped at every switching.
 
-The state between two switchings is smooth, so the pair keeps its order. When a margin turns
-negative within a step, the moment is found by bisection on the dense output to 1e-12 s, the
-switch is thrown there, and the integration starts anew. Sources: Dormand and Prince, J. Comp.
-Appl. Math. 6 (1980) 19; Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I,
-II.5 and II.6.
+The state is smooth between two switchings, so the pair keeps its order. When a margin becomes
+negative within a step, bisection on the dense output locates the moment to 1e-12 s. The switch is
+thrown there and the integration restarts. Sources: Dormand and Prince, J. Comp. Appl. Math. 6
+(1980) 19; Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.5 and II.6.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from antenna_drive.trial.compiled import compiled
+from antenna_drive.trial.compiled import compiled, inner
 from antenna_drive.trial.equations import (
     AXIS_FRICTION, derivative, FloatArray, FRICTION, LOAD_SIGN, ModeArray, MOTOR_AT,
     MOTOR_SIZE, STATES, SWITCHES, W, W_A)
@@ -35,11 +34,11 @@ import numpy as np
 # Reasons for which an integration ends.
 DONE, STEP_TOO_SMALL, NOT_FINITE, CHATTER, TOO_MANY_STEPS = 0, 1, 2, 3, 4
 
-TIME_RESOLUTION = 1e-12     # to which a switching is located [s]
-STEP_FLOOR = 1e-11          # below it the problem is not the step [s]
-LONGEST_STEP = 5e-3         # so that two switchings of one body cannot hide in a step [s]
+TIME_RESOLUTION = 1e-12     # of a switching [s]
+STEP_FLOOR = 1e-11          # a smaller step means failure [s]
+LONGEST_STEP = 5e-3         # short enough not to miss two switchings of one body [s]
 CHATTER_LIMIT = 400         # switchings without progress in time
-MOST_STEPS = 5_000_000      # a drive that holds together takes some ten thousand
+MOST_STEPS = 5_000_000      # a test normally takes some ten thousand
 
 A = np.array([
     [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -73,7 +72,7 @@ def interpolate(part: float, y: FloatArray, k: FloatArray, end: FloatArray, step
 
 @compiled
 def violated(margin: FloatArray) -> bool:
-    """Tell whether any switch has to be thrown."""
+    """Return whether any switch must be thrown."""
     for k in range(SWITCHES):
         if margin[k] < 0.0:
             return True
@@ -82,7 +81,7 @@ def violated(margin: FloatArray) -> bool:
 
 @compiled
 def rate_state(which: int) -> int:
-    """Return which state is the rate of a body that sticks and slips, -1 for other switches."""
+    """Return the index of the rate of a body that sticks and slips; -1 for other switches."""
     if which == AXIS_FRICTION:
         return W_A
     if FRICTION <= which < FRICTION + 2:
@@ -93,7 +92,7 @@ def rate_state(which: int) -> int:
 @compiled
 def throw(which: int, t: float, middle: float, y: FloatArray, mode: ModeArray,
           machine: Machine, test: Any, scratch: FloatArray, margin: FloatArray) -> None:
-    """Move one switch whose margin has turned negative to its next position."""
+    """Move one switch whose margin is negative to its next position."""
     rate = rate_state(which)
     if which == LOAD_SIGN:
         mode[which] = -mode[which]
@@ -102,7 +101,7 @@ def throw(which: int, t: float, middle: float, y: FloatArray, mode: ModeArray,
         if rate >= 0:
             y[rate] = 0.0
     else:
-        # To which side? Try the positive one: it holds, or a body accelerates that way.
+        # Try the positive side; if it is not valid, the negative one is.
         mode[which] = 1
         derivative(t, middle, y, mode, machine, test, scratch, margin)
         if (scratch[rate] if rate >= 0 else margin[which]) < 0.0:
@@ -113,9 +112,9 @@ def throw(which: int, t: float, middle: float, y: FloatArray, mode: ModeArray,
 def settle(t: float, middle: float, y: FloatArray, mode: ModeArray, machine: Machine,
            test: Any, dy: FloatArray, margin: FloatArray) -> int:
     """
-    Throw switches at one moment until all hold; fill derivatives and margins; count throws.
+    Throw switches until all margins hold; fill derivatives and margins; return the count.
 
-    Teeth that meet may break a stuck body loose at the same moment, so this repeats.
+    Teeth that meet may break a stuck body loose at the same moment, hence the loop.
     """
     for count in range(2 * SWITCHES):
         derivative(t, middle, y, mode, machine, test, dy, margin)
@@ -127,6 +126,58 @@ def settle(t: float, middle: float, y: FloatArray, mode: ModeArray, machine: Mac
         throw(which, t, middle, y, mode, machine, test, dy, margin)
     derivative(t, middle, y, mode, machine, test, dy, margin)
     return 2 * SWITCHES
+
+
+@inner
+def attempt(t: float, middle: float, h: float, y: FloatArray, mode: ModeArray, machine: Machine,
+            test: Any, scale: FloatArray, k: FloatArray, end: FloatArray,
+            margin: FloatArray) -> float:
+    """Fill slopes, state and margins at the end of a step; return its error over `scale`."""
+    for stage in range(1, 7):
+        for n in range(STATES):
+            total = 0.0
+            for past in range(stage):
+                total += A[stage, past] * k[past, n]
+            end[n] = y[n] + h * total
+        derivative(t + C[stage] * h, middle, end, mode, machine, test, k[stage], margin)
+    worst = 0.0
+    for n in range(STATES):
+        total = 0.0
+        for stage in range(7):
+            total += ERROR[stage] * k[stage, n]
+        worst = max(worst, abs(h * total) / scale[n])
+        if not np.isfinite(end[n]):
+            worst = np.inf
+    return worst
+
+
+@inner
+def first_switching(t: float, middle: float, h: float, y: FloatArray, mode: ModeArray,
+                    machine: Machine, test: Any, k: FloatArray, end: FloatArray,
+                    probe: FloatArray, scratch: FloatArray,
+                    margin: FloatArray) -> tuple[bool, float]:
+    """Return whether a switch must be thrown in a step, and at which share of it, 0 to 1."""
+    low, high = 0.0, 1.0
+    thrown = violated(margin)
+    for probe_at in range(1, 3):
+        part = probe_at / 3.0
+        interpolate(part, y, k, end, h, probe)
+        derivative(t + part * h, middle, probe, mode, machine, test, scratch, margin)
+        if violated(margin):
+            thrown, high = True, part
+            break
+        low = part
+    if not thrown:
+        return False, 1.0
+    while (high - low) * h > TIME_RESOLUTION and high - low > 1e-15:
+        part = 0.5 * (low + high)
+        interpolate(part, y, k, end, h, probe)
+        derivative(t + part * h, middle, probe, mode, machine, test, scratch, margin)
+        if violated(margin):
+            high = part
+        else:
+            low = part
+    return True, high
 
 
 @compiled
@@ -147,9 +198,9 @@ def integrate(machine: Machine, test: Any, start: FloatArray, mode: ModeArray,
     mode
         switches at t = 0, shape (SWITCHES,); overwritten
     corners
-        times at which inputs are not smooth, ascending [s]
+        times at which an input is not smooth, ascending [s]
     samples
-        times at which the state is wanted, ascending, from 0 [s]
+        times of the requested states, ascending, from 0 [s]
     tolerance
         largest error of one step, in units of `scale`
     scale
@@ -161,7 +212,7 @@ def integrate(machine: Machine, test: Any, start: FloatArray, mode: ModeArray,
 
     Returns
     -------
-    DONE, or the reason for giving up
+    DONE, or the reason of the failure
 
     """
     end_of_all = samples[-1]
@@ -187,21 +238,7 @@ def integrate(machine: Machine, test: Any, start: FloatArray, mode: ModeArray,
         h = min(step, LONGEST_STEP)
         if t + h >= stop - STEP_FLOOR:
             h, whole = stop - t, True
-        for stage in range(1, 7):
-            for n in range(STATES):
-                total = 0.0
-                for past in range(stage):
-                    total += A[stage, past] * k[past, n]
-                end[n] = y[n] + h * total
-            derivative(t + C[stage] * h, middle, end, mode, machine, test, k[stage], margin)
-        worst = 0.0
-        for n in range(STATES):
-            total = 0.0
-            for stage in range(7):
-                total += ERROR[stage] * k[stage, n]
-            worst = max(worst, abs(h * total) / scale[n])
-            if not np.isfinite(end[n]):
-                worst = np.inf
+        worst = attempt(t, middle, h, y, mode, machine, test, scale, k, end, margin)
         growth = 0.9 * (tolerance / max(worst, 1e-6 * tolerance))**0.2
         if worst > tolerance:
             statistics[1] += 1
@@ -213,29 +250,8 @@ def integrate(machine: Machine, test: Any, start: FloatArray, mode: ModeArray,
         if statistics[0] > MOST_STEPS:
             return TOO_MANY_STEPS
         step = h * min(5.0, max(0.2, growth))
-
-        # Has a switch to be thrown within the step? Bracket the first moment, then bisect.
-        low, high = 0.0, 1.0
-        thrown = violated(margin)
-        for probe_at in range(1, 3):
-            part = probe_at / 3.0
-            interpolate(part, y, k, end, h, probe)
-            derivative(t + part * h, middle, probe, mode, machine, test, scratch, margin)
-            if violated(margin):
-                thrown, high = True, part
-                break
-            low = part
-        if thrown:
-            while (high - low) * h > TIME_RESOLUTION and high - low > 1e-15:
-                part = 0.5 * (low + high)
-                interpolate(part, y, k, end, h, probe)
-                derivative(t + part * h, middle, probe, mode, machine, test, scratch, margin)
-                if violated(margin):
-                    high = part
-                else:
-                    low = part
-        else:
-            high = 1.0
+        thrown, high = first_switching(t, middle, h, y, mode, machine, test, k, end, probe,
+                                       scratch, margin)
         reached = stop if whole and high == 1.0 else t + high * h
         while sample < len(samples) and samples[sample] <= reached:
             interpolate((samples[sample] - t) / h, y, k, end, h, out[sample])
@@ -252,6 +268,6 @@ def integrate(machine: Machine, test: Any, start: FloatArray, mode: ModeArray,
             y[:] = end
             k[0] = k[6]
             if whole:
-                fresh = True        # an input jumps or bends here
+                fresh = True        # an input or its slope jumps here
         t = reached
     return DONE

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-One particular antenna: every physical constant and every imperfection, in records.
+One antenna as records: every physical constant and every imperfection.
 
-The compiled equations read these records. An imperfection is neutral at zero, and
-`effects.py` and `outside.py` are the only places that set one.
+The compiled equations read these records. An imperfection is absent at zero; only `effects.py`
+and `outside.py` set one.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ MOTOR = np.dtype([(name, np.float64) for name in (
     # imperfections of the catalogue
     'viscous',                  # [N m s/rad] at low rate
     'stribeck',                 # friction at rest above Coulomb [N m]
-    'stribeck_rate',            # rate at which half of it is left [rad/s]
+    'stribeck_rate',            # rate at which it has fallen to half [rad/s]
     'asymmetry',                # Coulomb times 1 + asymmetry * direction
     'load_friction',            # friction per gear torque
     'ripple', 'ripple_cycles', 'ripple_phase',        # [N m], per revolution, [rad]
@@ -148,7 +148,7 @@ class Machine(NamedTuple):
     sensors: NDArray[Any]       # shape (1,), SENSORS
 
 
-# What was built with a tolerance. A gear ratio is a count of teeth, and has none.
+# Constants with a manufacturing tolerance. A gear ratio is a ratio of tooth counts and has none.
 TOLERANCED_MOTOR = (
     'rate_gain', 'integral_time', 'lag', 'current_limit', 'tach_gain', 'feedback_gain',
     'voltage_limit', 'resistance', 'inductance', 'torque_constant', 'inertia', 'coulomb',
@@ -243,7 +243,7 @@ def _build_circuit(record: Any, circuit: str, filter_1: str, bias_pot: float) ->
 
 
 class Tolerances(NamedTuple):
-    """Factors near 1 for everything that is built with a tolerance, in a fixed order."""
+    """Factors near 1 for all toleranced constants, in a fixed order."""
 
     motors: NDArray[np.float64]         # shape (2, len(TOLERANCED_MOTOR))
     structure: NDArray[np.float64]      # shape (n,), modes one by one
@@ -252,7 +252,7 @@ class Tolerances(NamedTuple):
 
 def draw_tolerances(tolerance: float, random: np.random.Generator) -> Tolerances:
     """
-    Draw how far this one antenna is from the reference, evenly within +-tolerance.
+    Draw the deviations of one antenna from the reference, uniform within +-tolerance.
 
     Parameters
     ----------
@@ -274,7 +274,7 @@ def apply_tolerances(machine: Machine, tolerances: Tolerances) -> None:
     """Multiply every toleranced constant of the machine by its factor."""
     for column, name in enumerate(TOLERANCED_MOTOR):
         machine.motors[name] *= tolerances.motors[:, column]
-    # A magnet that is stronger gives more torque and more back-EMF alike.
+    # A stronger magnet raises torque and back-EMF together.
     strength = tolerances.motors[:, TOLERANCED_MOTOR.index('torque_constant')]
     machine.motors['back_emf'] *= strength
     at = 0

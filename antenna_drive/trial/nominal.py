@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-The numbers of the reference drive, each with its unit and where it comes from.
+The numbers of the reference drive, each with its unit and source.
 
-Copied by hand from the reference model's parameter file; the emulator reads its own copy.
-Currents and current gains are in article amperes, 1 A at the motor being 6.892 N m.
+They were copied by hand from the reference model's parameter file; the emulator reads its own
+copy. Currents and current gains are in article amperes: 1 A is 6.892 N m at the motor.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 
 class Fact(NamedTuple):
-    """A number, its unit, and whether the article gives it, implies it, or it was fitted."""
+    """A number, its unit and its source: article, derived from it, fitted or assumed."""
 
     value: float
     unit: str

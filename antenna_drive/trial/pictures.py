@@ -28,12 +28,12 @@ INK, GRID = '#1a3a5f', '#d0d4da'
 
 def draw_scorecard(figures: dict[str, Any], path: Path) -> None:
     """
-    Draw a scorecard to a file, whose suffix decides on the format.
+    Draw a scorecard to a file; the suffix selects the format.
 
     Parameters
     ----------
     figures
-        as `scorecard.score` gives them
+        from `scorecard.score`
     path
         of the picture
 
@@ -72,7 +72,7 @@ def _confusion(axes: Any, table: dict[str, dict[str, int]], rows: list[str],
     axes.tick_params(which='both', length=0)
     axes.set_xlabel('named first')
     axes.set_ylabel('true')
-    axes.set_title('Confusion: number of cases, shade by share of the row (pairs left out)',
+    axes.set_title('Confusion: number of cases, shade by share of the row (without pairs)',
                    fontsize=10, loc='left')
 
 

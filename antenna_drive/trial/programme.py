@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-The test programme: three recordings as a servo engineer would take them.
+The test programme: three recordings, as a servo engineer would take them.
 
-A slow square wave brings out friction, gaps and the start of motion; a fast triangle brings
-out load, saturation, limits and the fading of the bias; a multisine or a chirp brings out
-inertia, structure, filters and delay. They are taken at three elevations, which separates
-gravity from wind. Sizes vary from case to case, the plan does not.
+A slow square wave shows friction, gaps and the start of motion. A fast triangle shows load,
+saturation, limits and the fade-out of the bias. A multisine or a chirp shows inertia, structure,
+filters and delay. The three are recorded at different elevations, which separates gravity from
+wind. Amplitudes and periods vary from case to case; the kinds of recording do not.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from antenna_drive.trial.sheet import SensorGrade, TestSheet
+from antenna_drive.trial.sheet import CaseSheet, SensorGrade
 import numpy as np
 
 RECORDINGS = ('rec_a', 'rec_b', 'rec_c')
@@ -33,14 +33,14 @@ SOURCE_BIAS_V = (4.1, 8.3)      # 10 to 20 percent of the motors' largest curren
 
 
 def draw_sheets(tolerance: float, duration: float,
-                random: np.random.Generator) -> tuple[TestSheet, ...]:
+                random: np.random.Generator) -> tuple[CaseSheet, ...]:
     """
     Draw the test sheets of one case, one for each name in RECORDINGS.
 
     Parameters
     ----------
     tolerance
-        how far the machine may be from the reference, unit 1
+        largest relative deviation of the machine from the reference, unit 1
     duration
         length of each recording [s]
     random
@@ -59,7 +59,7 @@ def draw_sheets(tolerance: float, duration: float,
         (_fast_triangle(random), cold if random.uniform() < 0.5 else circuit),
         (_broad_band(duration, random), circuit))
     return tuple(
-        TestSheet(circuit=fitted, filter_1=fitted, bias=bias, waveform=shape,
+        CaseSheet(circuit=fitted, filter_1=fitted, bias=bias, waveform=shape,
                   elevation_deg=float(elevation), sensors=SensorGrade(),
                   parameter_tolerance=tolerance)
         for (shape, bias), elevation in zip(tests, elevations))
@@ -101,7 +101,7 @@ def _broad_band(duration: float, random: np.random.Generator) -> dict[str, Any]:
                 'f0_hz': 0.1, 'f1_hz': _rounded(random.uniform(6.0, 9.0), 1),
                 'duration_s': duration - 2.0, 'start_s': 1.0}
     count = 12
-    # Whole cycles in half the recording, so that the second half repeats the first.
+    # Whole cycles in half the recording: the second half repeats the first.
     low, high = 0.1, 8.0
     lines = np.unique(np.round(np.geomspace(low, high, count)
                                * np.exp(random.uniform(-0.15, 0.15, count)) * 14.0))

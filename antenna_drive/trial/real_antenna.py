@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-The real antenna: a machine and a test sheet in, what truly happened out.
+The real antenna: from a machine and a test sheet to the true signals.
 
     machine = reference_machine(circuit='new', filter_1='new')
-    effects.apply('motor_2.torque_ripple', {...}, machine)
+    CATALOGUE['motor_2.torque_ripple'].change(machine, {...})
     history = simulate(machine, sheet, times)
 """
 
@@ -27,23 +27,23 @@ import math
 from antenna_drive.trial import equations, integrator, waveform
 from antenna_drive.trial.equations import MOTOR_AT, MOTOR_SIZE
 from antenna_drive.trial.machine import Machine
-from antenna_drive.trial.sheet import TestSheet
+from antenna_drive.trial.sheet import CaseSheet
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-TOLERANCE = 1e-8    # of one step, relative to the size of each state below
+TOLERANCE = 1e-8    # error of one step, relative to the size of each state
 
 
 class SimulationError(RuntimeError):
-    """The equations could not be integrated: the machine is beyond what holds together."""
+    """The equations of this machine could not be integrated."""
 
 
 @dataclass(frozen=True)
 class History:
     """
-    What truly happened, at the asked times. Every array has shape (n,) unless said.
+    The true signals at the requested times; arrays have shape (n,) unless noted.
 
     Attributes
     ----------
@@ -51,12 +51,12 @@ class History:
     command : rate command [rad/s]
     current : of motor 1 and 2, shape (2, n) [A]
     rate : of the rotors, shape (2, n) [rad/s]
-    tach : what the tachometers give to the loop, shape (2, n) [rad/s]
+    tach : readings of the tachometers in the loop, shape (2, n) [rad/s]
     axis_angle, axis_rate : [rad], [rad/s]
     encoder_angle : of the encoder's own shaft [rad]
     bias : bias voltage [V]
     state : all states, shape (n, equations.STATES)
-    steps, rejected, switchings : what the integrator did
+    steps, rejected, switchings : counts of the integrator
 
     """
 
@@ -75,7 +75,7 @@ class History:
     switchings: int
 
 
-def start_state(machine: Machine, sheet: TestSheet, place: tuple[float, float]) -> FloatArray:
+def start_state(machine: Machine, sheet: CaseSheet, place: tuple[float, float]) -> FloatArray:
     """
     Return the state at rest, shape (equations.STATES,).
 
@@ -84,9 +84,9 @@ def start_state(machine: Machine, sheet: TestSheet, place: tuple[float, float]) 
     machine
         the antenna
     sheet
-        says whether the share circuit has settled (bias: start)
+        states whether the share circuit has settled (bias: start)
     place
-        where each motor stands inside its gap, -1 to 1
+        position of each motor in its gap, -1 to 1
 
     """
     y = np.zeros(equations.STATES)
@@ -97,7 +97,7 @@ def start_state(machine: Machine, sheet: TestSheet, place: tuple[float, float]) 
         motor = machine.motors[which]
         at = MOTOR_AT + which * MOTOR_SIZE
         y[at + equations.THETA] = place[which] * motor['half_gap']
-        # Teeth's own errors shift the gap: turn the motor until it stands where it is said to.
+        # Tooth errors shift the gap: iterate until the motor stands at its place.
         for _ in range(50):
             x, _, gap = equations.gear_deflection(
                 motor, machine.structure[0], y[at + equations.THETA], 0.0, 0.0, 0.0)
@@ -106,7 +106,7 @@ def start_state(machine: Machine, sheet: TestSheet, place: tuple[float, float]) 
 
 
 def _sizes(machine: Machine) -> FloatArray:
-    """Return the typical size of each state, by which its error is judged."""
+    """Return the typical size of each state, which scales its error."""
     size = np.ones(equations.STATES)
     per_axis = 1.0 / float(machine.structure[0]['gear_ratio'])
     size[equations.AXIS_AT:] = per_axis
@@ -118,11 +118,11 @@ def _sizes(machine: Machine) -> FloatArray:
     return size
 
 
-def simulate(machine: Machine, sheet: TestSheet, times: FloatArray,
+def simulate(machine: Machine, sheet: CaseSheet, times: FloatArray,
              place: tuple[float, float] = (0.0, 0.0),
              tolerance: float = TOLERANCE) -> History:
     """
-    Run one test from rest and give the true signals.
+    Simulate one test from rest and return the true signals.
 
     Parameters
     ----------
@@ -131,15 +131,15 @@ def simulate(machine: Machine, sheet: TestSheet, times: FloatArray,
     sheet
         the test
     times
-        when the signals are wanted, ascending, not before 0, shape (n,) [s]
+        times of the signals, ascending, from 0 on, shape (n,) [s]
     place
-        where each motor stands inside its gap at the start, -1 to 1
+        position of each motor in its gap at the start, -1 to 1
     tolerance
         largest error of one integration step, unit 1
 
     Raises
     ------
-    SimulationError : the integration broke down; the message says where
+    SimulationError : the integration failed; the message says where
 
     """
     test = sheet.record()
@@ -163,7 +163,7 @@ def simulate(machine: Machine, sheet: TestSheet, times: FloatArray,
 
 
 def _edges(machine: Machine, test: np.void, end: float) -> FloatArray:
-    """Return all times at which something outside the state jumps or bends [s]."""
+    """Return the times at which an input or its slope jumps [s]."""
     edges = list(waveform.corners(test, end))
     structure = machine.structure[0]
     edges.append(float(structure['ballast_at']))

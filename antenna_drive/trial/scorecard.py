@@ -12,10 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-The scorecard of a trial: every figure a pure function of truths and verdicts.
+The scorecard of a trial, computed from truths and verdicts alone.
 
-docs/trial.md defines each figure. A case without a valid verdict counts as wrong wherever it
-could have been right.
+docs/trial.md defines each figure. A case without a valid verdict counts as wrong.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ SCORED_SINGLE, SCORED_PAIR = 'single', 'pair'
 
 @dataclass(frozen=True)
 class Case:
-    """A truth with its verdict, which is None where the diagnosis failed."""
+    """A truth with its verdict, which is None if the diagnosis failed."""
 
     truth: Truth
     verdict: Verdict | None
@@ -53,24 +52,24 @@ class Case:
 
     @property
     def effects(self) -> frozenset[str]:
-        """Return what the best verdict names: the effects, UNKNOWN outside, NONE without."""
+        """Return the right answer: the effects, UNKNOWN outside the catalogue, or NONE."""
         if self.kind == 'outside':
             return frozenset([UNKNOWN])
         return frozenset(entry['id'] for entry in self.truth['effects']) or frozenset([NONE])
 
     @property
     def label(self) -> str:
-        """Return the truth for people: its ids, or 'none'."""
+        """Return the truth as text: its ids, or 'none'."""
         return ' + '.join(entry['id'] for entry in self.truth['effects']) or NONE
 
     @property
     def size(self) -> str:
-        """Return into which third of its range the smallest effect falls, one of SIZES."""
+        """Return the third of its range in which the smallest effect lies, one of SIZES."""
         smallest = min((entry['size'] for entry in self.truth['effects']), default=0.0)
         return SIZES[min(int(smallest * len(SIZES)), len(SIZES) - 1)]
 
     def named_among(self, first: int, *, exactly: bool = False) -> bool:
-        """Tell whether one of the first entries names the truth, or its confusable set."""
+        """Return whether one of the first entries names the truth or its confusable set."""
         if self.verdict is None:
             return False
         return any(entry.effects == self.effects if exactly
@@ -79,7 +78,7 @@ class Case:
 
     @property
     def within_set(self) -> bool:
-        """Tell whether all that is true is among what the first entry and its sets hold."""
+        """Return whether the first entry and its confusable sets contain the whole truth."""
         if self.verdict is None:
             return False
         held: frozenset[str] = frozenset().union(*(
@@ -88,7 +87,7 @@ class Case:
 
     @property
     def right(self) -> bool:
-        """Tell whether the first entry names the truth, or its confusable set."""
+        """Return whether the first entry names the truth or its confusable set."""
         return self.named_among(1)
 
 
@@ -103,7 +102,7 @@ def read_cases(folder: Path) -> tuple[list[Case], int]:
 
     Returns
     -------
-    the cases that were diagnosed, and the number of those that were not yet
+    the diagnosed cases, and the number of cases not yet diagnosed
 
     Raises
     ------
@@ -128,7 +127,7 @@ def read_cases(folder: Path) -> tuple[list[Case], int]:
 
 
 class Rate(NamedTuple):
-    """A share with its 95 percent interval (Wilson), and how many it rests on."""
+    """A share with its 95 percent interval (Wilson) and the number of cases."""
 
     value: float
     low: float
@@ -137,7 +136,7 @@ class Rate(NamedTuple):
 
 
 def rate(outcomes: Iterable[bool]) -> Rate:
-    """Return the share of true outcomes; nan without any."""
+    """Return the share of true outcomes; nan if there are no outcomes."""
     values = list(outcomes)
     count = len(values)
     if not count:
@@ -150,7 +149,7 @@ def rate(outcomes: Iterable[bool]) -> Rate:
 
 
 def auroc(positive: Sequence[float], negative: Sequence[float]) -> float:
-    """Return how often a positive scores above a negative, ties by half; nan without either."""
+    """Return the share of pairs whose positive scores higher, ties half; nan if one is empty."""
     if not positive or not negative:
         return math.nan
     first, second = np.asarray(positive)[:, None], np.asarray(negative)[None, :]
@@ -168,7 +167,7 @@ class Bin(NamedTuple):
 
 
 def reliability(confidences: Sequence[float], right: Sequence[bool]) -> list[Bin]:
-    """Return the bins of the reliability diagram, equally wide from 0 to 1."""
+    """Return the bins of the reliability diagram, of equal width from 0 to 1."""
     place = [min(int(c * BINS), BINS - 1) for c in confidences]
     bins = []
     for k in range(BINS):
@@ -182,7 +181,7 @@ def reliability(confidences: Sequence[float], right: Sequence[bool]) -> list[Bin
 
 
 def calibration_error(bins: Sequence[Bin]) -> float:
-    """Return the expected calibration error; nan without a case."""
+    """Return the expected calibration error; nan if there are no cases."""
     total = sum(b.cases for b in bins)
     if not total:
         return math.nan
@@ -213,7 +212,7 @@ def _unknown(cases: Iterable[Case]) -> list[float]:
 
 
 def confusion(cases: Sequence[Case]) -> dict[str, dict[str, int]]:
-    """Return how often each truth was answered how, pairs left out: truth, then first entry."""
+    """Return the number of cases by truth and first entry, without pairs."""
     table: dict[str, dict[str, int]] = {}
     for case in cases:
         if case.kind == SCORED_PAIR:
@@ -235,11 +234,11 @@ def score(cases: Sequence[Case], pending: int = 0) -> dict[str, Any]:
     cases
         with their verdicts
     pending
-        number of cases that were not diagnosed yet
+        number of cases not yet diagnosed
 
     Returns
     -------
-    figures by name, nan where there is no case to judge by; docs/trial.md defines them
+    figures by name, nan where there are no cases; docs/trial.md defines them
 
     """
     by_kind = {kind: [case for case in cases if case.kind == kind]
@@ -288,7 +287,7 @@ def score(cases: Sequence[Case], pending: int = 0) -> dict[str, Any]:
 
 
 def _one_named(case: Case) -> bool:
-    """Tell whether the first entry of a pair's verdict names at least one of the two."""
+    """Return whether the first entry of a pair's verdict names at least one of the two."""
     if case.verdict is None:
         return False
     return any(case.verdict.confusable_with(name) & case.effects

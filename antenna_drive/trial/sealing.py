@@ -12,14 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Truths under seal: written before any recording, with salted hashes that anyone can check.
+Sealed truths: written before any recording, with salted hashes that anyone can check.
 
     DIR/manifest.json            settings of the trial and one hash for each case
     DIR/truth/case_0001.json     the truth with its salt
-    DIR/case_0001/               what a diagnosis is given
+    DIR/case_0001/               the input of a diagnosis
 
-The salt keeps a truth from being guessed from its hash; whoever gets the truth file sees that
-it is the one that was sealed.
+The salt prevents guessing a truth from its hash. Anyone who has the truth file can check that it
+is the sealed one.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ SALT_BYTES = 16
 
 
 class SealError(UserError):
-    """A truth or a manifest is missing, unreadable or not what was sealed."""
+    """A truth or a manifest is missing, unreadable or not the sealed one."""
 
 
 def seal_of(truth: Truth) -> str:
@@ -52,7 +52,7 @@ def seal_of(truth: Truth) -> str:
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write a file so that it is there as a whole or not at all."""
+    """Write a file completely or not at all."""
     draft = path.with_name(f'.{path.name}.{os.getpid()}')
     try:
         with open(draft, 'w', encoding='utf-8', newline='') as stream:
@@ -71,9 +71,9 @@ def seal(folder: Path, settings: dict[str, Any], truths: Iterable[Truth]) -> dic
     Parameters
     ----------
     folder
-        of the trial; made if it is not there
+        of the trial; created if missing
     settings
-        what the trial was drawn with; goes into the manifest
+        of the draw; written to the manifest
     truths
         of all cases
 
@@ -95,7 +95,7 @@ def seal(folder: Path, settings: dict[str, Any], truths: Iterable[Truth]) -> dic
 
 
 def manifest_seal(manifest: dict[str, Any]) -> str:
-    """Return one hash over the whole manifest, to be noted down beforehand."""
+    """Return one hash over the whole manifest, to be noted before the trial."""
     return seal_of(manifest)
 
 
@@ -105,7 +105,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
     Raises
     ------
-    SealError : there is none, or it is not one
+    SealError : there is no manifest, or the file is not one
 
     """
     path = folder / MANIFEST
@@ -121,11 +121,11 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 def open_truth(folder: Path, case: str, manifest: dict[str, Any]) -> Truth:
     """
-    Read the truth of one case and check that it is the one that was sealed.
+    Read the truth of one case and check its seal.
 
     Raises
     ------
-    SealError : the file is missing, unreadable, or was changed since
+    SealError : the file is missing, unreadable or changed since
 
     """
     path = folder / TRUTHS / f'{case}.json'

@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""What the recorder writes down of what truly happened: noise, digits, an uneven clock."""
+"""The recorder: true signals with noise, quantisation and clock jitter."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ import numpy as np
 JITTER = 0.03               # spread of the sampling instants, in sample periods
 STAMP_ERROR_S = 5e-5        # spread of the time stamps about the true instants
 STAMP_DIGIT_S = 1e-6
-# Offsets that no recorder is free of: at most one standard deviation of its noise.
+# Largest zero error of the encoder.
 ENCODER_ZERO_RAD = 5e-6
 
 COLUMNS = ('time_s', 'rate_command_rad_s', 'current_1_A', 'current_2_A', 'tach_rate_1_rad_s',
@@ -35,7 +35,7 @@ COLUMNS = ('time_s', 'rate_command_rad_s', 'current_1_A', 'current_2_A', 'tach_r
 def sample_instants(rate: float, duration: float,
                     random: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """
-    Draw when the recorder samples, and when it says that it did.
+    Draw the true sampling instants and their time stamps.
 
     Parameters
     ----------
@@ -74,21 +74,21 @@ def _encoder(angle: FloatArray, machine: Machine, grade: SensorGrade,
     reading = reading + sensors['encoder_cyclic'] * (
         np.sin(phase) + 0.25 * np.sin(2.0 * phase + 0.5))
     step = float(sensors['encoder_step']) or 2.0 * math.pi / 2**grade.encoder_bits
-    # An encoder counts whole lines passed: it rounds down.
+    # An encoder counts whole lines and so rounds down.
     return np.floor(reading / step) * step
 
 
 def record(history: History, machine: Machine, grade: SensorGrade, stamps: FloatArray,
            random: np.random.Generator) -> dict[str, FloatArray]:
     """
-    Turn true signals into recorded ones.
+    Return the recording of true signals.
 
     Parameters
     ----------
     history
         true signals at the true instants
     machine
-        holds the errors of the sensors
+        with the errors of the sensors
     grade
         noise and resolution
     stamps

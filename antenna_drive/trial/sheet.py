@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-What the tester sets and knows: waveform, bias, sensors. Written beside every recording.
+The test sheet of a recording: waveform, bias and sensors, as the tester knows them.
 
-The YAML is that of the diagnosis' input format; phases of a square or triangle are in periods,
-those of a multisine in radians, and a sine of phase zero starts at zero.
+The YAML has the diagnosis' input format. Phases of a square or triangle are in periods, those of
+a multisine in radians; a sine of phase zero starts at zero.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ SHAPES = {'square': waveform.SQUARE, 'triangle': waveform.TRIANGLE,
 
 @dataclass(frozen=True)
 class SensorGrade:
-    """How good the recorder's sensors are: one standard deviation, one digit."""
+    """Noise (standard deviation) and resolution of the recorder's sensors."""
 
     current_noise_A: float = 0.01
     current_step_A: float = 0.01
@@ -48,9 +48,9 @@ class SensorGrade:
 
 
 @dataclass(frozen=True)
-class TestSheet:
+class CaseSheet:
     """
-    One test: what was commanded, how the bias was made, what the sensors can do.
+    One test: command, source of the bias, and grade of the sensors.
 
     Attributes
     ----------
@@ -59,11 +59,9 @@ class TestSheet:
     waveform : mapping of the input format: square, triangle, multisine or chirp; empty: rest
     elevation_deg : elevation at the start [deg]
     sensors : grade of the sensors
-    parameter_tolerance : how far the machine may be from the reference, unit 1
+    parameter_tolerance : largest relative deviation of the machine from the reference, unit 1
 
     """
-
-    __test__ = False    # not a test case, whatever pytest makes of the name
 
     circuit: str
     filter_1: str
@@ -74,7 +72,7 @@ class TestSheet:
     parameter_tolerance: float = 0.02
 
     def plain(self) -> dict[str, Any]:
-        """Return the sheet as the YAML file holds it."""
+        """Return the content of the YAML file."""
         return {
             'circuit': self.circuit, 'filter_1': self.filter_1, 'bias': dict(self.bias),
             'waveform': dict(self.waveform), 'start': 'rest',
@@ -82,7 +80,7 @@ class TestSheet:
             'parameter_tolerance': self.parameter_tolerance}
 
     def record(self) -> NDArray[Any]:
-        """Return the record that the compiled equations read, shape (1,), waveform.TEST."""
+        """Return the record for the compiled equations, shape (1,), waveform.TEST."""
         test = np.zeros(1, waveform.TEST)
         record = test[0]
         record['elevation'] = math.radians(self.elevation_deg)

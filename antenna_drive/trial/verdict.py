@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""A verdict of the diagnosis, read from its JSON and checked before anything is scored."""
+"""A verdict of the diagnosis, read from its JSON and checked."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from typing import Any
 
 UNKNOWN, NONE = 'unknown', 'none'
 VERDICTS = ('no_gap', 'explained', 'partly_explained', 'unknown_effect')
-LARGEST_SET = 5             # ids in a confusable set that still says something
+LARGEST_SET = 5             # ids in a confusable set that is still informative
 SUM_ERROR = 0.01            # allowed in the sum of the probabilities
 
 
 class VerdictError(ValueError):
-    """A verdict is not what the diagnosis promises; counted as a failure."""
+    """A verdict does not have the form of the diagnosis; it counts as a failure."""
 
 
 @dataclass(frozen=True)
-class Entry:
-    """One line of 'which': ids that act together, and how probable that is."""
+class VerdictLine:
+    """One line of 'which': effects that act together, and their probability."""
 
     effects: frozenset[str]
     probability: float
@@ -43,20 +43,20 @@ class Entry:
 @dataclass(frozen=True)
 class Verdict:
     """
-    What a diagnosis says.
+    The answer of a diagnosis.
 
     Attributes
     ----------
     verdict : one of VERDICTS
-    which : ranked, the most probable first
-    confusable : groups of ids that the data cannot tell apart
+    which : sorted, the most probable first
+    confusable : groups of ids that the data cannot separate
     explained_fraction : nan if not given
     seconds : nan if not given
 
     """
 
     verdict: str
-    which: tuple[Entry, ...]
+    which: tuple[VerdictLine, ...]
     confusable: tuple[frozenset[str], ...]
     explained_fraction: float
     seconds: float
@@ -65,15 +65,15 @@ class Verdict:
         """
         Return all ids published as confusable with `effect`, itself included.
 
-        The groups that hold it count together: beyond LARGEST_SET ids they say nothing, and
-        the effect stands alone. Otherwise many small groups could cover everything.
+        All groups that contain it count together. With more than LARGEST_SET ids they are ignored;
+        otherwise many small groups could cover every effect.
         """
         together = frozenset([effect]).union(
             *(group for group in self.confusable if effect in group))
         return together if len(together) <= LARGEST_SET else frozenset([effect])
 
     def means(self, named: frozenset[str], true: frozenset[str]) -> bool:
-        """Tell whether an entry names the true effects, each itself or one confusable with it."""
+        """Return whether an entry names the true effects or ones confusable with them."""
         return len(named) == len(true) and any(True for _ in self._matchings(
             sorted(named), true))
 
@@ -85,7 +85,7 @@ class Verdict:
             yield from self._matchings(named[1:], true - {effect})
 
     def confidence(self) -> float:
-        """Return the probability of the first entry with all that means the same."""
+        """Return the probability of the first entry and of all equivalent ones."""
         first = self.which[0].effects
         return min(1.0, sum(entry.probability for entry in self.which
                             if entry.effects == first or self.means(first, entry.effects)))
@@ -147,7 +147,7 @@ def parse_verdict(content: Any) -> Verdict:
                    _number_or_nan(value), _number_or_nan(content.get('seconds')))
 
 
-def _entry(content: Any) -> Entry:
+def _entry(content: Any) -> VerdictLine:
     if not isinstance(content, dict):
         raise VerdictError('which: an entry is not a JSON object')
     effects, probability = content.get('effects'), content.get('probability')
@@ -157,7 +157,7 @@ def _entry(content: Any) -> Entry:
     if isinstance(probability, bool) or not isinstance(probability, (int, float)) or not (
             0.0 <= probability <= 1.0):
         raise VerdictError(f'which.probability: {probability!r}, not a number from 0 to 1')
-    return Entry(frozenset(effects), float(probability))
+    return VerdictLine(frozenset(effects), float(probability))
 
 
 def _number_or_nan(value: Any) -> float:

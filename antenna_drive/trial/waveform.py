@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The rate command and the bias source of a test, as the compiled equations see them."""
+"""The rate command and the bias source of a test, for the compiled equations."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ TEST = np.dtype([(name, np.float64) for name in (
     'phase',                    # in periods
     'start', 'duration',        # [s]
     'first_frequency', 'last_frequency',              # of a chirp [Hz]
-    'sines',                    # how many
+    'sines',                    # their number
     'bias_source',              # 0: share circuit, 1: a source
     'bias_voltage', 'bias_at',  # of the source [V], [s]
     'elevation',                # at the start [rad]
@@ -55,7 +55,7 @@ def command(test: Any, t: float, middle: float) -> float:
     t
         time [s]
     middle
-        time within the same stretch between two corners, which selects the branch [s]
+        a time in the same interval between two corners, which selects the branch [s]
 
     """
     if test.shape == SQUARE:

@@ -19,7 +19,7 @@ from typing import Any
 
 from antenna_drive.machines.antenna.excitation import SheetCommand
 from antenna_drive.recording.sheet import parse_sheet
-from antenna_drive.trial.sheet import TestSheet
+from antenna_drive.trial.sheet import CaseSheet
 from antenna_drive.trial.waveform import command, corners
 from hypothesis import given, strategies as st
 import numpy as np
@@ -59,7 +59,7 @@ def test_both_programs_play_a_sheet_alike(waveform: dict[str, Any]) -> None:
     parsed = parse_sheet({'waveform': waveform}).waveform
     assert parsed is not None
     ours = SheetCommand(parsed)
-    theirs = TestSheet('new', 'new', {'type': 'circuit'}, waveform).record()[0]
+    theirs = CaseSheet('new', 'new', {'type': 'circuit'}, waveform).record()[0]
     knots = corners(theirs, END)
     assert ours.knots(END) == pytest.approx(knots, abs=1e-9)
     # within each stretch between two knots, up to a millionth of it from its ends

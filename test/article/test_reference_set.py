@@ -82,7 +82,7 @@ def test_every_number_is_the_reference_models(circuit: str) -> None:
         expected[f'{motor}.sign'] = sign
         expected.update({f'{motor}.{name}': value for name, value in MOTOR.items()})
     for name, value in CIRCUITS[circuit].items():
-        part = 'filter_1' if name in ('gain', 'pole') else 'torque_share'
+        part = 'filter_1' if name in ('gain', 'pole') else 'circuit'
         expected[f'torque_share.{part}.{name}'] = value
     assert {name: found[name] for name in expected} == expected
 

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 import json
+import math
 from pathlib import Path
 
 from antenna_drive import cli
@@ -24,7 +25,11 @@ from antenna_drive.article.contradictions import contradictions
 from antenna_drive.article.measures import Results, with_circuits
 from antenna_drive.article.published import CLAIMS
 from antenna_drive.article.rows import Row, rows
+from antenna_drive.calibration.problem import read_problem
 from antenna_drive.cli.article import CONFIGURATION
+from antenna_drive.parameters.files import config_dir
+from antenna_drive.parameters.sets import changed
+import numpy as np
 import pytest
 
 # The published figure and how far from it still passes: 3 percent of rates and currents, 0.2 V,
@@ -148,6 +153,57 @@ def test_the_contradictions_are_told_apart(reference: Results) -> None:
     assert fits['saw_tooth'] == [True, False]
 
 
+def changed_reference(**changes: float) -> Results:
+    """Return results of the reference with other values of some parameters."""
+    return Results({circuit: changed(drive, {name.replace('__', '.'): value
+                                             for name, value in changes.items()})
+                    for circuit, drive in with_circuits('reference').items()})
+
+
+def test_a_conclusion_follows_from_the_configuration() -> None:
+    def conclusion(results: Results, name: str) -> str:
+        return contradictions(results, [name])[0].conclusion
+
+    # by hand: 10.4, 11.6 and 11.2 V as shares of a saturation of 14.5 V
+    wide = changed_reference(torque_share__circuit__saturation_high=14.5)
+    for share in ('14.5 V', '0.717', '0.800', '0.772'):
+        assert share in conclusion(wide, 'bias_pot')
+    # an inductance 2.5 times as large halves the stability limit or more: Fig. 21(e) is above it
+    slow = {f'motor_{m}__armature__inductance': 0.03125 for m in (1, 2)}
+    said = conclusion(changed_reference(**slow), 'stability_limit_units')
+    assert 'No reading fits' in said
+    assert "k' = 145.2, above the limit" in said
+    # behind a small gear ratio even 308 kgf m would be a small motor's
+    said = conclusion(changed_reference(plant__axis__gear_ratio=150.0), 'torque_unit')
+    assert 'All readings fit' in said
+    # 6 kW at a ratio of 150 against 632 kW at 14868
+    assert f'{308.0 * 9.80665 * math.radians(0.685 / 0.85) * 150.0 / 1e3:.3g} kW' in said
+    assert 'Fits: pound-inches' in conclusion(Results(with_circuits('reference')), 'torque_unit')
+
+
+@pytest.mark.parametrize('seed', [1, 2])
+def test_the_basis_of_a_row_says_what_the_free_parameters_change(seed: int) -> None:
+    problem = read_problem(config_dir() / 'calibration' / 'article.yaml')
+    start = np.array(problem.start())
+    moved = start + 0.05 * np.random.default_rng(seed).choice([-1.0, 1.0], start.size)
+    before = by_id(rows(problem.results(start.tolist()), ['T5']))
+    found = rows(problem.results(moved.tolist()))
+    for row in found:
+        if row.basis == 'published':
+            assert row.obtained == before[row.id].obtained, row.id
+        if row.basis in ('published', 'derived'):
+            assert row.passed, row.id
+    assert sum(not row.passed for row in found if row.basis == 'fitted') >= 5
+
+
+def test_no_target_of_the_fit_counts_as_a_prediction() -> None:
+    bases = {claim.measure: claim.basis for claim in CLAIMS}
+    assert set(bases.values()) == {'published', 'derived', 'fitted', 'predicted'}
+    targets = {target.figure for target in
+               read_problem(config_dir() / 'calibration' / 'article.yaml').targets}
+    assert {bases[figure] for figure in targets & bases.keys()} == {'derived', 'fitted'}
+
+
 def test_the_command_gives_rows_and_contradictions_as_json(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('antenna_drive.cli.article.EXPERIMENTS', ('T3a', 'T4a'))
@@ -156,7 +212,8 @@ def test_the_command_gives_rows_and_contradictions_as_json(
     told = json.loads(target.read_text())
     assert {row['id'].partition('.')[0] for row in told['rows']} == {'T3a', 'T4a'}
     for row in told['rows']:
-        assert set(row) == {'id', 'published', 'obtained', 'tolerance', 'unit', 'passed', 'note'}
+        assert set(row) == {'id', 'published', 'obtained', 'tolerance', 'unit', 'passed',
+                            'basis', 'note'}
         assert row['passed'] is True
     assert len(told['contradictions']) >= 7
 

@@ -19,7 +19,7 @@ import math
 from pathlib import Path
 
 from antenna_drive.calibration.configuration import configuration
-from antenna_drive.calibration.problem import Free, Problem, read_problem, Target
+from antenna_drive.calibration.problem import CalibrationProblem, Free, read_problem, Target
 from antenna_drive.parameters import load, ParameterError
 from antenna_drive.parameters.files import config_dir
 from hypothesis import given, strategies as st
@@ -133,7 +133,7 @@ def test_mistakes_are_told_in_one_line(tmp_path: Path, old: str, new: str, says:
 
 def test_the_shipped_targets_are_valid() -> None:
     problem = read_problem(config_dir() / 'calibration' / 'article.yaml')
-    assert isinstance(problem, Problem)
+    assert isinstance(problem, CalibrationProblem)
     for item, share in zip(problem.free, problem.start()):
         assert 0.0 < share < 1.0, f'{item.name} starts at a bound'
 

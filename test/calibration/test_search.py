@@ -23,7 +23,7 @@ from typing import Any
 from antenna_drive import cli
 from antenna_drive.calibration.problem import Evaluation, Free, Target
 from antenna_drive.calibration.report import report
-from antenna_drive.calibration.search import Candidate, search
+from antenna_drive.calibration.search import FitCandidate, search
 from antenna_drive.errors import UserError
 from antenna_drive.parameters import load, ParameterError
 import numpy as np
@@ -69,7 +69,7 @@ class Linear:
         return Evaluation(cost, figures, True)
 
 
-def places(candidates: Sequence[Candidate]) -> list[tuple[float, ...]]:
+def places(candidates: Sequence[FitCandidate]) -> list[tuple[float, ...]]:
     return [candidate.shares for candidate in candidates]
 
 
@@ -145,7 +145,7 @@ def test_the_report_tells_what_is_determined(monkeypatch: pytest.MonkeyPatch) ->
     cheapest = min(curve, key=lambda point: point['cost_of_the_others'])
     assert cheapest['missed'] == []
     # a better candidate of another search is seen
-    other = Candidate((0.5, 0.5, 0.5), Evaluation(0.0, {
+    other = FitCandidate((0.5, 0.5, 0.5), Evaluation(0.0, {
         'sum': cheapest['level'] + 1e-6, 'difference': float(SLOPES[1] @ BEST)}, True))
     curve = report(problem, found, ['sum'],  # type: ignore[arg-type]
                    also=[other])['trade_offs']['sum']

@@ -25,7 +25,7 @@ from antenna_drive.article.experiments import experiments
 from antenna_drive.emulator.run import simulate
 from antenna_drive.trial.machine import reference_machine
 from antenna_drive.trial.real_antenna import simulate as simulate_apart
-from antenna_drive.trial.sheet import TestSheet
+from antenna_drive.trial.sheet import CaseSheet
 import numpy as np
 import pytest
 
@@ -51,7 +51,7 @@ def test_both_programs_give_the_same_motion(name: str) -> None:
     run = simulate(experiments()[name].drive(), 8.0, 2.5e-4, every=8)
     # the other program holds a jump's old value at its very instant: look just after each sample
     history = simulate_apart(reference_machine(circuit, circuit, pot),
-                             TestSheet(circuit, circuit, {**bias, 'bias_pot': pot}, waveform),
+                             CaseSheet(circuit, circuit, {**bias, 'bias_pot': pot}, waveform),
                              run.time + 1e-9)
     for signal, apart in (('motor_1/current', history.current[0]),
                           ('motor_2/current', history.current[1]),

@@ -20,7 +20,7 @@ import math
 
 from antenna_drive.trial.machine import reference_machine
 from antenna_drive.trial.real_antenna import History, simulate
-from antenna_drive.trial.sheet import TestSheet
+from antenna_drive.trial.sheet import CaseSheet
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -34,7 +34,7 @@ OLD_POLE = 1.369863
 @functools.cache
 def square(bias_v: float) -> History:
     """Run T1 or T2: a square wave of 0.013 deg/s and 6.3 s."""
-    sheet = TestSheet('old', 'old', {'type': 'fixed', 'voltage_V': bias_v},
+    sheet = CaseSheet('old', 'old', {'type': 'fixed', 'voltage_V': bias_v},
                       {'type': 'square', 'amplitude_deg_s': 0.013, 'period_s': 6.3})
     return simulate(reference_machine(), sheet, np.arange(0.0, 31.499, 0.0005))
 
@@ -53,7 +53,7 @@ def rms(values: NDArray[np.float64]) -> float:
 @functools.cache
 def sawtooth(circuit: str, pot: float) -> NDArray[np.float64]:
     """Run T3 and return the bias voltage after the first period."""
-    sheet = TestSheet(circuit, circuit, {'type': 'circuit', 'bias_pot': pot, 'start': 'steady'},
+    sheet = CaseSheet(circuit, circuit, {'type': 'circuit', 'bias_pot': pot, 'start': 'steady'},
                       {'type': 'triangle', 'amplitude_deg_s': 0.685, 'period_s': 5.0})
     history = simulate(reference_machine(circuit, circuit, pot), sheet,
                        np.arange(0.0, 30.0, 0.001))
@@ -66,7 +66,7 @@ def bias_step(circuit: str, gain: float, pole: float,
     machine = reference_machine(circuit, circuit, 0.7)
     machine.circuit['filter_gain'] = gain
     machine.circuit['filter_pole'] = pole
-    sheet = TestSheet(circuit, circuit, {'type': 'circuit', 'bias_pot': 0.7, 'start': 'zero'}, {})
+    sheet = CaseSheet(circuit, circuit, {'type': 'circuit', 'bias_pot': 0.7, 'start': 'zero'}, {})
     history = simulate(machine, sheet, np.arange(0.0, seconds, 0.001))
     return history.time, 100.0 * (history.current[1] - history.current[0]) / CURRENT_LIMIT_A
 

@@ -20,19 +20,19 @@ import math
 
 from antenna_drive.trial import equations
 from antenna_drive.trial.cases import draw_truths
-from antenna_drive.trial.effect import Effect
+from antenna_drive.trial.effect import Defect
 from antenna_drive.trial.effects import CATALOGUE
 from antenna_drive.trial.machine import reference_machine
 from antenna_drive.trial.outside import OUTSIDE
 from antenna_drive.trial.real_antenna import simulate
 from antenna_drive.trial.sensors import record
-from antenna_drive.trial.sheet import TestSheet
+from antenna_drive.trial.sheet import CaseSheet
 import numpy as np
 from numpy.typing import NDArray
 import pytest
 
 # Fast enough to reach the limits of current and voltage.
-PLAIN = TestSheet('new', 'new', {'type': 'circuit', 'bias_pot': 0.8, 'start': 'steady'},
+PLAIN = CaseSheet('new', 'new', {'type': 'circuit', 'bias_pot': 0.8, 'start': 'steady'},
                   {'type': 'triangle', 'amplitude_deg_s': 0.685, 'period_s': 3.0})
 MOTOR_EFFECTS = {
     'viscous_friction', 'stribeck_friction', 'coulomb_friction', 'friction_asymmetry',
@@ -52,7 +52,7 @@ OTHER_EFFECTS = {
     'loop': {'delay'}}
 
 
-def signals(effect: Effect | None, size: float) -> NDArray[np.float64]:
+def signals(effect: Defect | None, size: float) -> NDArray[np.float64]:
     """Return fourteen seconds of recorded signals, with an effect and all noises alike."""
     machine = reference_machine('new', 'new', 0.8)
     if effect is not None:
@@ -80,7 +80,7 @@ def test_catalogue_names_every_effect_of_the_specification() -> None:
 
 @pytest.mark.parametrize('effect', [*CATALOGUE.values(), *OUTSIDE.values()],
                          ids=lambda effect: effect.key)
-def test_every_effect_shows_at_both_ends_of_its_range(effect: Effect) -> None:
+def test_every_effect_shows_at_both_ends_of_its_range(effect: Defect) -> None:
     before = unchanged_signals()
     for size in (0.0, 1.0):
         after = signals(effect, size)

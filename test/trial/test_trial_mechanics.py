@@ -21,13 +21,13 @@ from antenna_drive.trial import equations
 from antenna_drive.trial.equations import MODES_AT, MOTOR_AT, MOTOR_SIZE
 from antenna_drive.trial.machine import Machine, reference_machine
 from antenna_drive.trial.real_antenna import History, simulate
-from antenna_drive.trial.sheet import TestSheet
+from antenna_drive.trial.sheet import CaseSheet
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-REST = TestSheet('old', 'old', {'type': 'fixed', 'voltage_V': 0.0}, {}, elevation_deg=0.0)
+REST = CaseSheet('old', 'old', {'type': 'fixed', 'voltage_V': 0.0}, {}, elevation_deg=0.0)
 
 
 def bare_axis() -> Machine:
@@ -163,7 +163,7 @@ def test_held_mode_swings_at_its_frequency() -> None:
 
 def test_share_circuit_fills_exponentially() -> None:
     """x_2 of Eq. (9) without load: k_2 f_o / s_2 (1 - exp(-s_2 t)), cut at 13 V."""
-    sheet = TestSheet('old', 'old', {'type': 'circuit', 'bias_pot': 0.7, 'start': 'zero'}, {})
+    sheet = CaseSheet('old', 'old', {'type': 'circuit', 'bias_pot': 0.7, 'start': 'zero'}, {})
     times = np.linspace(0.0, 3.0, 601)
     history = simulate(reference_machine(), sheet, times)
     free = -3.502 * -10.74 / 1.093 * (1.0 - np.exp(-1.093 * times))
@@ -171,7 +171,7 @@ def test_share_circuit_fills_exponentially() -> None:
 
 
 def test_result_does_not_hang_on_the_tolerance() -> None:
-    sheet = TestSheet('new', 'new', {'type': 'circuit', 'bias_pot': 0.8, 'start': 'steady'},
+    sheet = CaseSheet('new', 'new', {'type': 'circuit', 'bias_pot': 0.8, 'start': 'steady'},
                       {'type': 'triangle', 'amplitude_deg_s': 0.685, 'period_s': 5.0})
     times = np.linspace(0.0, 15.0, 1501)
     coarse, fine = (simulate(reference_machine('new', 'new', 0.8), sheet, times,

@@ -14,25 +14,25 @@
 r"""
 The motion of a position-controlled servo that carries a pendulum.
 
-The servo is a DC motor behind a gearbox, all seen from its output shaft, with a position gain
-that sets the duty of its bridge:
+The servo is a DC motor behind a gearbox, seen from its output shaft. A position gain sets the
+duty of its bridge:
 
     duty = clip(k_p g (goal - position), -1, 1),    i = (duty V - k_t w) / R,
-    (m l^2 + J) dw/dt = k_t i - m g l sin(q) - friction,
+    (m l^2 + J) dw/dt = k_t i - m g l sin(q) - friction.
 
-where friction stops the shaft if it can. The friction budget with its load-dependent terms is
-that of M. Duclusaud, G. Passault, V. Padois, O. Ly, 'Extended friction models for the physics
-simulation of servo actuators' (2024); every term of it, and every other one here, is nought by
-default. Positive torques and rates are those of a growing position.
+Friction holds the shaft wherever it can. Its load-dependent terms are those of M. Duclusaud,
+G. Passault, V. Padois, O. Ly, 'Extended friction models for the physics simulation of servo
+actuators' (2024). These and all other effects are zero by default. Torques and rates are positive
+when the position grows.
 
-The kernel is whole in this file, apart from the drive's physics: numba's own cache looks at the
-file of a kernel, and so neither needs a digest nor disturbs that of the drive.
+All compiled code is in this file except `inner` and `compiled`. numba's own cache checks the file
+of a kernel, so this kernel needs no digest and does not invalidate the cache of the drive.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Annotated, Final, get_type_hints, NamedTuple
 
 from antenna_drive.physics.compiling import compiled, inner
 import numpy as np
@@ -40,64 +40,77 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# The servo's numbers in the order in which the kernel takes them, with their units; what each
-# is stands in machines/servo/catalogue.py. Nought means absent, but for the first three.
+
+class Servo(NamedTuple):
+    """
+    The servo's parameters in the order of the kernel, with their units.
+
+    catalogue.py explains them. Zero switches an effect off; the first three must be above zero.
+    """
+
+    torque_constant: Annotated[float, 'N m/A']
+    resistance: Annotated[float, 'ohm']
+    armature_inertia: Annotated[float, 'kg m^2']
+    coulomb_torque: Annotated[float, 'N m']
+    viscous_friction: Annotated[float, 'N m s/rad']
+    stribeck_torque: Annotated[float, 'N m']
+    stribeck_rate: Annotated[float, 'rad/s']
+    stribeck_shape: Annotated[float, '1']
+    load_friction_motor: Annotated[float, '1']
+    load_friction_external: Annotated[float, '1']
+    load_stribeck_motor: Annotated[float, '1']
+    load_stribeck_external: Annotated[float, '1']
+    load_quadratic_motor: Annotated[float, '1/(N m)']
+    load_quadratic_external: Annotated[float, '1/(N m)']
+    load_square: Annotated[float, '1/(N m)']
+    load_square_stribeck: Annotated[float, '1/(N m)']
+    ageing: Annotated[float, '1']
+    current_limit: Annotated[float, '1/A']
+    friction_asymmetry: Annotated[float, '1']
+    viscous_quadratic: Annotated[float, 'N m s^2/rad^2']
+    viscous_thinning: Annotated[float, 's/rad']
+    friction_temperature: Annotated[float, '1/K']
+    friction_cosine: Annotated[float, '1']
+    friction_sine: Annotated[float, '1']
+    friction_cycles: Annotated[float, '1/rev']
+    ripple_cosine: Annotated[float, 'N m']
+    ripple_sine: Annotated[float, 'N m']
+    ripple_cycles: Annotated[float, '1/rev']
+    backlash: Annotated[float, 'rad']
+    compliance: Annotated[float, 'rad/(N m)']
+    saturation: Annotated[float, '1/A']
+    winding_temperature: Annotated[float, '1/K']
+    coasting: Annotated[float, '1']
+    bridge_drop: Annotated[float, 'V']
+    braking: Annotated[float, '1']
+    supply_resistance: Annotated[float, 'ohm']
+    gain_error: Annotated[float, '1']
+    derivative_gain: Annotated[float, 's']
+    dead_band: Annotated[float, 'rad']
+    duty_limit: Annotated[float, '1']
+    goal_slowness: Annotated[float, 's/rad']
+    delay: Annotated[float, 's']
+    position_offset: Annotated[float, 'rad']
+    eccentricity_cosine: Annotated[float, 'rad']
+    eccentricity_sine: Annotated[float, 'rad']
+    load_moment: Annotated[float, '1']
+
+
 UNITS: Final[dict[str, str]] = {
-    'torque_constant': 'N m/A',
-    'resistance': 'ohm',
-    'armature_inertia': 'kg m^2',
-    'coulomb_torque': 'N m',
-    'viscous_friction': 'N m s/rad',
-    'stribeck_torque': 'N m',
-    'stribeck_rate': 'rad/s',
-    'stribeck_shape': '1',
-    'load_friction_motor': '1',
-    'load_friction_external': '1',
-    'load_stribeck_motor': '1',
-    'load_stribeck_external': '1',
-    'load_quadratic_motor': '1/(N m)',
-    'load_quadratic_external': '1/(N m)',
-    'load_square': '1/(N m)',
-    'load_square_stribeck': '1/(N m)',
-    'ageing': '1',
-    'current_limit': '1',
-    'friction_asymmetry': '1',
-    'viscous_quadratic': 'N m s^2/rad^2',
-    'viscous_thinning': 's/rad',
-    'friction_temperature': '1/K',
-    'friction_cosine': '1',
-    'friction_sine': '1',
-    'friction_cycles': '1/rev',
-    'ripple_cosine': 'N m',
-    'ripple_sine': 'N m',
-    'ripple_cycles': '1/rev',
-    'backlash': 'rad',
-    'compliance': 'rad/(N m)',
-    'saturation': '1/A',
-    'winding_temperature': '1/K',
-    'coasting': '1',
-    'bridge_drop': 'V',
-    'braking': '1',
-    'supply_resistance': 'ohm',
-    'gain_error': '1',
-    'derivative_gain': 's',
-    'dead_band': 'rad',
-    'duty_limit': '1',
-    'goal_slowness': 's/rad',
-    'delay': 's',
-    'position_offset': 'rad',
-    'eccentricity_cosine': 'rad',
-    'eccentricity_sine': 'rad',
-    'load_moment': '1',
-}
+    name: hint.__metadata__[0]
+    for name, hint in get_type_hints(Servo, include_extras=True).items()}
 ORDER: Final = tuple(UNITS)
 
 GRAVITY: Final = 9.80665
-# Temperature at which the numbers hold [degC].
+# Temperature at which the parameters hold [degC].
 REFERENCE_TEMPERATURE: Final = 25.0
-# The teeth are never stiffer than this [rad/(N m)], and damp so much of the critical.
+# The least compliance of the teeth [rad/(N m)] and their damping ratio.
 _LEAST_COMPLIANCE: Final = 0.004
 _CONTACT_DAMPING: Final = 0.3
+# Rates are kept within this, so that a wild candidate stays finite [rad/s].
+_RATE_LIMIT: Final = 200.0
+# Time scale on which friction at rest grows with the logarithm of time [s].
+_AGEING_TIME: Final = 0.02
 
 
 @compiled
@@ -105,15 +118,15 @@ def swing(values: FloatArray, mass: float, length: float, gain: float, supply: f
           time: FloatArray, goal: FloatArray, enabled: FloatArray, temperature: FloatArray,
           start: float, start_rate: float, step: float, out: FloatArray) -> None:
     """
-    Simulate a servo with a pendulum, free of any correction from what was measured.
+    Simulate a servo with a pendulum in open loop: nothing is corrected from measurements.
 
-    A leapfrog of the second order; friction is an impulse that stops the shaft where it can, so
-    that it sticks exactly.
+    The integrator is a leapfrog of second order. Friction is an impulse that can bring the shaft
+    to an exact stop.
 
     Parameters
     ----------
     values
-        the numbers of UNITS, in that order, shape (46,)
+        parameters in the order and units of UNITS, shape (46,)
     mass, length
         of the pendulum [kg], [m]
     gain
@@ -123,7 +136,7 @@ def swing(values: FloatArray, mass: float, length: float, gain: float, supply: f
     time
         of the samples, rising, shape (n,) [s]
     goal
-        position asked for from each sample to the next, shape (n,) [rad]
+        goal position from each sample to the next, shape (n,) [rad]
     enabled
         1 where the bridge drives, 0 where it is off, shape (n,)
     temperature
@@ -131,170 +144,62 @@ def swing(values: FloatArray, mass: float, length: float, gain: float, supply: f
     start, start_rate
         at the first sample [rad], [rad/s]
     step
-        of integration, at most [s]
+        largest integration step [s]
     out
-        position [rad], rate [rad/s], duty and current [A] at each sample, rate and current
-        as of the last step before it, shape (n, 4); written
+        position [rad], rate [rad/s], duty and current [A] at each sample, shape (n, 4); written.
+        Rate and current are those of the last step before the sample
 
     """
-    kt, resistance, armature, coulomb, viscous = (
-        values[0], values[1], values[2], values[3], values[4])
-    stribeck, stribeck_rate, stribeck_shape = values[5], values[6], values[7]
-    motor_share, external_share = values[8], values[9]
-    motor_stribeck, external_stribeck = values[10], values[11]
-    motor_square, external_square = values[12], values[13]
-    square, square_stribeck, ageing, current_limit = values[14], values[15], values[16], values[17]
-    asymmetry, windage, thinning, warmth = values[18], values[19], values[20], values[21]
-    friction_cosine, friction_sine, friction_cycles = values[22], values[23], values[24]
-    ripple_cosine, ripple_sine, ripple_cycles = values[25], values[26], values[27]
-    backlash, compliance = values[28], values[29]
-    saturation, winding, coasting, drop, braking = (
-        values[30], values[31], values[32], values[33], values[34])
-    source = values[35]
-    gain_error, derivative, dead_band, duty_limit, slowness, delay = (
-        values[36], values[37], values[38], values[39], values[40], values[41])
-    offset, eccentric_cosine, eccentric_sine, moment = (
-        values[42], values[43], values[44], values[45])
-    stuck = 0.0
-
-    weight = mass * GRAVITY * length * (1.0 + moment)
+    servo = _servo(values)
+    armature = servo.armature_inertia
+    weight = mass * GRAVITY * length * (1.0 + servo.load_moment)
     load_inertia = mass * length * length
-    elastic = backlash > 0.0 or compliance > 0.0
-    stiffness = 1.0 / max(compliance, _LEAST_COMPLIANCE)
+    elastic = servo.backlash > 0.0 or servo.compliance > 0.0
+    stiffness = 1.0 / max(servo.compliance, _LEAST_COMPLIANCE)
     contact = 2.0 * _CONTACT_DAMPING * math.sqrt(
         stiffness * load_inertia * armature / (load_inertia + armature))
     inertia = armature if elastic else armature + load_inertia
-    has_stribeck = (stribeck != 0.0 or motor_stribeck != 0.0 or external_stribeck != 0.0
-                    or motor_square != 0.0 or external_square != 0.0
-                    or square_stribeck != 0.0)
-    law, limit = gain * (1.0 + gain_error), 1.0 - duty_limit
 
     n = time.size
     q, w = start, start_rate            # of the output shaft
     qm, wm = start, start_rate          # of the motor, seen from the output shaft
-    t = time[0]
-    asked = goal[0]
-    k_goal, k_on = 0, 0                 # the samples whose goal and bridge state are in force
-    duty, current = 0.0, 0.0
+    t, asked = time[0], goal[0]
+    held = 0                            # the sample whose goal and bridge state are in force
+    current, stuck = 0.0, 0.0
     first = True
     for k in range(n):
         if k > 0:
+            warming = temperature[k - 1] - REFERENCE_TEMPERATURE
             span = time[k] - t
             count = max(1, int(math.ceil(span / step - 1e-9)))
             if elastic:
                 count *= 2  # the teeth are stiff
             h = span / count
             for _ in range(count):
-                # this kick acts from half a step ago to half a step ahead; a change of the goal
-                # within that time counts with its part of it
-                begin, end = t - 0.5 * h - delay, t + 0.5 * h - delay
-                while k_goal + 1 < n and time[k_goal + 1] <= begin:
-                    k_goal += 1
-                wanted = goal[k_goal]
-                if k_goal + 1 < n and time[k_goal + 1] < end:
-                    part = (end - time[k_goal + 1]) / h
-                    wanted += part * (goal[k_goal + 1] - wanted)
-                while k_on + 1 < n and time[k_on + 1] <= begin:
-                    k_on += 1
-                on = enabled[k_on]
-                if k_on + 1 < n and time[k_on + 1] < end:
-                    on += (end - time[k_on + 1]) / h * (enabled[k_on + 1] - on)
-                if slowness > 0.0:
-                    most = h / slowness
-                    asked += min(max(wanted - asked, -most), most)
-                else:
-                    asked = wanted
-
-                # the rates are half a step behind: bring the first there
-                half = 0.5 * h if first else h
-                first = False
-
-                duty = _duty(asked, _sensed(q, eccentric_cosine, eccentric_sine), w, law,
-                             derivative, dead_band, limit)
-                warm = temperature[k - 1] - REFERENCE_TEMPERATURE
-                ohms = resistance * max(1.0 + winding * warm, 0.2)
+                # the torques act on the rates from half a step ago to half a step ahead
+                begin, end = t - 0.5 * h - servo.delay, t + 0.5 * h - servo.delay
+                while held + 1 < n and time[held + 1] <= begin:
+                    held += 1
+                asked = _slewed(asked, _mean_held(goal, time, held, end, h), h, servo)
+                on = _mean_held(enabled, time, held, end, h)
+                duty = _duty(asked, _sensed(q, servo), w, gain, servo)
                 if not elastic:
                     qm, wm = q, w
-                size = abs(duty)
-                volts = supply
-                if source > 0.0:
-                    # the battery feels the motor's current for the duty's part of the time
-                    volts = ((supply + source * duty * kt * wm / ohms)
-                             / (1.0 + source * duty * duty / ohms))
-                emf_part = 1.0 - coasting * (1.0 - size)
-                driven = duty * volts
-                if drop > 0.0:
-                    driven = (max(driven - drop, 0.0) if driven > 0.0
-                              else min(driven + drop, 0.0))
-                current = on * (driven - emf_part * kt * wm) / ohms
-                if current_limit > 0.0:
-                    current = min(max(current, -1.0 / current_limit), 1.0 / current_limit)
-                torque = kt * current
-                if saturation != 0.0:
-                    torque /= 1.0 + saturation * abs(current)
-                torque -= (1.0 - on) * braking * kt * kt / ohms * wm
-                # how fast the motor's torque falls with its rate
-                damping = (on * emf_part + (1.0 - on) * braking) * kt * kt / ohms
-                gravity = -weight * math.sin(q + offset)
-                if ripple_cosine != 0.0 or ripple_sine != 0.0:
-                    phase = ripple_cycles * qm
-                    torque += ripple_cosine * math.cos(phase) + ripple_sine * math.sin(phase)
-
+                current, torque, damping = _motor(duty, on, supply, qm, wm, warming, servo)
+                gravity = -weight * math.sin(q + servo.position_offset)
                 external = gravity
                 if elastic:
-                    twist = qm - q
-                    play = 0.5 * backlash
-                    through = 0.0
-                    if twist > play:
-                        through = max(stiffness * (twist - play) + contact * (wm - w), 0.0)
-                    elif twist < -play:
-                        through = min(stiffness * (twist + play) + contact * (wm - w), 0.0)
-                    external = -through
-
-                level = coulomb
-                if asymmetry != 0.0:
-                    level *= 1.0 + (asymmetry if wm >= 0.0 else -asymmetry)
-                mesh = 1.0
-                if friction_cosine != 0.0 or friction_sine != 0.0:
-                    # it is what presses the teeth together that rubs more here than there
-                    phase = friction_cycles * qm
-                    mesh += friction_cosine * math.cos(phase) + friction_sine * math.sin(phase)
-                level += abs(external * external_share - torque * motor_share)
-                level += square * torque * torque
-                if has_stribeck:
-                    extra = stribeck + abs(external * external_stribeck - torque * motor_stribeck)
-                    extra += square_stribeck * torque * torque
-                    if external * torque < 0.0:
-                        if abs(external) < abs(torque):
-                            extra += external_square * external * external
-                        elif abs(external) > abs(torque):
-                            extra += motor_square * torque * torque
-                    level += extra * math.exp(-(abs(wm) / stribeck_rate) ** stribeck_shape)
-                level *= max(mesh, 0.0)
-                drag = viscous
-                if thinning != 0.0:
-                    drag /= 1.0 + thinning * abs(wm)
-                drag += windage * abs(wm)
-                if warmth != 0.0:
-                    factor = max(1.0 + warmth * warm, 0.0)
-                    level *= factor
-                    drag *= factor
-                level = max(level, 0.0)
-                if ageing > 0.0 and stuck > 0.0:
-                    level *= 1.0 + ageing * math.log(1.0 + stuck / 0.02)
-
-                # damping is taken in the middle of the step, friction as what stops the shaft
-                total = damping + drag
-                free = (wm + half * (torque + damping * wm + external
-                                     - 0.5 * total * wm) / inertia)
-                stopping = half * level / inertia
-                free = max(free - stopping, 0.0) if free > 0.0 else min(free + stopping, 0.0)
-                wm = free / (1.0 + 0.5 * half * total / inertia)
-                wm = min(max(wm, -200.0), 200.0)
+                    external = -_tooth_torque(qm - q, wm - w, 0.5 * servo.backlash, stiffness,
+                                              contact)
+                level, drag = _friction(torque, external, qm, wm, warming, stuck, servo)
+                # after the first step the rates are half a step behind
+                kick = 0.5 * h if first else h
+                first = False
+                wm = _kicked(wm, kick, torque + damping * wm + external, level, damping + drag,
+                             inertia)
                 stuck = stuck + h if wm == 0.0 else 0.0
                 if elastic:
-                    w += half * (gravity - external) / load_inertia
-                    w = min(max(w, -200.0), 200.0)
+                    w = _limited(w + kick * (gravity - external) / load_inertia)
                     q += h * w
                     qm += h * wm
                 else:
@@ -302,31 +207,188 @@ def swing(values: FloatArray, mass: float, length: float, gain: float, supply: f
                     q += h * w
                 t += h
             t = time[k]
-        # the goal of this sample is in force when the position is read
-        k_now = k_goal
-        while k_now + 1 < n and time[k_now + 1] <= time[k] - delay + 1e-9:
-            k_now += 1
-        now = asked if slowness > 0.0 else goal[k_now]
-        sensed = _sensed(q, eccentric_cosine, eccentric_sine)
+        # the position is read after this sample's goal has come into force
+        now = held
+        while now + 1 < n and time[now + 1] <= time[k] - servo.delay + 1e-9:
+            now += 1
+        latest = asked if servo.goal_slowness > 0.0 else goal[now]
+        sensed = _sensed(q, servo)
         out[k, 0] = sensed
         out[k, 1] = w
-        out[k, 2] = enabled[k] * _duty(now, sensed, w, law, derivative, dead_band, limit)
+        out[k, 2] = enabled[k] * _duty(latest, sensed, w, gain, servo)
         out[k, 3] = current
 
 
 @inner
-def _sensed(q: float, cosine: float, sine: float) -> float:
-    """Return what an encoder beside the axis reads [rad]."""
+def _servo(v: FloatArray) -> Servo:
+    # written out: a tuple that numba fills in a loop makes the kernel slower
+    return Servo(
+        v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8], v[9], v[10], v[11], v[12],
+        v[13], v[14], v[15], v[16], v[17], v[18], v[19], v[20], v[21], v[22], v[23],
+        v[24], v[25], v[26], v[27], v[28], v[29], v[30], v[31], v[32], v[33], v[34],
+        v[35], v[36], v[37], v[38], v[39], v[40], v[41], v[42], v[43], v[44], v[45])
+
+
+@inner
+def _mean_held(values: FloatArray, time: FloatArray, k: int, end: float, h: float) -> float:
+    """Return the mean of held values over the step h that ends at `end` and starts in sample k."""
+    value = values[k]
+    if k + 1 < time.size and time[k + 1] < end:
+        value += (end - time[k + 1]) / h * (values[k + 1] - value)
+    return value
+
+
+@inner
+def _slewed(asked: float, wanted: float, h: float, servo: Servo) -> float:
+    """Return the goal that the firmware asks for after a step of h [rad]."""
+    if servo.goal_slowness > 0.0:
+        most = h / servo.goal_slowness
+        return asked + min(max(wanted - asked, -most), most)
+    return wanted
+
+
+@inner
+def _sensed(q: float, servo: Servo) -> float:
+    """Return the reading of an encoder that is mounted off the axis [rad]."""
+    cosine, sine = servo.eccentricity_cosine, servo.eccentricity_sine
     if cosine == 0.0 and sine == 0.0:
         return q
     return q + cosine * (math.cos(q) - 1.0) + sine * math.sin(q)
 
 
 @inner
-def _duty(asked: float, sensed: float, rate: float, law: float, derivative: float,
-          dead_band: float, limit: float) -> float:
+def _duty(asked: float, sensed: float, rate: float, gain: float, servo: Servo) -> float:
     """Return the duty that the firmware sets."""
-    error = asked - sensed
-    if dead_band > 0.0:
-        error = max(error - dead_band, 0.0) if error > 0.0 else min(error + dead_band, 0.0)
-    return min(max(law * (error - derivative * rate), -limit), limit)
+    error = _toward_zero(asked - sensed, servo.dead_band)
+    limit = 1.0 - servo.duty_limit
+    return min(max(gain * (1.0 + servo.gain_error) * (error - servo.derivative_gain * rate),
+                   -limit), limit)
+
+
+@inner
+def _motor(duty: float, on: float, supply: float, angle: float, rate: float, warming: float,
+           servo: Servo) -> tuple[float, float, float]:
+    """Return current [A], torque [N m] and how the torque falls with the rate [N m s/rad]."""
+    kt = servo.torque_constant
+    ohms = servo.resistance * max(1.0 + servo.winding_temperature * warming, 0.2)
+    source, volts = servo.supply_resistance, supply
+    if source > 0.0:
+        # the supply carries the motor's current for a share of the time equal to the duty
+        volts = (supply + source * duty * kt * rate / ohms) / (1.0 + source * duty * duty / ohms)
+    emf_part = 1.0 - servo.coasting * (1.0 - abs(duty))
+    driven = _toward_zero(duty * volts, servo.bridge_drop)
+    current = on * (driven - emf_part * kt * rate) / ohms
+    if servo.current_limit > 0.0:
+        most = 1.0 / servo.current_limit
+        current = min(max(current, -most), most)
+    torque = kt * current
+    if servo.saturation != 0.0:
+        torque /= 1.0 + servo.saturation * abs(current)
+    torque -= (1.0 - on) * servo.braking * kt * kt / ohms * rate
+    damping = (on * emf_part + (1.0 - on) * servo.braking) * kt * kt / ohms
+    if servo.ripple_cosine != 0.0 or servo.ripple_sine != 0.0:
+        torque += _wave(servo.ripple_cosine, servo.ripple_sine, servo.ripple_cycles, angle)
+    return current, torque, damping
+
+
+@inner
+def _tooth_torque(twist: float, rate: float, play: float, stiffness: float,
+                  contact: float) -> float:
+    """Return the torque through teeth that push but do not pull [N m]."""
+    if twist > play:
+        return max(stiffness * (twist - play) + contact * rate, 0.0)
+    if twist < -play:
+        return min(stiffness * (twist + play) + contact * rate, 0.0)
+    return 0.0
+
+
+@inner
+def _friction(torque: float, external: float, angle: float, rate: float, warming: float,
+              stuck: float, servo: Servo) -> tuple[float, float]:
+    """
+    Return the friction level [N m] and the viscous coefficient [N m s/rad].
+
+    Parameters
+    ----------
+    torque, external
+        of the motor and of the load on it [N m]
+    angle, rate
+        of the motor [rad], [rad/s]
+    warming
+        temperature above REFERENCE_TEMPERATURE [K]
+    stuck
+        time for which the shaft has been at rest [s]
+    servo
+        the parameters
+
+    """
+    level = servo.coulomb_torque
+    if servo.friction_asymmetry != 0.0:
+        level *= 1.0 + (servo.friction_asymmetry if rate >= 0.0 else -servo.friction_asymmetry)
+    level += abs(external * servo.load_friction_external - torque * servo.load_friction_motor)
+    level += servo.load_square * torque * torque
+    stribeck = _stribeck(torque, external, servo)
+    if stribeck != 0.0:
+        level += stribeck * math.exp(-(abs(rate) / servo.stribeck_rate) ** servo.stribeck_shape)
+    # the mesh varies with the angle, and with it the force between the teeth
+    if servo.friction_cosine != 0.0 or servo.friction_sine != 0.0:
+        mesh = _wave(servo.friction_cosine, servo.friction_sine, servo.friction_cycles, angle)
+        level *= max(1.0 + mesh, 0.0)
+    drag = servo.viscous_friction
+    if servo.viscous_thinning != 0.0:
+        drag /= 1.0 + servo.viscous_thinning * abs(rate)
+    drag += servo.viscous_quadratic * abs(rate)
+    if servo.friction_temperature != 0.0:
+        factor = max(1.0 + servo.friction_temperature * warming, 0.0)
+        level *= factor
+        drag *= factor
+    level = max(level, 0.0)
+    if servo.ageing > 0.0 and stuck > 0.0:
+        level *= 1.0 + servo.ageing * math.log(1.0 + stuck / _AGEING_TIME)
+    return level, drag
+
+
+@inner
+def _stribeck(torque: float, external: float, servo: Servo) -> float:
+    """Return by how much friction at rest exceeds friction in motion [N m]."""
+    if (servo.stribeck_torque == 0.0 and servo.load_stribeck_motor == 0.0
+            and servo.load_stribeck_external == 0.0 and servo.load_square_stribeck == 0.0
+            and servo.load_quadratic_motor == 0.0 and servo.load_quadratic_external == 0.0):
+        return 0.0
+    extra = servo.stribeck_torque + abs(external * servo.load_stribeck_external
+                                        - torque * servo.load_stribeck_motor)
+    extra += servo.load_square_stribeck * torque * torque
+    if external * torque < 0.0:
+        if abs(external) < abs(torque):
+            extra += servo.load_quadratic_external * external * external
+        elif abs(external) > abs(torque):
+            extra += servo.load_quadratic_motor * torque * torque
+    return extra
+
+
+@inner
+def _kicked(rate: float, h: float, torque: float, level: float, damping: float,
+            inertia: float) -> float:
+    """Return the rate after h: damping in the middle of the step, friction as an impulse."""
+    free = rate + h * (torque - 0.5 * damping * rate) / inertia
+    free = _toward_zero(free, h * level / inertia)
+    return _limited(free / (1.0 + 0.5 * h * damping / inertia))
+
+
+@inner
+def _wave(cosine: float, sine: float, cycles: float, angle: float) -> float:
+    """Return a wave of the angle."""
+    return cosine * math.cos(cycles * angle) + sine * math.sin(cycles * angle)
+
+
+@inner
+def _toward_zero(value: float, by: float) -> float:
+    """Return a value brought closer to zero, but not beyond."""
+    if by == 0.0:
+        return value
+    return max(value - by, 0.0) if value > 0.0 else min(value + by, 0.0)
+
+
+@inner
+def _limited(rate: float) -> float:
+    return min(max(rate, -_RATE_LIMIT), _RATE_LIMIT)
