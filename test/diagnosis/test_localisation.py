@@ -1,0 +1,123 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Where a gap lies, on a machine whose parts, signals and regimes are laid out beforehand."""
+
+from __future__ import annotations
+
+from antenna_drive.diagnosis import (
+    Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Hypothesis, LeastSquares,
+    Machine, Parameter, Point, Regimes, TimeScales,
+)
+from antenna_drive.diagnosis.localisation import of_effects, of_the_unknown
+from antenna_drive.diagnosis.verdict import Answer, LackOfFit
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+TIME: FloatArray = np.arange(3000, dtype=np.float64) * 0.01
+NOISE = 0.05
+HALF = TIME > 15.0
+
+
+def answered(course: FloatArray) -> FloatArray:
+    """Return the response of a lag of 0.2 s, exact for an input held between samples."""
+    pole = np.exp(-0.01 / 0.2)
+    return np.asarray(lfilter([0.0, 1.0 - pole], [1.0, -pole], course))
+
+
+class TwoLags(Machine):
+    """Two lags side by side, each seen by a sensor of its own; regimes are the halves."""
+
+    disturbance_inputs = (DisturbanceInput('force on the left', 'left'),
+                          DisturbanceInput('force on the right', 'right'))
+    time_scales = TimeScales(1.0, 5.0, 0.15, 1.5, 1.0)
+
+    def __init__(self, left: FloatArray, right: FloatArray) -> None:
+        clean = np.column_stack([answered(left), answered(right)])
+        measured = clean + NOISE * np.random.default_rng(7).normal(size=clean.shape)
+        number = Parameter('left.step.size', 'N', -5.0, 5.0, 1e-3)
+        super().__init__(
+            [Experiment('one', TIME, ('seen left', 'seen right'), ('m', 'm'), measured,
+                        np.full_like(measured, NOISE))],
+            [Parameter('zero', 'm', -0.01, 0.01, 1e-4, 0.005)],
+            [Effect('left.step', 'left', '', '', (Form('', (number,)),))])
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return both readings."""
+        step = answered(point.get('left.step.size', 0.0) * HALF.astype(np.float64))
+        return np.column_stack([step, 0.0 * TIME]) + point.get('zero', 0.0)
+
+    def simulate_disturbed(self, point: Point, place: DisturbanceInput,
+                           course: Course) -> list[FloatArray]:
+        """Return both readings with a force on one lag."""
+        readings = self.predict(point, 0)
+        readings[:, int(place.component == 'right')] += answered(course(TIME))
+        return [readings]
+
+    def regimes(self, experiment: int) -> Regimes:
+        """Return the half of the test."""
+        return Regimes(('first half', 'second half'), HALF.astype(np.int64))
+
+
+def smooth(seed: int) -> FloatArray:
+    random = np.random.default_rng(seed)
+    waves = np.sin(np.multiply.outer(TIME, random.uniform(1.0, 6.0, 6))
+                   + random.uniform(0.0, 6.3, 6))
+    return np.asarray(waves.sum(axis=1))
+
+
+def test_an_effect_lies_in_its_part_its_signal_and_its_regime() -> None:
+    problem = LeastSquares(TwoLags(2.0 * HALF.astype(np.float64), 0.0 * TIME))
+    effect = problem.machine.effects['left.step']
+    none = problem.fit(problem.start(problem.machine.nuisances, {}), 10)
+    number = effect.forms[0].parameters[0]
+    best = problem.fit(problem.start((*problem.machine.nuisances, number), {}), 10)
+    answers = [Answer(Hypothesis(('left.step',), effect.forms, best), 0.0, 0.9),
+               Answer(Hypothesis((), (), none), 9.0, 0.1)]
+    found = of_effects(problem, answers, none, best)
+    assert (found[0]['component'], found[0]['signal'], found[0]['regime']) == (
+        'left', 'seen left', 'second half')
+    assert found[0]['share'] == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize('side', ['left', 'right'])
+def test_an_unknown_force_lies_where_it_acts(side: str) -> None:
+    course = smooth(1)
+    machine = (TwoLags(course, 0.0 * TIME) if side == 'left' else TwoLags(0.0 * TIME, course))
+    problem = LeastSquares(machine)
+    none = problem.fit(problem.start(machine.nuisances, {}), 10)
+    found, places = of_the_unknown(problem, none, LackOfFit(9.0, 1.0))
+    assert places[0].name == f'force on the {side}'
+    assert places[0].explained > 0.9
+    assert found[0]['component'] == side and found[0]['signal'] == f'seen {side}'
+
+
+def test_what_is_too_fast_for_a_pulse_lies_in_its_reading() -> None:
+    machine = TwoLags(0.0 * TIME, 0.0 * TIME)
+    hum = 0.5 * np.sin(2.0 * np.pi * 37.0 * TIME)
+    machine.experiments[0].measured[:, 1] += hum
+    problem = LeastSquares(machine)
+    none = problem.fit(problem.start(machine.nuisances, {}), 10)
+    found, places = of_the_unknown(problem, none, LackOfFit(
+        0.0, 1.0, fast=50.0, loudest='seen right'))
+    assert places[0].evidence < 20.0
+    assert {item['component'] for item in found} == {'seen right'}
+
+
+def test_where_nothing_is_nothing_is_located() -> None:
+    machine = TwoLags(0.0 * TIME, 0.0 * TIME)
+    problem = LeastSquares(machine)
+    none = problem.fit(problem.start(machine.nuisances, {}), 10)
+    found, _ = of_the_unknown(problem, none, LackOfFit(0.0, 1.0))
+    assert found == []

@@ -1,0 +1,72 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Statistics of residuals whose answers are known: white noise, AR(1), a sine, a staircase."""
+
+from __future__ import annotations
+
+from antenna_drive.diagnosis import FloatArray
+from antenna_drive.diagnosis.residual_statistics import (
+    autocorrelation, dependence, dependences, fast_power, power, slow_excess,
+)
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+N = 200_000
+WHITE: FloatArray = np.random.default_rng(11).normal(size=N)
+
+
+def test_white_noise_has_power_one_and_nothing_slow() -> None:
+    assert power(WHITE) == pytest.approx(1.0, abs=0.01)
+    assert fast_power(WHITE) == pytest.approx(1.0, abs=0.01)
+    assert slow_excess(WHITE) == pytest.approx(0.0, abs=0.03)
+    assert autocorrelation(WHITE) < 0.01
+
+
+@pytest.mark.parametrize('phi', [0.3, 0.6, 0.9])
+def test_an_autoregressive_residual_is_as_slow_as_theory_says(phi: float) -> None:
+    """AR(1) of unit variance: half the squared step is 1 - phi, lag one correlates by phi."""
+    z = np.asarray(lfilter([np.sqrt(1.0 - phi ** 2)], [1.0, -phi], WHITE))
+    lags = np.arange(1, 10)
+    mean_of_ten = (1.0 + 2.0 * np.sum((1.0 - lags / 10.0) * phi ** lags)) / 10.0
+    assert fast_power(z) == pytest.approx(1.0 - phi, rel=0.02)
+    assert slow_excess(z) == pytest.approx(10.0 * mean_of_ten / (1.0 - phi) - 1.0, rel=0.04)
+    assert autocorrelation(z) == pytest.approx(phi, abs=0.01)
+
+
+def test_a_residual_that_follows_a_covariate_says_by_how_much() -> None:
+    """The share of a variance that a sign explains: a^2 / (a^2 + 1)."""
+    direction = np.sign(np.sin(np.arange(N) * 0.01))
+    for size in (0.5, 1.0, 3.0):
+        share = dependence(size * direction + WHITE, direction + 1e-6 * np.arange(N) / N)
+        assert share == pytest.approx(size ** 2 / (size ** 2 + 1.0), abs=0.01)
+    assert dependence(WHITE, direction) == 0.0
+    assert dependence(WHITE, np.ones(N)) == 0.0
+
+
+def test_dependences_are_listed_by_their_share() -> None:
+    rate, angle = np.sin(np.arange(4000) * 0.01), np.linspace(0.0, 1.0, 4000)
+    noise = np.random.default_rng(2).normal(size=(4000, 2))
+    noise[:, 0] += 3.0 * rate
+    noise[:, 1] += 2.0 * angle
+    found = dependences(('current', 'tach'), [{'rate': rate, 'angle': angle}], [noise])
+    assert [(item['signal'], item['depends_on']) for item in found[:2]] == [
+        ('current', 'rate'), ('tach', 'angle')]
+    assert found[0]['share'] == pytest.approx(4.5 / 5.5, abs=0.02)
+
+
+def test_too_short_a_residual_says_nothing() -> None:
+    assert slow_excess(np.ones(30)) == 0.0
+    assert autocorrelation(np.ones(30) + 1e-3 * WHITE[:30]) == 0.0
+    assert fast_power(np.ones(1)) == 0.0 and power(np.full(5, np.nan)) == 0.0
