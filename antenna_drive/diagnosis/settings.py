@@ -212,7 +212,7 @@ class LackOfFitSettings:
 class LocalisationSettings:
     """Where the gap lies, and where an unknown input acts."""
 
-    outlier: float = _setting(
+    downweighted: float = _setting(
         6.0, 'residual level', 'residual beyond which a sample loses weight')
     caution: float = _setting(
         0.02, '1', 'share of the log evidence that counts, because residuals are not white',

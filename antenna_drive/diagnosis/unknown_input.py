@@ -77,9 +77,9 @@ def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
     scales = machine.time_scales
     residual = problem.residuals(here)
     level = max(problem.noise_level(residual), 1e-9)
-    outlier = problem.settings.localisation.outlier
+    bound = problem.settings.localisation.downweighted * level
     weight = np.where(problem.valid, np.minimum(
-        1.0, outlier * level / np.maximum(np.abs(residual), 1e-12)), 0.0) / level ** 2
+        1.0, bound / np.maximum(np.abs(residual), 1e-12)), 0.0) / level ** 2
     nuisances = problem.jacobian(here, machine.nuisances, residual, central=False).astype(float)
     evidence = _Evidence(residual, weight, nuisances, prior_precision(machine.nuisances))
     found = []
