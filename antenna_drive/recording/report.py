@@ -19,7 +19,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from antenna_drive import __version__
-from antenna_drive.pages.builder import render
+from antenna_drive.pages import render
 from antenna_drive.pages.curves import Panel as PlottedPanel
 from antenna_drive.recording.figures import MotorStatistics, Statistics, statistics
 from antenna_drive.recording.panels import Panel, panels_of, real_amperes

@@ -31,7 +31,7 @@ from antenna_drive.diagnosis.page import contents
 from antenna_drive.errors import UserError
 from antenna_drive.machines.antenna.field_test import CHANNELS
 from antenna_drive.machines.antenna.machine import DriveModel
-from antenna_drive.pages.builder import render
+from antenna_drive.pages import render
 from antenna_drive.parameters import load
 from antenna_drive.recording.csv_format import write_csv
 from antenna_drive.recording.recording import Recording
