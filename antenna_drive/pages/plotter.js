@@ -92,7 +92,9 @@
     listen(plot, group);
     window.addEventListener('resize',
       () => plot.setSize({ width: element.clientWidth, height }));
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => plot.redraw());
+    for (const medium of ['(prefers-color-scheme: dark)', 'print']) {
+      matchMedia(medium).addEventListener('change', () => plot.redraw());
+    }
     return { plot, curves };
   }
 
