@@ -65,7 +65,7 @@ def _plotted(recording: Recording, panel: Panel, kappa: float | None) -> Plotted
 def _summary(recording: Recording) -> str:
     count, changes = sum(map(len, recording.channels.values())), len(recording.changes)
     return ' \u00b7 '.join((
-        f'{recording.start_ns / 1e9:g} s to {recording.end_ns / 1e9:g} s',
+        f'{recording.start_ns / 1e9:.12g} s to {recording.end_ns / 1e9:.12g} s',
         f'{len(recording.channels)} signals', f'{count} samples',
         f'{changes} live change{"s" * (changes != 1)}'))
 
