@@ -31,7 +31,7 @@ from antenna_drive.article.experiments import GAINS, LAGS, SAW_TOOTH
 from antenna_drive.article.measures import NEW_CIRCUIT, OLD_CIRCUIT, Results
 from antenna_drive.article.profile_measures import loaded_axis as loop_of_load
 from antenna_drive.article.static_profile import as_in_the_text, bias_voltage, NEW_GAIN
-from antenna_drive.pages.builder import render
+from antenna_drive.pages import render
 from antenna_drive.parameters.sets import changed, TorqueShare
 from antenna_drive.physics.backlash import dead_zone
 from antenna_drive.physics.friction import friction_torque

@@ -84,7 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
         write_json(diagnosis.result, arguments.json)
     if arguments.report:
         from antenna_drive.diagnosis.page import contents
-        from antenna_drive.pages.builder import render
+        from antenna_drive.pages import render
         with replaced(Path(arguments.report)) as stream:
             stream.write(render('verdict.html', **vars(contents(diagnosis))).encode())
     stream_out = sys.stderr if arguments.json == STANDARD_OUTPUT else sys.stdout

@@ -17,9 +17,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
-# Height of a block, in the unit of its place and width.
-HEIGHT = 26
 # The layout of a machine that gives none: so many blocks in a row, so wide, so far apart.
 _IN_A_ROW, _WIDTH, _GAP = 4, 170, 20
 
@@ -54,10 +53,12 @@ class Diagram:
     ----------
     blocks : in the order in which they are drawn
     lines : x and y of their two ends
+    height : of a block
     several : components that are no block but several, with the components of those blocks
 
     """
 
+    height: ClassVar[int] = 26
     blocks: tuple[Block, ...]
     lines: tuple[tuple[float, float, float, float], ...] = ()
     several: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -68,20 +69,15 @@ class Diagram:
         return cls(tuple(
             Block(component, component.replace('_', ' '),
                   _GAP + i % _IN_A_ROW * (_WIDTH + _GAP),
-                  _GAP + i // _IN_A_ROW * (HEIGHT + _GAP), _WIDTH)
+                  _GAP + i // _IN_A_ROW * (cls.height + _GAP), _WIDTH)
             for i, component in enumerate(dict.fromkeys(components))))
-
-    @property
-    def height(self) -> int:
-        """Return the height of a block."""
-        return HEIGHT
 
     @property
     def box(self) -> tuple[float, float, float, float]:
         """Return x, y, width and height of what holds all blocks, with a margin."""
         left, top = (min(b.x for b in self.blocks) - 2, min(b.y for b in self.blocks) - 2)
         return (left, top, max(b.x + b.width for b in self.blocks) + 2 - left,
-                max(b.y for b in self.blocks) + HEIGHT + 2 - top)
+                max(b.y for b in self.blocks) + self.height + 2 - top)
 
     def shares(self, suspicion: Mapping[str, float]) -> dict[str, float]:
         """Return the share of each component that has a block, from those of all components."""

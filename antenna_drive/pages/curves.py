@@ -43,17 +43,19 @@ def plotted(panels: Sequence[Panel],
     Parameters
     ----------
     panels
-        in the order in which they are drawn; samples that are not finite are left out
+        in the order in which they are drawn; what is not finite is left out, be it a sample, a
+        curve or a panel
     colours
         of curves by name; the others take theirs from COLOURS in turn
 
     """
-    return {'panels': [{
+    found = [{
         'group': group, 'title': title, 'unit': unit,
         'curves': [_packed(name, time[there], values[there], colours.get(name, colour))
                    for (name, time, values), colour in zip(curves, COLOURS * len(curves))
                    if (there := np.isfinite(values)).any()],
-    } for group, title, unit, curves in panels]}
+    } for group, title, unit, curves in panels]
+    return {'panels': [panel for panel in found if panel['curves']]}
 
 
 def kept(values: NDArray[np.float64], most: int = MOST_SAMPLES) -> tuple[NDArray[np.intp], int]:

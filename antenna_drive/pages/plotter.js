@@ -28,11 +28,13 @@
              values: of((i, share) => given.base + given.scale * share) };
   }
 
-  // numbers along an axis: as many digits as the step between them needs
+  // numbers along an axis: as many digits as the step between them needs, which are many for the
+  // time of a clock
   function numbers(plot, values, axis, space, step) {
     let digits = 0;
     while (digits < 9 && Math.abs(step * 10 ** digits % 1 - 0.5) < 0.499999) digits++;
-    return values.map(value => Math.abs(value) >= 1e6 || (value !== 0 && step < 1e-5)
+    const short = value => Math.abs(value) < 300 * step && value !== 0;
+    return values.map(value => short(value) && (Math.abs(value) >= 1e6 || step < 1e-5)
       ? value.toExponential(2) : value.toFixed(digits));
   }
 
@@ -63,11 +65,13 @@
     const axis = { stroke: colour('--faint'), font: '11px system-ui, sans-serif', values: numbers,
                    labelFont: '11px system-ui, sans-serif', ticks: { show: false },
                    grid: { stroke: colour('--line'), width: 1 } };
+    const spread = (plot, axis, low, high) => 45 + 7 * Math.max(0, Math.log10(Math.abs(high)));
     const height = HEIGHT + (isLast ? 18 : 0);
     const plot = new uPlot({
       width: element.clientWidth, height, padding: [8, RIGHT, 0, 0], legend: { show: false },
       scales: { x: { time: false }, y: { range: roomy } },
-      axes: [{ ...axis, size: 22, gap: 4, ...(isLast && { label: 'time [s]', labelSize: 18 }) },
+      axes: [{ ...axis, size: 22, gap: 4, space: spread,
+               ...(isLast && { label: 'time [s]', labelSize: 18 }) },
              { ...axis, size: LEFT, gap: 6, space: 26 }],
       series: [{}, ...curves.map(curve => ({ stroke: curve.colour, width: 1.4, spanGaps: true,
                                              points: { size: 4, fill: curve.colour } }))],
@@ -79,6 +83,7 @@
     plot.ctx.canvas.setAttribute('role', 'img');
     plot.ctx.canvas.setAttribute('aria-label',
       `${given.title}: ${curves.map(curve => curve.name).join(', ')}`);
+
     // beside each name its sample nearest to the cursor
     function tell(plot) {
       const left = plot.cursor.left, t = left < 0 ? null : plot.posToVal(left, 'x');
@@ -92,7 +97,9 @@
     listen(plot, group);
     window.addEventListener('resize',
       () => plot.setSize({ width: element.clientWidth, height }));
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => plot.redraw());
+    for (const medium of ['(prefers-color-scheme: dark)', 'print']) {
+      matchMedia(medium).addEventListener('change', () => plot.redraw());
+    }
     return { plot, curves };
   }
 
@@ -155,12 +162,17 @@
       group.show(group.view[0] + moved, group.view[1] + moved);
     });
     plot.over.addEventListener('pointerup', event => {
-      const x = share(event), span = [timeAt(Math.min(grip, x)), timeAt(Math.max(grip, x))];
-      const wanted = marked && span[1] > span[0];
-      grip = null;
-      mark(0, 0);
-      if (wanted) group.show(...span);
+      const ends = [grip, share(event)].map(timeAt).sort((a, b) => a - b);
+      const wanted = marked && grip !== null && ends[1] > ends[0];
+      release();
+      if (wanted) group.show(...ends);
     });
+    // a finger that scrolls the page lets go of the curve
+    plot.over.addEventListener('pointercancel', release);
+    function release() {
+      [grip, marked] = [null, false];
+      mark(0, 0);
+    }
   }
 
   const data = JSON.parse(document.getElementById('data').textContent).panels;

@@ -19,7 +19,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from antenna_drive import __version__
-from antenna_drive.pages.builder import render
+from antenna_drive.pages import render
 from antenna_drive.pages.curves import Panel as PlottedPanel
 from antenna_drive.recording.figures import MotorStatistics, Statistics, statistics
 from antenna_drive.recording.panels import Panel, panels_of, real_amperes
@@ -65,7 +65,7 @@ def _plotted(recording: Recording, panel: Panel, kappa: float | None) -> Plotted
 def _summary(recording: Recording) -> str:
     count, changes = sum(map(len, recording.channels.values())), len(recording.changes)
     return ' \u00b7 '.join((
-        f'{recording.start_ns / 1e9:g} s to {recording.end_ns / 1e9:g} s',
+        f'{recording.start_ns / 1e9:.12g} s to {recording.end_ns / 1e9:.12g} s',
         f'{len(recording.channels)} signals', f'{count} samples',
         f'{changes} live change{"s" * (changes != 1)}'))
 

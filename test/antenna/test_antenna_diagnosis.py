@@ -33,7 +33,7 @@ from antenna_drive.machines.antenna.field_test import CHANNELS
 from antenna_drive.machines.antenna.machine import AntennaMachine
 from antenna_drive.machines.antenna.planned_tests import BUILT_IN, confusability_of, planned
 from antenna_drive.machines.antenna.waves import Wave
-from antenna_drive.pages.builder import render
+from antenna_drive.pages import render
 from antenna_drive.parameters import load
 from antenna_drive.recording.csv_format import write_csv
 from antenna_drive.recording.recording import Recording

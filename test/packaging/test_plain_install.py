@@ -79,6 +79,16 @@ def test_config(prefix: Path) -> None:
                       for path in (ROOT / 'config').rglob('*')) != [])
 
 
+def test_pages_come_along(prefix: Path, tmp_path: Path) -> None:
+    """Templates, style and plotter are installed, and what fills them in."""
+    recording = tmp_path / 'field.csv'
+    recording.write_text('time_s,rate_command_rad_s\n0.0,0.0\n0.01,0.0\n')
+    done = run(prefix, 'antenna-drive', 'report', str(recording), '-o', str(tmp_path / 'a.html'))
+    assert (done.returncode, done.stderr) == (0, '')
+    page = (tmp_path / 'a.html').read_text()
+    assert 'uPlot' in page and '--paper' in page and 'field.csv' in page
+
+
 def test_everything_but_the_nodes_can_be_imported(prefix: Path) -> None:
     """Only the rooms of ROS 2 need ROS 2, and every other lack has its remedy."""
     done = run(prefix, 'python', '-c', IMPORT_EVERYTHING)

@@ -43,9 +43,9 @@ def test_packed_samples_are_the_samples(samples: list[tuple[int, float]]) -> Non
     time = np.cumsum([step for step, _ in samples])
     values = np.array([value for _, value in samples])
     there = np.isfinite(values)
-    curves = plotted([('', 'a', 'V', [('a/b', time, values)])])['panels'][0]['curves']
-    assert len(curves) == there.any()
-    for curve in curves:
+    panels = plotted([('', 'a', 'V', [('a/b', time, values)])])['panels']
+    assert len(panels) == there.any()
+    for curve in (curve for panel in panels for curve in panel['curves']):
         times, found = unpacked(curve)
         assert times == pytest.approx(time[there] / 1e9, abs=2e-9)
         spread = float(np.ptp(values[there]))

@@ -27,7 +27,7 @@ from antenna_drive.diagnosis.page import contents
 from antenna_drive.machines.antenna.advice import ADVICE
 from antenna_drive.machines.antenna.catalogue import catalogue
 from antenna_drive.machines.antenna.diagram import DIAGRAM
-from antenna_drive.pages.builder import render
+from antenna_drive.pages import render
 from chromium import EXECUTABLE, Page
 import numpy as np
 import pytest
