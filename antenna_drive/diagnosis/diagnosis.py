@@ -95,12 +95,18 @@ class Diagnosis:
                          f'explain {100.0 * place["explained"]:.0f} % of the gap')
         fraction = result['how_far']['explained_fraction']
         if fraction['value'] is not None:
-            low, high = fraction['ci95']
-            lines.append(f'  explains {100.0 * fraction["value"]:.0f} % of the gap '
-                         f'({100.0 * low:.0f} to {100.0 * high:.0f}), judged on '
+            lines.append(f'  explains {share_text(fraction)}, judged on '
                          f'{result["how_far"]["held_out"]}')
         lines += [f'  note: {note}' for note in result['notes']]
         return '\n'.join(lines)
+
+
+def share_text(fraction: Mapping[str, Any]) -> str:
+    """Return an explained fraction as people read it; an effect may make a gap wider, too."""
+    if fraction['value'] < 0.0:
+        return 'nothing of the gap: with the effect it is wider'
+    low, high = (100.0 * max(bound, 0.0) for bound in fraction['ci95'])
+    return f'{100.0 * fraction["value"]:.0f} % of the gap ({low:.0f} to {high:.0f} %)'
 
 
 def value_lines(parameters: Mapping[str, Any]) -> list[str]:

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
-from antenna_drive.diagnosis.diagnosis import Diagnosis, value_lines
+from antenna_drive.diagnosis.diagnosis import Diagnosis, share_text, value_lines
 from antenna_drive.diagnosis.diagram import Block, Diagram
 from antenna_drive.diagnosis.machine import Experiment, FloatArray
 import numpy as np
@@ -69,6 +69,7 @@ class Contents:
     Attributes
     ----------
     title, lead : the verdict in two words and in a sentence
+    explained : how much of the gap its effects explain; empty if it names none
     result : the JSON of docs/diagnosis.md, which holds the tables and notes
     diagram : of the machine
     blocks : its blocks, each with the probability that an effect sits there
@@ -81,6 +82,7 @@ class Contents:
 
     title: str
     lead: str
+    explained: str
     result: Mapping[str, Any]
     diagram: Diagram
     blocks: Sequence[tuple[Block, float]]
@@ -104,8 +106,10 @@ def contents(diagnosis: Diagnosis) -> Contents:
                      [effects[name].cause for name in entry['effects'] if name in effects],
                      value_lines(entry['parameters']))
               for entry in result['which'][:_SHOWN] if entry['probability'] >= _LEAST]
+    fraction = result['how_far']['explained_fraction']
+    explained = '' if fraction['value'] is None else share_text(fraction)
     return Contents(
-        title, lead, result, diagram,
+        title, lead, explained, result, diagram,
         [(block, min(shares.get(block.component, 0.0), 1.0)) for block in diagram.blocks],
         likely, _panels(diagnosis), _advice(diagnosis))
 

@@ -20,6 +20,7 @@ from collections.abc import Mapping
 from antenna_drive.diagnosis import (
     diagnose, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point,
 )
+from antenna_drive.diagnosis.diagnosis import share_text
 import numpy as np
 import pytest
 
@@ -96,3 +97,9 @@ def test_two_effects_at_once_are_both_named() -> None:
 def test_a_diagnosis_says_itself_in_one_line() -> None:
     said = repr(diagnose(Body({'heater.step.size': -0.3})))
     assert said.startswith('<Diagnosis: explained, heater.step 9') and len(said) < 80
+
+
+def test_an_effect_that_widens_the_gap_explains_nothing_of_it() -> None:
+    assert share_text({'value': -8453.94, 'ci95': [-9e5, -12.0]}) == (
+        'nothing of the gap: with the effect it is wider')
+    assert share_text({'value': 0.9, 'ci95': [-0.2, 0.99]}) == '90 % of the gap (0 to 99 %)'

@@ -105,7 +105,7 @@ def test_everything_is_said_and_nothing_is_taken_for_html(browser: Page, tmp_pat
     text = show(browser, tmp_path, FULL, advice=(
         (('friction',), 'Turn it by hand.'), (('ripple',), 'Hold one rate.'), ((), HOSTILE)))
     for words in ('Partly explained', '75.0 % motors.friction', f'torque = 0.25 {HOSTILE}',
-                  '90.0 % of the gap is explained (80.0 % to 95.0 %)', f'dial.gain + {HOSTILE}',
+                  'The effects explain 90 % of the gap (80 to 95 %).', f'dial.gain + {HOSTILE}',
                   'cannot tell apart: motors.friction, dial.gain', 'reversal 40 %',
                   f'{HOSTILE} dial 30 %', f'{HOSTILE} depends on rate (20 % of its residual)',
                   'Turn it by hand.', '3 s of computing', 'a bent needle',
