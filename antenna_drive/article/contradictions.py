@@ -270,8 +270,8 @@ def torque_unit(results: Results) -> Contradiction:
     return Contradiction(
         'kGm', "Section IV: the maximal torque of a motor is 308 'kGm'", {}, tuple(found),
         f'{_which(found)} At the greatest rate a motor would need {powers[0]:.3g} kW with '
-        f'kilogram-force metres and {powers[1]:.3g} kW with pound-inches; the motors of such a '
-        'drive have some kilowatts')
+        f'kilogram-force metres, both motors {2e-3 * powers[0]:.3g} MW; with pound-inches a motor '
+        f'would need {powers[1]:.3g} kW. The motors of such a drive have some kilowatts')
 
 
 def ampere(results: Results) -> Contradiction:
