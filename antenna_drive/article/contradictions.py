@@ -21,7 +21,7 @@ draws its conclusion from the figures obtained.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from antenna_drive.article import readings
@@ -31,7 +31,7 @@ from antenna_drive.article.experiments import (
 from antenna_drive.article.linear import bias_loop, growth, stability_limit
 from antenna_drive.article.measures import OLD_CIRCUIT, Results
 from antenna_drive.article.published import SIGNIFICANT_TIME
-from antenna_drive.emulator.run import Run, simulate
+from antenna_drive.emulator.run import simulate
 from antenna_drive.parameters.sets import changed
 import numpy as np
 
@@ -45,6 +45,7 @@ SHARE_OF_GREATEST_RATE = 0.85
 GREATEST_TORQUE, TORQUE_PER_AMPERE, AXIS_FRICTION = 308.0, 61.0, 9.1e5
 # Section VI: k_ctfr of the new filter, the limit of k_ctfr, and the bias of Fig. 21 [percent].
 NEW_FILTER_GAIN, STABILITY_LIMIT, BIAS_PERCENT = 48.67, 146.0, 22.0
+_POT = 'torque_share.circuit.bias_pot'
 # No motor of such a drive is larger.
 _LARGEST_MOTOR_KW = 100.0
 
@@ -89,15 +90,11 @@ class Contradiction:
     conclusion: str
 
 
-def _variant(results: Results, name: str, **settings: Any) -> Run:
-    """Run an experiment with other settings of the torque-share circuit."""
+def _saw_tooth_bias(results: Results, name: str, settings: dict[str, Any]) -> dict[str, float]:
+    """Read the bias of T3a or T3b with other settings."""
     experiment = experiments()[name]
     drive = experiment.applied_to(results.drives[experiment.circuit])
-    return simulate(changed(drive, {f'torque_share.circuit.{key}': value
-                                    for key, value in settings.items()}), experiment.duration)
-
-
-def _bias_range(run: Run) -> dict[str, float]:
+    run = simulate(changed(drive, settings), experiment.duration)
     found = readings.bias_range(run.time, run['torque_share/bias_voltage'], SAW_TOOTH['period'])
     return {'low_V': found.low_V, 'high_V': found.high_V,
             'time_at_zero_percent': 100.0 * found.zero_fraction}
@@ -178,11 +175,11 @@ def stability_limit_units(results: Results) -> Contradiction:
     """Compare the limit of 146 with k_ctfr as in Section VI and as in Table 1."""
     limit = stability_limit(results.drives[OLD_CIRCUIT], 1.0 / TAU_6_OLD)
     last = GAINS[-1]
-    found = tuple(Interpretation(words, {'limit': scale * limit, 'figure_21e': scale * gain},
-                                 abs(scale * limit - STABILITY_LIMIT) <= 3.0)
-                  for words, scale, gain in (("as Table 1's k'", 1.0, last / TAU_6_OLD),
-                                             ("as Section VI's k_ctfr", TAU_6_OLD,
-                                              last / TAU_6_OLD)))
+    found = tuple(Interpretation(words, {'limit': found, 'figure_21e': gain},
+                                 abs(found - STABILITY_LIMIT) <= 3.0)
+                  for words, found, gain in (
+                      ("as Table 1's k'", limit, last / TAU_6_OLD),
+                      ("as Section VI's k_ctfr", limit * TAU_6_OLD, last)))
     side = 'below' if last / TAU_6_OLD < limit else 'above'
     return Contradiction(
         'stability_limit', f'Section VI: k_ctfr > 146 is unstable; Fig. 21(e) has k_ctfr {last:g}',
@@ -197,7 +194,7 @@ def gain_k_2(results: Results) -> Contradiction:
     published = {'low_V': 0.0, 'high_V': 10.4}
     found = []
     for gain, source in ((2.6, 'text and Eq. (14)'), (2.8, 'Table 1')):
-        gives = _bias_range(_variant(results, 'T3a', g_4=gain))
+        gives = _saw_tooth_bias(results, 'T3a', {'torque_share.circuit.g_4': gain})
         found.append(Interpretation(f'{gain:g}, {source}', gives,
                                     gives['low_V'] == 0.0
                                     and gives['time_at_zero_percent'] >= SIGNIFICANT_TIME))
@@ -216,14 +213,13 @@ def bias_pot(results: Results) -> Contradiction:
     most = results.drives[OLD_CIRCUIT].torque_share.circuit.saturation_high
     found = []
     for pot, source in ((0.7, 'Fig. 15'), (0.8, 'Eq. (9)'), (0.892, 'what 11.6 V of 13 V needs')):
-        old = _bias_range(_variant(results, 'T3a', bias_pot=pot))
-        new = _bias_range(_variant(results, 'T3b', bias_pot=pot))
+        old, new = (_saw_tooth_bias(results, name, {_POT: pot}) for name in ('T3a', 'T3b'))
         gives = {'T3a_high_V': old['high_V'], 'T3b_low_V': new['low_V'],
                  'T3b_high_V': new['high_V']}
         found.append(Interpretation(
             f'{pot:g}, {source}', gives, _close(gives, published, dict.fromkeys(published, 0.2))))
-    used = ' and '.join(f'{experiments()[name].settings["torque_share.circuit.bias_pot"]:g} in '
-                        f'{name}' for name in ('T3a', 'T3b'))
+    used = ' and '.join(f'{experiments()[name].settings[_POT]:g} in {name}'
+                        for name in ('T3a', 'T3b'))
     return Contradiction(
         'k_p', 'Eq. (9): k_p = 0.8; Fig. 15: 0.7; Fig. 19: 10.4 V (analysis), 11.2 V (field); '
         'Fig. 20: 11.6 V', published, tuple(found),
@@ -238,8 +234,8 @@ def fade_out_voltage(results: Results) -> Contradiction:
     own = results.drives[OLD_CIRCUIT].torque_share.circuit.fade_out_voltage
     for volts, source in ((-9.0, 'as implemented at DSS 13'), (-11.0, 'Fig. 15(a)'),
                           (own, 'of this configuration')):
-        old = _bias_range(_variant(results, 'T3a', fade_out_voltage=volts))
-        new = _bias_range(_variant(results, 'T3b', fade_out_voltage=volts))
+        changes = {'torque_share.circuit.fade_out_voltage': volts}
+        old, new = (_saw_tooth_bias(results, name, changes) for name in ('T3a', 'T3b'))
         gives = {'T3a_time_at_zero_percent': old['time_at_zero_percent'],
                  'T3b_low_V': new['low_V'], 'T3b_high_V': new['high_V']}
         found.append(Interpretation(f'{volts:g} V, {source}', gives,
@@ -270,8 +266,8 @@ def torque_unit(results: Results) -> Contradiction:
     return Contradiction(
         'kGm', "Section IV: the maximal torque of a motor is 308 'kGm'", {}, tuple(found),
         f'{_which(found)} At the greatest rate a motor would need {powers[0]:.3g} kW with '
-        f'kilogram-force metres and {powers[1]:.3g} kW with pound-inches; the motors of such a '
-        'drive have some kilowatts')
+        f'kilogram-force metres, both motors {2e-3 * powers[0]:.3g} MW; with pound-inches a motor '
+        f'would need {powers[1]:.3g} kW. The motors of such a drive have some kilowatts')
 
 
 def ampere(results: Results) -> Contradiction:
@@ -331,13 +327,9 @@ def saw_tooth(results: Results) -> Contradiction:
     """Compare a saw-tooth that rises and falls with one that jumps, Fig. 18."""
     published = {'low_V': 7.2, 'high_V': 11.6}
     found = []
-    experiment = experiments()['T3b']
     for words, waveform in (('symmetric, from zero, rising', 'saw_tooth'),
                             ('with a jump', 'saw_tooth_jump')):
-        variant = replace(experiment, settings={**experiment.settings,
-                                                'test_signal.rate.waveform': waveform})
-        drive = variant.applied_to(results.drives[variant.circuit])
-        gives = _bias_range(simulate(drive, variant.duration))
+        gives = _saw_tooth_bias(results, 'T3b', {'test_signal.rate.waveform': waveform})
         found.append(Interpretation(words, gives, _close(gives, published,
                                                          {'low_V': 0.2, 'high_V': 0.2})))
     lows = [item.gives['low_V'] for item in found]

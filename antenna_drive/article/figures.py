@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Callable, Sequence
+from functools import partial
 import io
 import math
 from typing import Any
@@ -112,16 +113,6 @@ def _loaded(results: Results, circuit: str) -> Figure:
     axes[0, 0].legend(ncols=2, loc='upper left')
     axes[-1, 0].set_xlabel('Axial torque, percent')
     return figure
-
-
-def torque_existing(results: Results) -> Figure:
-    """Fig. 2: motor torque against axial torque, existing circuit."""
-    return _loaded(results, OLD_CIRCUIT)
-
-
-def torque_modified(results: Results) -> Figure:
-    """Fig. 17: motor torque against axial torque, modified circuit."""
-    return _loaded(results, NEW_CIRCUIT)
 
 
 def _square_wave(results: Results, name: str, signals: Sequence[tuple[str, str, str]],
@@ -231,16 +222,6 @@ def _bias(results: Results, name: str, low: float | None, high: float) -> Figure
     return figure
 
 
-def bias_old(results: Results) -> Figure:
-    """Fig. 19: bias voltage under the saw-tooth, old circuit."""
-    return _bias(results, 'T3a', None, 10.4)
-
-
-def bias_new(results: Results) -> Figure:
-    """Fig. 20: bias voltage under the saw-tooth, new circuit."""
-    return _bias(results, 'T3b', 7.2, 11.6)
-
-
 def _responses(results: Results, names: Sequence[tuple[str, str]], end: float) -> Figure:
     figure, axes = _new(len(names), 1.35 * len(names) + 0.5 if len(names) > 1 else 2.6,
                         sharex=True)
@@ -268,43 +249,36 @@ def lags(results: Results) -> Figure:
                                 for letter, lag in zip('abcde', LAGS)], 4.0)
 
 
-def chosen(results: Results) -> Figure:
-    """Fig. 23: torque bias with the new filter and the new circuit."""
-    return _responses(results, [('T4e', '')], 4.0)
-
-
-def _of(draw: Callable[[Results, str], Figure], name: str) -> Callable[[Results], Figure]:
-    return lambda results: draw(results, name)
-
-
 # Number, caption and drawing function.
 FIGURES: tuple[tuple[int, str, Callable[[Results], Figure]], ...] = (
     (1, 'The backlash function, Eq. (1), b = 1 deg, k = 20 N m/deg.', backlash),
     (2, 'Motor torque versus axial torque for a 10, 20 and 30 percent torque bias, existing '
         'circuit: the dynamic model while the load rises and falls, and Eq. (14) alone.',
-     torque_existing),
+     partial(_loaded, circuit=OLD_CIRCUIT)),
     (3, 'Friction torque versus relative velocity, Eq. (2).', friction),
-    (8, 'Tachometer rates for zero torque bias, simulated.', _of(_tachs, 'T1')),
-    (9, 'Motor currents for zero torque bias, simulated.', _of(_currents, 'T1')),
-    (10, 'Encoder readings for zero torque bias, simulated.', _of(_encoder, 'T1')),
-    (11, 'Tachometer rates for 15 percent torque bias, simulated.', _of(_tachs, 'T2')),
-    (12, 'Motor currents for 15 percent torque bias, simulated.', _of(_currents, 'T2')),
-    (13, 'Encoder readings for 15 percent torque bias, simulated.', _of(_encoder, 'T2')),
+    (8, 'Tachometer rates for zero torque bias, simulated.', partial(_tachs, name='T1')),
+    (9, 'Motor currents for zero torque bias, simulated.', partial(_currents, name='T1')),
+    (10, 'Encoder readings for zero torque bias, simulated.', partial(_encoder, name='T1')),
+    (11, 'Tachometer rates for 15 percent torque bias, simulated.', partial(_tachs, name='T2')),
+    (12, 'Motor currents for 15 percent torque bias, simulated.', partial(_currents, name='T2')),
+    (13, 'Encoder readings for 15 percent torque bias, simulated.', partial(_encoder, name='T2')),
     (15, 'Bias voltage versus current, Eq. (14): (a) fade-out voltages, (b) bias pots, (c) gains '
          'g_2, (d) gains k_2.', bias_fade_out),
     (16, 'Bias voltage versus current with the modified gains (solid) and the existing ones '
          '(dashed).', bias_slopes),
     (17, 'Motor torque versus axial torque for a 10, 20 and 30 percent torque bias, modified '
          'circuit: the dynamic model while the load rises and falls, and Eq. (14) alone.',
-     torque_modified),
+     partial(_loaded, circuit=NEW_CIRCUIT)),
     (18, 'The test signal.', saw_tooth),
     (19, 'Bias voltage under the test signal, old circuit. Grey: the period left out of the '
-         'figures; dotted: the greatest value of the analysis in the article.', bias_old),
+         'figures; dotted: the greatest value of the analysis in the article.',
+     partial(_bias, name='T3a', low=None, high=10.4)),
     (20, 'Bias voltage under the test signal, new circuit. Dotted: least and greatest value of '
-         'the analysis in the article.', bias_new),
+         'the analysis in the article.', partial(_bias, name='T3b', low=7.2, high=11.6)),
     (21, 'Counter-torque dynamics for tau_6 = 0.73 s and five gains.', gains),
     (22, 'Counter-torque dynamics for k_ctfr = 3.3 and five time constants.', lags),
-    (23, 'Counter-torque dynamics with the new filter and the new circuit.', chosen),
+    (23, 'Counter-torque dynamics with the new filter and the new circuit.',
+     partial(_responses, names=[('T4e', '')], end=4.0)),
 )
 
 

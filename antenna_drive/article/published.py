@@ -84,24 +84,26 @@ def _near(measure: str, number: float, tolerance: float, basis: str, note: str,
     return Claim(measure, says, NEAR, number, tolerance, basis, note)
 
 
-# A trend holds strictly: its greatest step the wrong way is below zero, and so at most this.
-_STRICTLY_BELOW_ZERO = -1e-9
+def _trend(measure: str, says: str, figure: str) -> Claim:
+    # a trend holds strictly: its greatest step the wrong way is below zero, so at most -1e-9
+    return Claim(measure, says, AT_MOST, -1e-9, 0.0, FITTED,
+                 f'Section VI, {figure}; obtained is the greatest step the wrong way')
+
+
 # How much calmer 'less chaotic' must be, and which share of the time is 'significant' [percent].
 TACH_CALMER, ENCODER_CALMER = 20.0, 30.0
 SIGNIFICANT_TIME = 10.0
 _CALM = 'less chaotic than without bias'
-_TREND = 'obtained is the greatest step the wrong way'
 
 CLAIMS = (
     _near('T1.tach_rate', 193.0, SHARE * 193.0, DERIVED, 'Section IV; mean of both tachometers '
           'over 1.5 to 3.0 s after each reversal, first period left out; the gear ratio is '
           '193/0.013'),
-    _near('T1.current_1', 1.0, SHARE, FITTED, 'Section IV, Fig. 9; window as for the rate'),
-    _near('T1.current_2', 1.0, SHARE, FITTED, 'Section IV, Fig. 9; window as for the rate'),
-    Claim('T2a.current_1', 'nonzero, opposite signs', AT_MOST, -0.1, 0.0, DERIVED,
-          'Section IV, Fig. 12; nonzero means 0.1 A or more; half of the commanded bias'),
-    Claim('T2a.current_2', 'nonzero, opposite signs', AT_LEAST, 0.1, 0.0, DERIVED,
-          'Section IV, Fig. 12; nonzero means 0.1 A or more; half of the commanded bias'),
+    *(_near(f'T1.current_{m}', 1.0, SHARE, FITTED, 'Section IV, Fig. 9; window as for the rate')
+      for m in (1, 2)),
+    *(Claim(f'T2a.current_{m}', 'nonzero, opposite signs', kind, number, 0.0, DERIVED,
+            'Section IV, Fig. 12; nonzero means 0.1 A or more; half of the commanded bias')
+      for m, kind, number in ((1, AT_MOST, -0.1), (2, AT_LEAST, 0.1))),
     _near('T2a.bias', 15.0, SHARE * 15.0, DERIVED, 'Section IV: a torque bias of 15 percent of '
           'the greatest torque, 46 kGm of 308; the command is computed from it'),
     Claim('T2b.tach', _CALM, AT_MOST, -TACH_CALMER, 0.0, FITTED,
@@ -130,18 +132,14 @@ CLAIMS = (
           'is computed from it'),
     _near('T4a.overshoot', 80.0, OVERSHOOT, FITTED, 'Sections VI and VII, Fig. 21(a)'),
     _near('T4a.settling', 2.4, SETTLING, FITTED, 'Section VII; to stay within 5 percent'),
-    Claim('T4b.overshoot_trend', 'overshoot falls with gain', AT_MOST, _STRICTLY_BELOW_ZERO, 0.0,
-          FITTED, f'Section VI, Fig. 21; {_TREND}'),
-    Claim('T4b.settling_trend', 'settling time falls with gain', AT_MOST, _STRICTLY_BELOW_ZERO,
-          0.0, FITTED, f'Section VI, Fig. 21; {_TREND}'),
+    _trend('T4b.overshoot_trend', 'overshoot falls with gain', 'Fig. 21'),
+    _trend('T4b.settling_trend', 'settling time falls with gain', 'Fig. 21'),
     _near('T4c.limit', 146.0, LIMIT, FITTED, "Section VI: unstable above, read as k' of Table 1; "
           'linear, static friction holds the rotors'),
     _near('T4c.simulated', 146.0, LIMIT, FITTED, 'the same limit from simulation: the sign of the '
           'growth of a small disturbance'),
-    Claim('T4d.overshoot_trend', 'overshoot falls with tau_6', AT_MOST, _STRICTLY_BELOW_ZERO, 0.0,
-          FITTED, f'Section VI, Fig. 22; {_TREND}'),
-    Claim('T4d.settling_trend', 'settling time falls, then rises', AT_MOST, _STRICTLY_BELOW_ZERO,
-          0.0, FITTED, f'Section VI, Fig. 22; {_TREND}'),
+    _trend('T4d.overshoot_trend', 'overshoot falls with tau_6', 'Fig. 22'),
+    _trend('T4d.settling_trend', 'settling time falls, then rises', 'Fig. 22'),
     _near('T4e.overshoot', 0.0, OVERSHOOT, FITTED, 'Sections VI and VII, Fig. 23'),
     _near('T4e.settling', 0.8, SETTLING, FITTED, 'Sections VI and VII, Fig. 23; to stay within 5 '
           'percent'),

@@ -103,12 +103,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    if arguments.cases < 1:
-        raise UserError(f'--cases: {arguments.cases} given, allowed is 1 or more')
-    if arguments.seed < 0:
-        raise UserError(f'--seed: {arguments.seed} given, allowed is 0 or more')
-    if arguments.jobs < 1:
-        raise UserError(f'--jobs: {arguments.jobs} given, allowed is 1 or more')
+    for name, least in (('cases', 1), ('seed', 0), ('jobs', 1)):
+        if getattr(arguments, name) < least:
+            raise UserError(f'--{name}: {getattr(arguments, name)} given, '
+                            f'allowed is {least} or more')
     if not 0.0 <= arguments.tolerance <= LARGEST_TOLERANCE:
         raise UserError(f'--tolerance: {arguments.tolerance} given, allowed is 0 to '
                         f'{LARGEST_TOLERANCE}')

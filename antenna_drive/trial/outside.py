@@ -20,7 +20,7 @@ Even at its smallest size each leaves a gap that the tolerances cannot explain.
 from __future__ import annotations
 
 from antenna_drive.trial.effect import Defect, Parameters, PHASE, Quantity
-from antenna_drive.trial.effects import Change
+from antenna_drive.trial.effects import Change, setting
 from antenna_drive.trial.machine import DROPOUTS, Machine
 import numpy as np
 
@@ -39,20 +39,6 @@ def _motor_values(**fields: str) -> Change:
     return change
 
 
-def _both_motors(**fields: str) -> Change:
-    def change(machine: Machine, values: Parameters) -> None:
-        for field, quantity in fields.items():
-            machine.motors[field] = values[quantity]
-    return change
-
-
-def _structure_values(**fields: str) -> Change:
-    def change(machine: Machine, values: Parameters) -> None:
-        for field, quantity in fields.items():
-            machine.structure[field] = values[quantity]
-    return change
-
-
 def _dropouts(machine: Machine, values: Parameters) -> None:
     random = np.random.default_rng(int(values['seed']))
     which = _which(values)
@@ -66,13 +52,6 @@ def _brake(machine: Machine, values: Parameters) -> None:
     machine.motors['brake'][which] = values['torque']
     machine.motors['brake_start'][which] = values['start']
     machine.motors['brake_end'][which] = values['start'] + values['length']
-
-
-def _current_ripple(machine: Machine, values: Parameters) -> None:
-    which = _which(values)
-    machine.motors['current_ripple'][which] = values['share']
-    machine.motors['ripple_cycles'][which] = values['cycles']
-    machine.motors['ripple_phase'][which] = values['phase']
 
 
 def _warm_motor(machine: Machine, values: Parameters) -> None:
@@ -98,29 +77,31 @@ OUTSIDE: dict[str, Defect] = {effect.key: effect for effect in (
            (Quantity('limit', 'A/s', 120.0, 8.0), MOTOR), _motor_values(slew_limit='limit')),
     Defect('outside.windup', 'the clamp does not stop the integrator, which also leaks',
            (Quantity('leak', '1/s', 0.1, 3.0), Quantity('share', '1', 0.7, 1.0, 'even')),
-           _both_motors(integrator_leak='leak', windup='share')),
+           setting('motors', integrator_leak='leak', windup='share')),
     Defect('outside.encoder_coupling', 'the encoder hangs on a spring',
            (Quantity('frequency', 'rad/s', 40.0, 6.0), Quantity('damping_ratio', '1', 0.02, 0.2)),
-           _structure_values(encoder_frequency='frequency', encoder_damping='damping_ratio')),
+           setting('structure', encoder_frequency='frequency', encoder_damping='damping_ratio')),
     Defect('outside.hardening_gear', 'gear stiffness grows with the square of its deflection',
-           (Quantity('hardening', '1/rad^2', 0.5, 30.0),), _both_motors(hardening='hardening')),
+           (Quantity('hardening', '1/rad^2', 0.5, 30.0),),
+           setting('motors', hardening='hardening')),
     Defect('outside.dahl_friction', 'part of the axis friction acts as a spring before it slides',
            (Quantity('travel', 'rad', 1.5e-5, 4e-4), Quantity('share', '1', 0.5, 0.9, 'even')),
-           _structure_values(dahl_travel='travel', dahl='share')),
+           setting('structure', dahl_travel='travel', dahl='share')),
     Defect('outside.unequal_bridges', 'gain of a power stage differs with the direction of '
            'the current, v (1 + error tanh(v / 0.3 A))',
            (Quantity('error', '1', 0.05, 0.3, turned='sign'), MOTOR),
            _motor_values(bridge_error='error')),
     Defect('outside.structural_friction', 'dry friction in the joints of the first mode',
            (Quantity('torque', 'N m', 4e3, 8e4), Quantity('rate', 'rad/s', 2e-5, 1e-4)),
-           _structure_values(mode_friction='torque', mode_friction_rate='rate')),
+           setting('structure', mode_friction='torque', mode_friction_rate='rate')),
     Defect('outside.current_ripple', 'torque constant ripples with the angle: '
            'the ripple grows with the current',
            (Quantity('share', '1', 0.05, 0.4), MOTOR, Quantity('cycles', '1/rev', 2, 24, 'whole'),
-            PHASE), _current_ripple),
+            PHASE), _motor_values(current_ripple='share', ripple_cycles='cycles',
+                                  ripple_phase='phase')),
     Defect('outside.warming_lubricant', 'axis friction falls exponentially with time',
            (Quantity('loss', '1', 0.1, 0.6), Quantity('time', 's', 5.0, 20.0)),
-           _structure_values(warming='loss', warming_time='time')),
+           setting('structure', warming='loss', warming_time='time')),
     Defect('outside.dragging_brake', "a motor's brake drags for some seconds",
            (Quantity('torque', 'N m', 0.5, 6.0), MOTOR, Quantity('start', 's', 3.0, 18.0),
             Quantity('length', 's', 3.0, 9.0)), _brake),
@@ -131,5 +112,5 @@ OUTSIDE: dict[str, Defect] = {effect.key: effect for effect in (
            (Quantity('amplitude', 'rad/s', 0.02, 0.6), MOTOR), _motor_values(hum='amplitude')),
     Defect('outside.shifting_ballast', 'a load shifts once: gravity jumps',
            (Quantity('torque', 'N m', 2e4, 2e5, turned='sign'), Quantity('at', 's', 5.0, 15.0)),
-           _structure_values(ballast='torque', ballast_at='at')),
+           setting('structure', ballast='torque', ballast_at='at')),
 )}

@@ -245,9 +245,9 @@ def test_the_ladders_simpler_models_are_parts_of_the_richer() -> None:
     for name, parents in servo_refit.PARENTS.items():
         for parent in parents:
             known = dict.fromkeys(servo_refit.LADDER[parent], 0.123)
-            begun = servo_refit.begun(servo_refit.LADDER[name], known)
-            # begun from a simpler model it is that model: what is new is absent
-            for number_name, value in begun.items():
+            values = servo_refit.initial_values(servo_refit.LADDER[name], known)
+            # started from a simpler model it is that model: what is new is absent
+            for number_name, value in values.items():
                 tied = number_name.replace('_motor', '').replace('_external', '')
                 if number_name in known or tied in known:
                     assert value == 0.123
@@ -274,7 +274,7 @@ def test_what_is_withheld_is_never_fitted() -> None:
     chosen = directions(tests)
     assert len(chosen) == 6 + 3
     for direction in chosen:
-        fitted, rest = direction.parted(tests)
+        fitted, rest = direction.split_tests(tests)
         key = {'gain': 'kp', 'trajectory': 'trajectory'}[direction.split]
         assert len(fitted) + len(rest) == len(tests)
         assert {getattr(t, key) for t in fitted} == set(direction.fitted)

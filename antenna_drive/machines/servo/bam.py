@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Recordings of a real servo drive, as the BAM project (Rhoban) logs them, in JSON.
+Recordings of a real servo drive in the JSON format of the BAM project (Rhoban).
 
-A position-controlled servo swings a pendulum: mass, length, gain, supply voltage and the name of
-the trajectory at the top, then one entry per sample with its own time stamp.
+A position-controlled servo swings a pendulum. A log has mass, length, gain, supply voltage and the
+name of the trajectory at the top, then one entry per sample with its own time stamp.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from antenna_drive.recording.plain import from_json, PlainDataError
 from antenna_drive.recording.recording import make_channel, nanoseconds, Recording, RecordingError
 import numpy as np
 
-# The log's key of each signal, and the signal's name and unit. The load is the servo's own
-# register, 16 bits in two's complement; torque_enable is 1 while the servo drives, 0 while free.
+# The log's key of each signal, its name and its unit. The load is a register of the servo, 16 bits
+# in two's complement; torque_enable is 1 while the servo drives and 0 while it is off.
 SIGNALS = {
     'goal_position': ('servo/goal_position', 'rad'),
     'position': ('servo/position', 'rad'),
@@ -45,7 +45,7 @@ NOTES = {'mass': (int, float), 'length': (int, float), 'kp': (int, float), 'vin'
 
 def read_bam(path: str | Path) -> Recording:
     """
-    Read one log of BAM.
+    Read one log of the BAM project.
 
     Returns
     -------
@@ -53,7 +53,7 @@ def read_bam(path: str | Path) -> Recording:
 
     Raises
     ------
-    RecordingError : the file cannot be read, is no such log, or an entry lacks a number; one
+    RecordingError : the file cannot be read, is not such a log, or an entry lacks a number; one
         line names the file and the entry
 
     """

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-What a position-controlled servo may have beyond a motor with Coulomb and viscous friction.
+The effects of a position-controlled servo beyond Coulomb and viscous friction.
 
-`NUMBERS` says of every number of the servo how large it may be and where a fit begins;
-`catalogue` says which of them make up an effect. All effects are absent in the model that a
-diagnosis starts from. One more takes a term in physics.py, a number and an effect here.
+`NUMBERS` gives the range of every parameter of the servo and the start of a fit; `catalogue`
+combines parameters to effects. A diagnosis starts with a model that has none of them. A new effect
+needs a term in physics.py, and a parameter and an effect here.
 """
 
 from __future__ import annotations
@@ -31,24 +31,24 @@ from antenna_drive.diagnosis import Effect, FloatArray, Form, Parameter
 from antenna_drive.machines.servo.physics import ORDER, UNITS
 import numpy as np
 
-# A number's name may end in '@N': a wave of so many cycles in a turn of the output shaft.
+# A parameter's name may end in '@N': a wave of N cycles per turn of the output shaft.
 CYCLES_MARK: Final = '@'
-# Eccentric wheels make a few cycles in a turn, the teeth of the last stage dozens.
+# Eccentric wheels cause a few cycles per turn, the teeth of the last stage dozens.
 CYCLES: Final = (1, 2, *range(8, 41, 2))
 
 
 @dataclass(frozen=True)
 class Number:
     """
-    How large a number of the servo may be.
+    The range of a parameter of the servo.
 
     Attributes
     ----------
     low, high : hard bounds
-    start : where a global fit begins
-    step : for difference quotients; of a logarithmic number, the relative one
-    logarithmic : True where only its order of magnitude is known beforehand
-    shape : True for a number that means nothing while its effect is absent
+    start : initial value of a global fit
+    step : of difference quotients; relative for a logarithmic parameter
+    logarithmic : True where only the order of magnitude is known beforehand
+    shape : True for a parameter without meaning while its effect is absent
 
     """
 
@@ -60,24 +60,24 @@ class Number:
     shape: bool = False
 
     def share(self, value: float) -> float:
-        """Return where a value lies between the bounds, 0 to 1."""
+        """Return the share of the range at a value, 0 to 1."""
         value = min(max(value, self.low), self.high)
         if self.logarithmic:
             return math.log(value / self.low) / math.log(self.high / self.low)
         return (value - self.low) / (self.high - self.low)
 
     def value(self, share: float) -> float:
-        """Return the value that lies at a share of the way between the bounds."""
+        """Return the value at a share of the range, 0 to 1."""
         share = min(max(share, 0.0), 1.0)
         if self.logarithmic:
             return self.low * (self.high / self.low) ** share
         return self.low + share * (self.high - self.low)
 
 
-# Nothing is known of a servo's motor and friction but that it is a servo.
+# Parameters of the initial model; none of them is known beforehand.
 BASE: Final = ('torque_constant', 'resistance', 'armature_inertia', 'coulomb_torque',
                'viscous_friction')
-# One number that stands for several: friction that does not ask who drives whom.
+# One parameter for several: friction that does not depend on whether motor or load drives.
 TIED: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({
     'load_friction': ('load_friction_motor', 'load_friction_external'),
     'load_stribeck': ('load_stribeck_motor', 'load_stribeck_external'),
@@ -133,24 +133,24 @@ NUMBERS: Final[Mapping[str, Number]] = MappingProxyType({
 
 
 def base_name(name: str) -> str:
-    """Return a number's name without the cycles of its wave."""
+    """Return a parameter's name without the cycles of its wave."""
     return name.partition(CYCLES_MARK)[0]
 
 
 def number(name: str) -> Number:
-    """Return what is known of a number; its name may have cycles."""
+    """Return the range of a parameter; its name may have cycles."""
     return NUMBERS[base_name(name)]
 
 
 def unit(name: str) -> str:
-    """Return a number's unit."""
+    """Return a parameter's unit."""
     name = base_name(name)
     return UNITS[TIED[name][0] if name in TIED else name]
 
 
 def vector(values: Mapping[str, float]) -> FloatArray:
     """
-    Return the numbers in the order of the physics, nought where none is given.
+    Return the parameters in the order of the physics, zero where none is given.
 
     Parameters
     ----------
@@ -159,12 +159,12 @@ def vector(values: Mapping[str, float]) -> FloatArray:
 
     Raises
     ------
-    KeyError : there is no such number
+    KeyError : there is no such parameter
 
     """
     row = np.zeros(len(ORDER))
     for name, rest in (('stribeck_rate', 1.0), ('stribeck_shape', 1.0)):
-        row[_INDEX[name]] = rest  # what they shape is absent, but they divide
+        row[_INDEX[name]] = rest  # divisors, which must not be zero
     for name, value in values.items():
         plain, _, cycles = name.partition(CYCLES_MARK)
         for target in TIED.get(plain, (plain,)):
@@ -178,7 +178,7 @@ _INDEX: Final = {name: i for i, name in enumerate(ORDER)}
 
 
 def parameter(name: str) -> Parameter:
-    """Return a number of an absent effect as a parameter: nought, or its shape's start."""
+    """Return a parameter of an absent effect, at zero or at the start of a shape."""
     item = number(name)
     return Parameter(name, unit(name), item.low, item.high, item.step,
                      start=item.start if item.shape else 0.0, is_shape=item.shape)
@@ -200,11 +200,11 @@ def catalogue(without: Iterable[str] = ()) -> dict[str, Effect]:
     Parameters
     ----------
     without
-        ids that are left out
+        ids of effects to leave out
 
     Raises
     ------
-    KeyError : there is no such effect to leave out
+    KeyError : there is no such effect
 
     """
     effects = {effect.id: effect for effect in _EFFECTS}
@@ -220,7 +220,7 @@ def _effect(name: str, cause: str, look: str, *forms: Form) -> Effect:
 _EFFECTS: Final = (
     _effect('motor.saturation',
             'at a large current the iron saturates or the brushes heat up: less torque per ampere',
-            'the servo stalls under a load that small signals say it would lift',
+            'the servo stalls under a load that it would lift according to its small signals',
             _form('i / (1 + s |i|)', 'saturation')),
     _effect('motor.winding_temperature',
             "copper's resistance grows with its temperature",
@@ -231,16 +231,16 @@ _EFFECTS: Final = (
             'the same wave at the same angles in either direction',
             *_waves('ripple')),
     _effect('bridge.coasting',
-            'while the pulse is off the bridge lets the current die instead of braking',
+            'between pulses the bridge lets the current decay instead of braking',
             'less damping at a small duty than at a large one',
             _form('share', 'coasting')),
     _effect('bridge.dead_zone',
-            'brushes, transistors and dead time take a voltage that turns with the current',
+            'brushes, transistors and dead time take a voltage against the current',
             'a small duty drives nothing: standing errors larger than friction explains',
             _form('voltage', 'bridge_drop')),
     _effect('bridge.braking',
             'a servo without torque may short its windings instead of opening them',
-            'a pendulum let go swings out faster than friction explains',
+            'a released pendulum decays faster than friction explains',
             _form('share', 'braking')),
     _effect('bridge.current_limit',
             'the bridge or the firmware cuts the current',
@@ -255,58 +255,58 @@ _EFFECTS: Final = (
             'the position lags the goal by the same time at any gain and speed',
             _form('time', 'delay')),
     _effect('controller.gain',
-            "the firmware's unit of the position gain is another one",
-            'the duty is another multiple of the position error',
+            "the firmware's unit of the position gain differs",
+            'the duty is a different multiple of the position error',
             _form('share', 'gain_error')),
     _effect('controller.derivative_gain',
             'the firmware has a derivative gain, or filters the position',
             'the duty falls with the rate, most at a large position gain',
             _form('time', 'derivative_gain')),
     _effect('controller.dead_band',
-            'the firmware takes a small position error for none',
-            'the duty is nought near the goal',
+            'the firmware ignores a small position error',
+            'the duty is zero near the goal',
             _form('width', 'dead_band')),
     _effect('controller.duty_limit',
             'the firmware allows less than the full duty',
             'the duty saturates early',
             _form('share', 'duty_limit')),
     _effect('controller.goal_slew',
-            'the firmware leads the goal along a ramp of a greatest rate',
+            'the firmware limits the rate of the goal',
             'fast goals are followed at a constant rate',
             _form('time per angle', 'goal_slowness')),
     _effect('gearbox.stribeck_friction',
-            'a film of grease carries only when the teeth move',
+            'the grease film carries load only while the teeth move',
             'jerks at low rates; the shaft stays where it stopped',
             _form('Stribeck', 'stribeck_torque', 'stribeck_rate', 'stribeck_shape')),
     _effect('gearbox.load_dependent_friction',
             'teeth and bearings rub in proportion to what they carry',
-            'friction grows with the torque; lifting loses, lowering brakes',
+            'friction grows with the torque, when lifting and when lowering',
             _form('alike', 'load_friction'),
             _form('by direction', 'load_friction_motor', 'load_friction_external')),
     _effect('gearbox.load_dependent_stribeck',
-            'under load the film of grease breaks down when the teeth hardly move',
+            'under load the grease film breaks down at low rates',
             'the loaded shaft sticks at slow rates and lets go suddenly',
             _form('alike', 'load_stribeck', 'stribeck_rate', 'stribeck_shape'),
             _form('by direction', 'load_stribeck_motor', 'load_stribeck_external',
                   'stribeck_rate', 'stribeck_shape')),
     _effect('gearbox.quadratic_load_friction',
-            'wheels and shafts bend under load and rub where they did not',
+            'wheels and shafts bend under load and touch elsewhere',
             'friction grows faster than the torque',
             _form('square', 'load_square'),
             _form('square, at rest', 'load_square_stribeck', 'stribeck_rate', 'stribeck_shape'),
             _form('by direction, at rest', 'load_quadratic_motor', 'load_quadratic_external',
                   'stribeck_rate', 'stribeck_shape')),
     _effect('gearbox.stiction_ageing',
-            'contacts creep together while they rest',
-            'the longer the shaft has stood, the more it takes to move it',
+            'contacts creep while they are at rest',
+            'the break-away torque grows with the time at rest',
             _form('logarithm of time', 'ageing')),
     _effect('gearbox.friction_asymmetry',
-            'flanks of teeth differ from side to side',
-            'another friction in either direction',
+            'the two flanks of the teeth differ',
+            'friction depends on the direction',
             _form('share', 'friction_asymmetry')),
     _effect('gearbox.viscous_nonlinearity',
-            'grease shears thinner, or churns, at rate',
-            'drag is no straight line over the rate',
+            'grease thins under shear, or churns at high rates',
+            'drag is not proportional to the rate',
             _form('quadratic', 'viscous_quadratic'),
             _form('thinning', 'viscous_thinning')),
     _effect('gearbox.friction_temperature',
@@ -314,7 +314,7 @@ _EFFECTS: Final = (
             'friction falls from test to test as the servo warms up',
             _form('linear', 'friction_temperature')),
     _effect('gearbox.position_dependent_friction',
-            'wheels run out of true, and teeth mesh better here than there',
+            'wheels are eccentric, and the meshing varies from tooth to tooth',
             'the shaft sticks at certain angles',
             *_waves('friction')),
     _effect('gearbox.backlash',
@@ -323,18 +323,18 @@ _EFFECTS: Final = (
             _form('gap', 'backlash')),
     _effect('gearbox.elasticity',
             'wheels, shafts and the horn twist',
-            'the load rings when it is let go or stopped',
+            'the load oscillates when it is released or stopped',
             _form('compliance', 'compliance')),
     _effect('encoder.offset',
-            'the horn sits on the spline beside where the encoder has its zero',
-            'the pendulum hangs beside zero; lifting differs from side to side',
+            'the horn is mounted off the zero of the encoder',
+            'the pendulum hangs off zero; lifting differs between the two sides',
             _form('angle', 'position_offset')),
     _effect('encoder.eccentricity',
-            "the encoder's magnet sits beside the axis",
+            "the encoder's magnet is mounted off the axis",
             'angles are stretched on one side and squeezed on the other',
             _form('once a turn', 'eccentricity_cosine', 'eccentricity_sine')),
     _effect('load.moment',
-            'the arm, screws or the horn weigh something too, or the arm is longer',
+            'the arm, screws or horn have mass too, or the arm is longer',
             'more torque at the same angle, without more inertia at the motor',
             _form('share', 'load_moment')),
 )

@@ -12,11 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Global fits of a servo's numbers to the mean absolute position error of free runs.
+Global fits of a servo's parameters to the mean absolute position error of open-loop runs.
 
-A shaft that sticks or does not makes a landscape with steps and many valleys. CMA-ES takes it as
-it is; every structure that is compared gets the same number of runs, from the same kinds of
-beginnings.
+Stiction makes the error discontinuous with many local minima, which CMA-ES can handle. All models
+that are compared get the same number of runs and the same kinds of initial values.
 """
 
 from __future__ import annotations
@@ -31,15 +30,14 @@ import numpy as np
 
 Values = Mapping[str, float]
 
-# How far a search looks, as a share of the way between the bounds: from scratch, from the fit
-# of a simpler model, and around the best of all.
+# Initial spread of a search, as a share of the bounds: from scratch, from the fit of a simpler
+# model, and around the best of all.
 WIDE, NEAR, CLOSE = 0.2, 0.06, 0.015
 _COMMON = (*BASE, 'position_offset', 'delay')
 _STRIBECK = ('stribeck_torque', 'stribeck_rate', 'stribeck_shape')
 _DIRECTED = ('load_friction_motor', 'load_friction_external', 'load_stribeck_motor',
              'load_stribeck_external')
-# BAM's friction models by their names there, each with the simpler ones that it contains. Offset
-# and delay are fitted in all of them, as BAM does.
+# BAM's friction models by their names there. Offset and delay are fitted in all, as in BAM.
 LADDER: Mapping[str, tuple[str, ...]] = {
     'm1': _COMMON,
     'm2': (*_COMMON, *_STRIBECK),
@@ -48,6 +46,7 @@ LADDER: Mapping[str, tuple[str, ...]] = {
     'm5': (*_COMMON, *_STRIBECK, *_DIRECTED),
     'm6': (*_COMMON, *_STRIBECK, *_DIRECTED, 'load_quadratic_motor', 'load_quadratic_external'),
 }
+# The simpler models that each contains.
 PARENTS: Mapping[str, tuple[str, ...]] = {
     'm1': (), 'm2': ('m1',), 'm3': ('m1',), 'm4': ('m2', 'm3'), 'm5': ('m4',), 'm6': ('m5',)}
 
@@ -55,7 +54,7 @@ PARENTS: Mapping[str, tuple[str, ...]] = {
 @dataclass(frozen=True)
 class Fit:
     """
-    Numbers that were fitted.
+    Fitted parameters.
 
     Attributes
     ----------
@@ -69,17 +68,17 @@ class Fit:
 
 
 def error(tests: Sequence[ServoLog], values: Values) -> float:
-    """Return the mean over tests of the mean absolute position error of free runs [rad]."""
+    """Return the mean over tests of the mean absolute error of open-loop positions [rad]."""
     row = vector(values)
     return float(np.mean([test.error(row) for test in tests]))
 
 
-def begun(names: Sequence[str], known: Values | None = None) -> dict[str, float]:
+def initial_values(names: Sequence[str], known: Values | None = None) -> dict[str, float]:
     """
-    Return values to begin with: those that are known, else the usual ones.
+    Return initial values: the known ones, or the default ones if none are known.
 
-    What a simpler model knows under one name serves for the two that part it by direction; an
-    effect that a simpler model lacks begins absent.
+    A known value also serves for the two parameters that split it by direction. An effect that the
+    known model lacks starts absent.
     """
     values = {}
     for name in names:
@@ -99,39 +98,40 @@ def begun(names: Sequence[str], known: Values | None = None) -> dict[str, float]
 def refit(tests: Sequence[ServoLog], names: Sequence[str], begins: Sequence[Values],
           runs: int, seed: int = 1) -> Fit:
     """
-    Fit numbers to tests.
+    Fit parameters to tests.
 
     Parameters
     ----------
     tests
         the logs
     names
-        what is fitted; everything else is absent
+        the fitted parameters; all others are absent
     begins
-        known values to begin from, beside the usual ones
+        known values to start from, besides the default ones
     runs
-        how many times all tests are run, at most
+        largest number of simulations of all tests
     seed
         of the random candidates
 
     """
-    starts = [(begun(names), WIDE), *((begun(names, known), NEAR) for known in begins)]
+    starts = [(initial_values(names), WIDE),
+              *((initial_values(names, known), NEAR) for known in begins)]
     share = int(0.75 * runs / len(starts))
-    fits = [_searched(tests, names, start, spread, share, seed + i)
+    fits = [_search(tests, names, start, spread, share, seed + i)
             for i, (start, spread) in enumerate(starts)]
     best = min(fits, key=lambda fit: fit.error)
-    return _searched(tests, names, best.values, CLOSE, runs - share * len(starts), seed)
+    return _search(tests, names, best.values, CLOSE, runs - share * len(starts), seed)
 
 
 def nearby(tests: Sequence[ServoLog], names: Sequence[str], start: Values, runs: int,
            seed: int = 1) -> Fit:
-    """Fit numbers to tests in the neighbourhood of where they are; see `refit`."""
-    return _searched(tests, names, begun(names, start), 0.5 * NEAR, runs, seed)
+    """Fit parameters to tests near their present values; see `refit`."""
+    return _search(tests, names, initial_values(names, start), 0.5 * NEAR, runs, seed)
 
 
-def _searched(tests: Sequence[ServoLog], names: Sequence[str], start: Values, spread: float,
-              runs: int, seed: int) -> Fit:
-    """Search with CMA-ES; what it ends with is never worse than the start."""
+def _search(tests: Sequence[ServoLog], names: Sequence[str], start: Values, spread: float,
+            runs: int, seed: int) -> Fit:
+    """Search with CMA-ES; the result is never worse than the start."""
     items = [number(name) for name in names]
 
     def named(shares: Sequence[float]) -> dict[str, float]:

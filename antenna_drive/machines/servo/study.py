@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-A servo's diagnosis beside refits of BAM's friction ladder, on tests that neither has seen.
+A servo's diagnosis against refits of BAM's friction models, on withheld tests.
 
-For each two gains, and each two trajectories: what the model of motor and Coulomb-viscous
-friction lacks is searched for in the tests with these alone; the model that is reached and the
-six models of the ladder are fitted to the same tests with the same number of runs; all of them
-are then run free over the tests with the other gains or trajectories.
+For each pair of gains, and each pair of trajectories, the tests with these are fitted and the
+others withheld. The diagnosis searches the fitted tests for the effects that a motor with Coulomb
+and viscous friction lacks. The diagnosed model and the six models of BAM's ladder are then fitted
+to the same tests with the same number of runs, and simulated in open loop over the withheld ones.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ SPLITS = {'gain': 'kp', 'trajectory': 'trajectory'}
 @dataclass(frozen=True)
 class Direction:
     """
-    Which tests are fitted and which withheld.
+    A choice of the tests that are fitted; the others are withheld.
 
     Attributes
     ----------
@@ -61,8 +61,8 @@ class Direction:
     split: str
     fitted: tuple[Any, ...]
 
-    def parted(self, tests: Sequence[ServoLog]) -> tuple[list[ServoLog], list[ServoLog]]:
-        """Return the tests that are fitted and those that are withheld."""
+    def split_tests(self, tests: Sequence[ServoLog]) -> tuple[list[ServoLog], list[ServoLog]]:
+        """Return the fitted and the withheld tests."""
         key = SPLITS[self.split]
         chosen = [test for test in tests if getattr(test, key) in self.fitted]
         return chosen, [test for test in tests if getattr(test, key) not in self.fitted]
@@ -71,7 +71,7 @@ class Direction:
 def directions(tests: Sequence[ServoLog], splits: Iterable[str] = tuple(SPLITS),
                ) -> list[Direction]:
     """
-    Return every choice of two gains and of two trajectories that leaves something withheld.
+    Return every choice of two gains and of two trajectories that withholds some tests.
 
     Raises
     ------
@@ -84,35 +84,35 @@ def directions(tests: Sequence[ServoLog], splits: Iterable[str] = tuple(SPLITS),
         if len(levels) > 2:
             found += [Direction(split, pair) for pair in combinations(levels, 2)]
     if not found:
-        raise UserError(f'nothing can be withheld: three values of {" or ".join(splits)} '
-                        'at least are needed')
+        raise UserError(f'nothing can be withheld: at least three values of '
+                        f'{" or ".join(splits)} are needed')
     return found
 
 
 def compared(tests: Sequence[ServoLog], direction: Direction, effort: Effort,
              without: Sequence[str] = ()) -> dict[str, Any]:
     """
-    Return how the models do in one direction, as plain data.
+    Compare the models in one direction; return plain data.
 
     Parameters
     ----------
     tests
         all logs
     direction
-        which of them are fitted
+        the choice of the fitted ones
     effort
         of each fit
     without
-        effects that the diagnosis does not consider
+        effects to leave out of the diagnosis
 
     """
     began = time.monotonic()
-    fitted, withheld = direction.parted(tests)
+    fitted, withheld = direction.split_tests(tests)
     found = lacking(fitted, effort, without)
     diagnosed = servo_refit.refit(fitted, found.names, [found.fit.values], effort.runs)
     fits: dict[str, Fit] = {}
     for name, names in LADDER.items():
-        # the ladder may begin where the diagnosis has ended, too
+        # the ladder may also start from the diagnosed values
         begins = [*(fits[parent].values for parent in PARENTS[name]), diagnosed.values]
         fits[name] = servo_refit.refit(fitted, names, begins, effort.runs)
     fits[DIAGNOSED] = diagnosed
@@ -139,7 +139,7 @@ def study(tests: Sequence[ServoLog], chosen: Sequence[Direction], effort: Effort
           without: Sequence[str] = (), jobs: int = 1, keep: Path | None = None,
           progress: Progress = lambda share, doing: None) -> dict[str, Any]:
     """
-    Compare in several directions and sum up, as plain data.
+    Compare in several directions and summarise; return plain data.
 
     Parameters
     ----------
@@ -150,17 +150,17 @@ def study(tests: Sequence[ServoLog], chosen: Sequence[Direction], effort: Effort
     effort
         of each fit
     without
-        effects that the diagnosis does not consider
+        effects to leave out of the diagnosis
     jobs
-        how many processes at once
+        parallel processes
     keep
-        folder in which each direction's result is kept, and taken from where it is there
+        folder for the result of each direction; results found there are used again
     progress
-        called with the share that is done, 0 to 1, and what is being done
+        called with the share that is done, 0 to 1, and a description
 
     Raises
     ------
-    UserError : there is no such effect to leave out
+    UserError : there is no effect of a name in `without`
 
     """
     for name in without:
@@ -169,11 +169,11 @@ def study(tests: Sequence[ServoLog], chosen: Sequence[Direction], effort: Effort
                             f'{", ".join(catalogue())}')
     began = time.monotonic()
     results: dict[int, dict[str, Any]] = {}
-    shelf = _Shelf(keep, tests, effort, without)
+    kept = _KeptResults(keep, tests, effort, without)
     with ProcessPoolExecutor(jobs) as pool:
         running = {}
         for i, direction in enumerate(chosen):
-            known = shelf.find(direction)
+            known = kept.find(direction)
             if known is None:
                 running[pool.submit(compared, tests, direction, effort, without)] = i
             else:
@@ -186,7 +186,7 @@ def study(tests: Sequence[ServoLog], chosen: Sequence[Direction], effort: Effort
                 for future in done:
                     i = running[future]
                     results[i] = future.result()
-                    shelf.put(chosen[i], results[i])
+                    kept.put(chosen[i], results[i])
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
@@ -200,8 +200,8 @@ def study(tests: Sequence[ServoLog], chosen: Sequence[Direction], effort: Effort
             'seconds': time.monotonic() - began}
 
 
-class _Shelf:
-    """Results of directions, each in a file of its own, found again by what they came from."""
+class _KeptResults:
+    """Results of directions, each in a file with a digest of the data and code it came from."""
 
     def __init__(self, folder: Path | None, tests: Sequence[ServoLog], effort: Effort,
                  without: Sequence[str]) -> None:
@@ -272,12 +272,12 @@ def summed(results: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def text(result: dict[str, Any]) -> str:
-    """Return the comparison as a few lines for a terminal."""
+    """Return the comparison as text for a terminal."""
     lines = []
     for split, part in result['summary'].items():
         names = list(part['withheld_mrad'])
         lines.append(f'two values of {split} fitted, the others withheld: '
-                     f'mean absolute position error in free runs [mrad]')
+                     f'mean absolute position error in open loop [mrad]')
         lines.append('  ' + ' ' * 34 + ''.join(f'{name:>10}' for name in names))
         for direction in result['directions']:
             if direction['split'] == split:
