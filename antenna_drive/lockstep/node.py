@@ -18,9 +18,7 @@ from __future__ import annotations
 from collections.abc import Collection
 import gc
 import json
-from threading import Thread
 import time
-from typing import Any
 
 from antenna_drive.emulator.unit import FloatArray, Unit
 from antenna_drive.emulator.wiring import TEST_SIGNAL
@@ -30,8 +28,8 @@ from antenna_drive.lockstep.pace import LEAD_S, Pace
 from antenna_drive.lockstep.readings import ChangeRecord, READING_QOS, Readings
 from antenna_drive.lockstep.report import Report
 from antenna_drive.lockstep.ros_link import FrameLink
+from antenna_drive.lockstep.serving import Serving
 from antenna_drive.parameters.schema import Entry, Value
-from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
@@ -168,10 +166,7 @@ class DriveNode:
 
     def spin(self) -> None:
         """Take part in runs until `stop` is called."""
-        executor = SingleThreadedExecutor(context=self._node.context)
-        executor.add_node(self._node)
-        services = Thread(target=_serve, args=(executor,), daemon=True)
-        services.start()
+        serving = Serving(self._node)
         try:
             # What is there now stays: the collector need not look through all of it again.
             gc.freeze()
@@ -183,8 +178,7 @@ class DriveNode:
                 if self._quiet or not self._gather():
                     self._wait_for_anything()
         finally:
-            executor.shutdown(timeout_sec=0.5)
-            services.join(0.5)
+            serving.close()
 
     def _hello(self) -> None:
         self._link.publish(self._member.layout.hello(self._member.birth))
@@ -299,10 +293,3 @@ def _as_float(value: Value) -> float:
 
 def _number(setting: tuple[Entry, Value] | None) -> float | None:
     return None if setting is None else _as_float(setting[1])
-
-
-def _serve(executor: Any) -> None:
-    try:
-        executor.spin()
-    except (ExternalShutdownException, ShutdownException):
-        pass

@@ -17,27 +17,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime
-import json
 import os
 from pathlib import Path
 import signal
-from threading import Thread
 import time
 from types import FrameType
 from typing import Any
 
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.errors import UserError
+from antenna_drive.lockstep.changes import read_record
 from antenna_drive.lockstep.entry import choose_transport
 from antenna_drive.lockstep.following import Follower, Step
 from antenna_drive.lockstep.frame import FrameLayout
 from antenna_drive.lockstep.readings import CHANGES_QOS
 from antenna_drive.lockstep.ros_link import FrameLink
+from antenna_drive.lockstep.serving import Serving
 from antenna_drive.recording.recorder import RunRecorder
 from antenna_drive.recording.recording import RecordingError
 from antenna_drive.recording.sheet import load_sheet
 import rclpy
-from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
@@ -106,6 +105,7 @@ class _RecorderNode:
         self._failed = False
         self._stop = False
         self._told_lost = 0
+        self._told_refused = 0
         self._ask_by = float('inf')
         for unit in OUTPUTS:
             node.create_subscription(String, f'{unit}/changes', self._listener(unit), CHANGES_QOS)
@@ -114,12 +114,7 @@ class _RecorderNode:
 
     def _listener(self, unit: str) -> Any:
         def listen(message: String) -> None:
-            try:
-                record = json.loads(message.data)
-            except ValueError:
-                return
-            if isinstance(record, dict):
-                self._recorder.told(unit, record)
+            self._recorder.told(unit, read_record(message.data))
         return listen
 
     def _end(self, number: int, frame: FrameType | None) -> None:
@@ -127,10 +122,7 @@ class _RecorderNode:
 
     def spin(self) -> int:
         """Record until told to stop; return the exit code."""
-        executor = SingleThreadedExecutor()
-        executor.add_node(self._node)
-        listening = Thread(target=_serve, args=(executor,), daemon=True)
-        listening.start()
+        serving = Serving(self._node)
         peers = tuple(OUTPUTS)
         self._link.publish(self._own.hello(float(time.time_ns() // 1000)))
         try:
@@ -146,8 +138,7 @@ class _RecorderNode:
                 self._look()
             self._guarded(self._recorder.close)
         finally:
-            executor.shutdown(timeout_sec=0.5)
-            listening.join(0.5)
+            serving.close()
         if self._recorder.steps and not self._failed:
             self._log.info(f'{self._recorder.steps} steps recorded to {self._recorder.path}')
         return FAILED if self._failed or self._told_lost else OK
@@ -186,14 +177,12 @@ class _RecorderNode:
             self._log.error(f'{lost} steps lost: the recorder or the machine is too slow; '
                             '-p run.observers:=[recorder] on test_signal makes the drive wait')
         self._told_lost = lost
+        refused = self._recorder.refused + self._follower.refused
+        if refused > self._told_refused:
+            self._log.warning(f'{refused} messages refused: they are no frame or no change of '
+                              'this drive')
+        self._told_refused = refused
         if time.monotonic() > self._ask_by:
             self._ask_by = float('inf')
             if not self._recorder.knows_configuration:
                 self._log.warning('not every node tells its parameters: the bag lacks them')
-
-
-def _serve(executor: SingleThreadedExecutor) -> None:
-    try:
-        executor.spin()
-    except (ExternalShutdownException, ShutdownException):
-        pass
