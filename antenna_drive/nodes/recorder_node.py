@@ -15,7 +15,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import datetime
 import os
 from pathlib import Path
@@ -102,7 +102,8 @@ class _RecorderNode:
         self._own = FrameLayout(())
         self._link = FrameLink(node, layouts)
         self._run = 0
-        self._failed = False
+        self._failed = False  # in this run
+        self._ever_failed = False
         self._stop = False
         self._told_lost = 0
         self._told_refused = 0
@@ -123,29 +124,34 @@ class _RecorderNode:
     def spin(self) -> int:
         """Record until told to stop; return the exit code."""
         serving = Serving(self._node)
-        peers = tuple(OUTPUTS)
         self._link.publish(self._own.hello(float(time.time_ns() // 1000)))
         try:
             while not self._stop:
-                came = self._link.wait(peers, _LONGEST_WAIT_S)
-                for peer in came:
-                    while (frame := self._link.take(peer)) is not None:
-                        self._follower.receive(peer, frame)
-                for step in self._follower.steps():
-                    self._take(step)
+                came = self._link.wait(tuple(OUTPUTS), _LONGEST_WAIT_S)
+                self._gather(came)
                 if not came:
                     self._guarded(self._recorder.idle)
                 self._look()
+            self._gather(OUTPUTS)
             self._guarded(self._recorder.close)
+            self._look()
         finally:
             serving.close()
         if self._recorder.steps and not self._failed:
             self._log.info(f'{self._recorder.steps} steps recorded to {self._recorder.path}')
-        return FAILED if self._failed or self._told_lost else OK
+        return FAILED if self._ever_failed or self._follower.lost else OK
+
+    def _gather(self, peers: Iterable[str]) -> None:
+        for peer in peers:
+            while (frame := self._link.take(peer)) is not None:
+                self._follower.receive(peer, frame)
+        for step in self._follower.steps():
+            self._take(step)
 
     def _take(self, step: Step) -> None:
         if step.run != self._run:
             self._run = step.run
+            self._guarded(self._recorder.close)
             self._failed = False
             self._ask_by = time.monotonic() + _PATIENCE_S
             if self._guarded(self._recorder.begin, step.run, step.step_s):
@@ -166,7 +172,7 @@ class _RecorderNode:
         try:
             write(*arguments)
         except RecordingError as error:
-            self._failed = True
+            self._failed = self._ever_failed = True
             self._log.error(f'{error}; the drive goes on without being recorded')
             return False
         return True

@@ -117,6 +117,10 @@ class RecorderProcess:
         assert self.process.poll() is None or not self._reader.is_alive() or self.lines
         return any(words in line for line in self.lines)
 
+    @property
+    def gone(self) -> bool:
+        return self.process.poll() is not None
+
     def end(self, number: signal.Signals = signal.SIGINT) -> int:
         """Send a signal; return the exit code once everything said has been read."""
         self.process.send_signal(number)
@@ -202,12 +206,12 @@ def test_whatever_is_said_of_changes_the_recorder_goes_on(
         for text in WRONG_CHANGES:
             speaker.publish(String(data=text))  # remembered for whoever comes later
         with recorder(f'out:={tmp_path}/run') as process:
-            drive.until(lambda: process.said('recording from step'))
+            drive.until(lambda: process.gone or process.said('recording from step'))
             for text in WRONG_CHANGES:
                 speaker.publish(String(data=text))
-            drive.until(lambda: process.process.poll() is not None or process.said(
+            drive.until(lambda: process.gone or process.said(
                 f'{2 * len(WRONG_CHANGES)} messages refused'))
-            assert process.process.poll() is None, process.lines
+            assert not process.gone, process.lines
             began = drive.step
             drive.until(lambda: drive.step > began + 300)
             assert process.end() == 0, process.lines
@@ -284,6 +288,17 @@ def test_a_full_disk_is_told_and_stops_nothing_else(tmp_path: Path, fresh_domain
         assert process.said('File too large; recorded up to')
     with pytest.warns(RecordingWarning, match='read up to'):
         assert len(read_bag(tmp_path / 'run', partial=True)['plant/encoder']) > 100
+
+
+def test_a_good_run_does_not_make_up_for_a_bad_one(tmp_path: Path, fresh_domain: int) -> None:
+    with Drive(pace=KEPT_PACE) as drive, recorder(
+            f'out:={tmp_path}/run', program=('-c', FULL_DISK)) as process:
+        drive.until(lambda: process.said('cannot be written'))
+        drive.processes.kill('motor_1')
+        drive.processes.start('motor_1')
+        drive.until(lambda: process.said('run_run_2'))
+        assert process.end() == 1
+    assert read_bag(tmp_path / 'run_run_2').start_ns == 0
 
 
 def test_a_recorded_command_is_played_by_a_node_as_in_one_process(
