@@ -115,6 +115,7 @@ class DriveNode:
             node, {name: entry for name, (entry, _) in {**settings, **own}.items()}, self._change)
         self._every = 0
         self._quiet = False
+        self._stands_still = False
         self._said_end = False
 
     def _make_member(self, birth: float, overrides: ros_parameters.Overrides,
@@ -188,10 +189,10 @@ class DriveNode:
             self._apply_changes()
         member = self._member
         if self._pace is None:
-            return member.go_on()
+            return member.go_on(self._stands_still)
         assert isinstance(member, Conductor)
         if self._quiet:
-            outputs = member.new_run(time.time_ns() / 1e3)
+            outputs = member.new_run(time.time_ns() / 1e3, stands_still=True)
             if outputs is not None:
                 self._pace.begin()
                 return outputs
@@ -220,7 +221,7 @@ class DriveNode:
             self._begun()
         if self._every and step % self._every == 0:
             self._readings.publish(step, member.step_s, outputs)
-        self._quiet = False
+        self._quiet = self._stands_still = False
         self._report.stepped()
         now = time.monotonic()
         if now >= self._report.next_s:
@@ -282,6 +283,7 @@ class DriveNode:
                 member.receive(peer, frame)
         self._quiet = not ready
         now = time.monotonic()
+        self._stands_still = self._report.stands_still(now)
         if now >= self._report.next_s:
             self._report.publish(now)
 

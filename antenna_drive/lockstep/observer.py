@@ -34,6 +34,7 @@ from antenna_drive.lockstep.changes import read_record
 from antenna_drive.lockstep.entry import choose_transport
 from antenna_drive.lockstep.member import Guest, Member
 from antenna_drive.lockstep.readings import CHANGES_QOS
+from antenna_drive.lockstep.report import STANDSTILL_S
 from antenna_drive.lockstep.ros_link import FrameLink
 from antenna_drive.lockstep.serving import Serving
 import numpy as np
@@ -169,13 +170,20 @@ class Observer:
     def spin(self, until: Callable[[], bool]) -> None:
         """Follow the drive until `until()` is true; it is asked every 0.1 s and at each step."""
         member = self._member
+        waiting_since: float | None = None
+        stands_still = False
         while not until():
-            if member.go_on() is None:
+            if member.go_on(stands_still) is None:
+                now = time.monotonic()
+                waiting_since = now if waiting_since is None else waiting_since
+                stands_still = now - waiting_since >= STANDSTILL_S
                 if not self._take():
                     self._tell()
                     self._link.wait(member.wanted(), _LONGEST_WAIT_S)
                     time.sleep(_NAP_S)
-            elif member.run != self._run:
+                continue
+            waiting_since, stands_still = None, False
+            if member.run != self._run:
                 self._run = member.run
                 self._told = -1
                 if self._on_begin is not None:
