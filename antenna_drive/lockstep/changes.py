@@ -27,12 +27,10 @@ import json
 import math
 from typing import Any
 
+from antenna_drive.limits import CHANGE
 from antenna_drive.lockstep.frame import LARGEST_RUN
 
 SETTINGS, CHANGES = 'settings', 'changes'
-
-# Every parameter of the largest unit takes some thousand characters.
-LONGEST_TEXT = 1_000_000
 
 # Lists of numbers, such as a multisine's, are the deepest that a parameter is.
 _DEEPEST = 4
@@ -45,7 +43,7 @@ def write_record(run: float, step: int, key: str, values: Mapping[str, Any]) -> 
 
 def read_record(text: str) -> dict[str, Any] | None:
     """Return the record that a text holds, None if it holds none."""
-    if len(text) > LONGEST_TEXT:
+    if len(text) > CHANGE.value():
         return None
     try:
         record = json.loads(text)

@@ -19,9 +19,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.lockstep.changes import (
-    CHANGES, LONGEST_TEXT, read_record, SETTINGS, write_record,
-)
+from antenna_drive.limits import CHANGE
+from antenna_drive.lockstep.changes import CHANGES, read_record, SETTINGS, write_record
 from antenna_drive.recording.mcap_format import read_bag
 from antenna_drive.recording.recorder import RunRecorder
 from hypothesis import given, strategies as st
@@ -53,7 +52,7 @@ def test_a_record_is_read_as_it_was_written(key: str) -> None:
     f'{{"run": {RUN}, "step": 0, "changes": {{"pot": "\\ud800"}}}}',
     f'{{"run": {RUN}, "step": 0, "changes": {{"\\ud800": 1}}}}',
     f'{{"run": {"9" * 5000}, "step": 0, "changes": {{}}}}',
-    f'{{"run": {RUN}, "step": 0, "changes": {{"pot": "{"x" * LONGEST_TEXT}"}}}}'])
+    f'{{"run": {RUN}, "step": 0, "changes": {{"pot": "{"x" * CHANGE.default}"}}}}'])
 def test_what_is_no_record_is_none(text: str) -> None:
     assert read_record(text) is None
 
