@@ -36,6 +36,7 @@ from antenna_drive.lockstep.serving import Serving
 from antenna_drive.recording.recorder import RunRecorder
 from antenna_drive.recording.recording import RecordingError
 from antenna_drive.recording.sheet import load_sheet
+from rcl_interfaces.msg import ParameterDescriptor
 import rclpy
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -85,6 +86,15 @@ def run(arguments: Sequence[str]) -> int:
         rclpy.try_shutdown()
 
 
+def _sync_s(node: Node) -> float | None:
+    given: Any = node.declare_parameter('sync', 0.0, ParameterDescriptor(
+        description='after how long the disk is made to hold what was written, 0: at the end [s]',
+        dynamic_typing=True)).value
+    if isinstance(given, bool) or not isinstance(given, (int, float)) or not given >= 0.0:
+        raise UserError(f'sync: {given!r} given, allowed is a time in seconds, 0 or more')
+    return float(given) or None
+
+
 class _RecorderNode:
     """Follows the drive's frames and hands its steps to a RunRecorder."""
 
@@ -96,7 +106,7 @@ class _RecorderNode:
         sheet = str(node.declare_parameter('sheet', '').value or '')
         self._recorder = RunRecorder(
             out, {f'{unit}/{s.name}': s.unit for unit, own in OUTPUTS.items() for s in own},
-            load_sheet(Path(sheet)) if sheet else None, recorded_by=NAME)
+            load_sheet(Path(sheet)) if sheet else None, sync_s=_sync_s(node), recorded_by=NAME)
         layouts = {unit: FrameLayout(signals) for unit, signals in OUTPUTS.items()}
         self._follower = Follower({u: layout.length for u, layout in layouts.items()}, TEST_SIGNAL)
         self._own = FrameLayout(())

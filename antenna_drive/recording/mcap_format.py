@@ -20,7 +20,8 @@ sheet (YAML); a metadata record holds each live change. The mcap library writes 
 storage; nothing here needs ROS 2.
 
 A chunk is complete at least every half second, and a reader needs nothing behind it: whatever
-happens to the process that records, at most the last half second is lost.
+happens to the process that records, at most the last half second is lost. Should the power fail,
+what was synchronised is safe, see `sync_s`.
 """
 
 from __future__ import annotations
@@ -38,12 +39,13 @@ from typing import Any, BinaryIO
 import warnings
 import zlib
 
+from antenna_drive.drafts import drafted
 from antenna_drive.emulator.wiring import signal_names
 from antenna_drive.errors import one_line
 from antenna_drive.limits import BAG, BAG_RECORD, SAMPLES, SIGNALS
 from antenna_drive.parameters.plain_yaml import parse_yaml, read_yaml
 from antenna_drive.parameters.schema import ParameterError
-from antenna_drive.recording.atomic import new_folder, refuse_existing, refuse_io
+from antenna_drive.recording.atomic import new_folder, refuse_existing, refuse_io, sync_folder
 from antenna_drive.recording.csv_format import parse_known
 from antenna_drive.recording.plain import freeze, from_json, PlainDataError, to_json
 from antenna_drive.recording.recording import (
@@ -97,13 +99,14 @@ class BagWriter:
     ----------
     path : the folder
     written_ns : time stamp of the last sample that is safe in the file [ns], -1 if none is
+    synced_ns : time stamp of the last sample that a failure of the power leaves [ns], -1 if none
 
     """
 
     def __init__(self, path: str | Path, signals: Mapping[str, str], *,
                  configuration: Mapping[str, Any] | None = None, sheet: TestSheet | None = None,
                  notes: Mapping[str, Any] | None = None, stem: str | None = None,
-                 flush_s: float = FLUSH_S,
+                 flush_s: float = FLUSH_S, sync_s: float | None = None,
                  clock: Callable[[], float] = time.monotonic) -> None:
         """
         Create the folder and write everything that is known before the first sample.
@@ -120,6 +123,9 @@ class BagWriter:
             first part of the storage file's name; the folder's name if not given
         flush_s
             longest time between chunks, by `clock` and by the time stamps [s]
+        sync_s
+            after how long by `clock` the disk is made to hold what was written [s], at the end
+            of a chunk; None for at the end only
         clock
             a steady clock [s]
 
@@ -130,12 +136,13 @@ class BagWriter:
 
         """
         self.path = Path(path)
-        self.written_ns = -1
+        self.written_ns = self.synced_ns = -1
+        self._sync_s = sync_s
         self._signals = dict(signals)
         self._flush_s = flush_s
         self._flush_ns = flush_s * NANOSECONDS
         self._clock = clock
-        self._flushed_at = clock()
+        self._flushed_at = self._synced_at = clock()
         self._flushed_ns = 0
         self._counts = [0] * len(self._signals)
         self._first_ns, self._last_ns = 2**63 - 1, -1
@@ -161,6 +168,8 @@ class BagWriter:
         self._writer: Writer | None = Writer(self._raw, enable_data_crcs=True)
         with self._guarded() as writer:
             self._topics = self._begin(writer, attachments)
+            if sync_s is not None:
+                self._sync()
 
     def _begin(self, writer: Writer, attachments: Mapping[str, str]) -> list[int]:
         writer.start('ros2')
@@ -300,6 +309,15 @@ class BagWriter:
         self.written_ns = self._last_ns
         self._flushed_ns = max(self._last_ns, 0)
         self._flushed_at = self._clock()
+        if self._sync_s is not None and self._flushed_at - self._synced_at >= self._sync_s:
+            with self._guarded():
+                self._sync()
+
+    def _sync(self) -> None:
+        os.fsync(self._raw.fileno())
+        sync_folder(self.path)
+        self.synced_ns = self.written_ns
+        self._synced_at = self._clock()
 
     def close(self) -> None:
         """
@@ -315,11 +333,11 @@ class BagWriter:
         with self._guarded() as writer:
             writer.finish()
             writer.flush()
-            os.fsync(self._raw.fileno())
             self.written_ns = self._last_ns
-            draft = self.path / f'.{METADATA}'
-            draft.write_text(self._metadata(), encoding='utf-8')
-            draft.replace(self.path / METADATA)
+            self._sync()
+            with drafted(self.path / METADATA) as stream:
+                stream.write(self._metadata().encode())
+            sync_folder(self.path)
         self._abandon()
 
     def _metadata(self) -> str:

@@ -50,7 +50,8 @@ class RunRecorder:
     """
 
     def __init__(self, path: str | Path, signals: Mapping[str, str],
-                 sheet: TestSheet | None = None, **notes: Any) -> None:
+                 sheet: TestSheet | None = None, *, sync_s: float | None = None,
+                 **notes: Any) -> None:
         """
         Prepare to record.
 
@@ -62,6 +63,8 @@ class RunRecorder:
             name -> unit of every signal, in the order in which `step` gives them
         sheet, notes
             see Recording
+        sync_s
+            see BagWriter
 
         Raises
         ------
@@ -73,6 +76,7 @@ class RunRecorder:
         self.refused = 0
         self._signals = dict(signals)
         self._sheet = sheet
+        self._sync_s = sync_s
         self._notes = notes
         self._bag: BagWriter | None = None
         self._count = 0
@@ -101,7 +105,7 @@ class RunRecorder:
         self._settings.pop(self._run, None)
         self._run, self.steps = run, 0
         self._step_s = step_s
-        self._bag = BagWriter(self.path, self._signals, sheet=self._sheet,
+        self._bag = BagWriter(self.path, self._signals, sheet=self._sheet, sync_s=self._sync_s,
                               notes={**self._notes, STEP: step_s, 'run': run})
         self._catch_up()
 
