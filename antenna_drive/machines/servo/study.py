@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass
 import hashlib
 from itertools import combinations
@@ -39,6 +39,7 @@ from antenna_drive.machines.servo.catalogue import catalogue, vector
 from antenna_drive.machines.servo.machine import ServoTest
 from antenna_drive.machines.servo.refit import Fit, LADDER, PARENTS
 from antenna_drive.machines.servo.rounds import Effort, lacking, plain
+from antenna_drive.workers import worker_processes
 import numpy as np
 
 Progress = Callable[[float, str], None]
@@ -170,7 +171,7 @@ def study(tests: Sequence[ServoTest], chosen: Sequence[Direction], effort: Effor
     began = time.monotonic()
     results: dict[int, dict[str, Any]] = {}
     shelf = _Shelf(keep, tests, effort, without)
-    with ProcessPoolExecutor(jobs) as pool:
+    with worker_processes(jobs) as pool:
         running = {}
         for i, direction in enumerate(chosen):
             known = shelf.find(direction)
@@ -187,9 +188,12 @@ def study(tests: Sequence[ServoTest], chosen: Sequence[Direction], effort: Effor
                     i = running[future]
                     results[i] = future.result()
                     shelf.put(chosen[i], results[i])
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+        finally:
+            # an interrupt may come between the end of a direction and its being kept
+            for future, i in running.items():
+                if i not in results and future.done() and not future.cancelled() \
+                        and future.exception() is None:
+                    shelf.put(chosen[i], future.result())
     progress(1.0, 'directions')
     ordered = [results[i] for i in range(len(chosen))]
     return {'recordings': [test.name for test in tests],
