@@ -29,10 +29,13 @@ import os
 import sys
 from types import ModuleType
 from typing import NamedTuple
+import warnings
 
 from antenna_drive import __version__
+from antenna_drive.cli.interruption import interruptible
 from antenna_drive.errors import UserError
 from antenna_drive.remedies import remedy
+from antenna_drive.workers import expect_overflow
 
 OK, NEGATIVE, BAD_INPUT, NOT_INSTALLED = 0, 1, 2, 3
 INTERRUPTED, BROKEN_PIPE = 130, 141  # 128 + the signal's number, as shells do
@@ -99,7 +102,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     name = next((word for word in arguments if not word.startswith('-')), '')
     try:
         try:
-            return _run(name, arguments)
+            with interruptible(lambda: _say(name, 'interrupted', INTERRUPTED)):
+                with warnings.catch_warnings():
+                    expect_overflow()
+                    return _run(name, arguments)
         finally:
             sys.stdout.flush()
     except BrokenPipeError:

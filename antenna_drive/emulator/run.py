@@ -29,6 +29,7 @@ from antenna_drive.emulator import units as drive_units
 from antenna_drive.emulator import wiring
 from antenna_drive.emulator.steps import advance
 from antenna_drive.emulator.unit import FloatArray, Unit
+from antenna_drive.errors import one_line
 from antenna_drive.parameters.schema import ParameterError, Value
 from antenna_drive.parameters.sets import Drive
 import numpy as np
@@ -63,6 +64,15 @@ class Run:
     names: tuple[str, ...]
     samples: FloatArray
     changes: Changes = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """Return two lines instead of the arrays: how much there is, and the signals."""
+        steps = self.steps
+        span = f' from {steps[0] * self.step_s:g} to {steps[-1] * self.step_s:g} s' if len(
+            steps) else ''
+        live = f', live changes: {len(self.changes)}' if self.changes else ''
+        return (f'Run: {len(self.names)} signals, {len(steps)} steps of {self.step_s:g} s kept'
+                f'{span}{live}\n  {one_line(", ".join(self.names), 96)}')
 
     @property
     def time(self) -> FloatArray:

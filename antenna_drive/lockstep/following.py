@@ -15,7 +15,9 @@
 The steps of a running drive, put together from the frames of its units by somebody who listens.
 
 Unlike a member of the lock-step, who is there from step 0 on, a follower may come at any time: it
-begins with the first step of which it gets every unit's frame. Nothing here needs ROS.
+begins with the first step of which it gets every unit's frame. It turns to another run when the
+conductor speaks of it and every unit has sent a step of it: a frame that somebody invents begins
+no run. Nothing here needs ROS.
 """
 
 from __future__ import annotations
@@ -24,12 +26,16 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from antenna_drive.lockstep.frame import all_finite, HEADER, NO_RUN
+from antenna_drive.lockstep.frame import all_finite, HEADER, LARGEST_RUN, NO_RUN
 
 Frame = tuple[float, ...]
 
-# Units are a few steps apart at most; one that is so far ahead waits for somebody we lost.
+# Units are a few steps apart at most; more incomplete steps than these are somebody's invention.
 _DEPTH = 4096
+
+# Runs of which frames are kept, and runs that are over and remembered as such.
+_MOST_RUNS = 8
+_MOST_PAST_RUNS = 16
 
 
 class Step(NamedTuple):
@@ -41,6 +47,23 @@ class Step(NamedTuple):
     values: list[float]
 
 
+class _Run:
+    """The frames of one run, until every unit has sent its own of a step."""
+
+    def __init__(self) -> None:
+        self.steps: dict[int, dict[str, Frame]] = {}
+        self.complete: deque[int] = deque()
+        self.next: int | None = None
+
+    def trim(self) -> None:
+        """Drop half of too many incomplete steps: the farthest, or the oldest before the first."""
+        numbers = list(self.steps)
+        unwanted = (numbers[:_DEPTH // 2] if self.next is None
+                    else sorted(numbers)[_DEPTH // 2:])
+        for number in {*unwanted} - {*self.complete}:
+            del self.steps[number]
+
+
 class Follower:
     """
     Puts frames together to steps.
@@ -48,8 +71,9 @@ class Follower:
     Attributes
     ----------
     run : the run in progress, 0 for none
-    lost : steps of this run that were missed after the first that was seen
-    refused : frames that are none: wrong length, NaN or infinite
+    lost : steps that were missed after the first that was seen, in all runs together
+    refused : frames that are none: wrong length, NaN or infinite, no run, no step, or another
+        than was sent before
 
     """
 
@@ -67,9 +91,9 @@ class Follower:
         """
         self._lengths = dict(lengths)
         self._conductor = conductor
-        self._frames: dict[str, deque[Frame]] = {
-            unit: deque(maxlen=_DEPTH) for unit in self._lengths}
-        self._next: int | None = None
+        self._runs: dict[float, _Run] = {}
+        self._past: deque[float] = deque(maxlen=_MOST_PAST_RUNS)
+        self._announced = NO_RUN
         self.run = 0
         self.lost = 0
         self.refused = 0
@@ -79,35 +103,78 @@ class Follower:
         if len(frame) != self._lengths[unit] or not all_finite(frame):
             self.refused += 1
             return
-        run = int(frame[0])
-        if frame[0] == NO_RUN or run < self.run:
+        if frame[0] == NO_RUN or frame[0] in self._past:
             return
-        if unit == self._conductor and run > self.run:
-            self.run, self._next, self.lost = run, None, 0
-        self._frames[unit].append(tuple(frame))
+        if not (_is_count(frame[0]) and _is_count(frame[1])):
+            self.refused += 1
+            return
+        if unit == self._conductor:
+            self._announced = frame[0]
+        self._file(unit, tuple(frame), self._runs.get(frame[0]) or self._another(frame[0]))
+
+    def _another(self, run_id: float) -> _Run:
+        if len(self._runs) >= _MOST_RUNS:
+            del self._runs[next(known for known in self._runs if known != self.run)]
+        run = self._runs[run_id] = _Run()
+        return run
+
+    def _file(self, unit: str, frame: Frame, run: _Run) -> None:
+        number = int(frame[1])
+        if run.next is not None and number < run.next:
+            return
+        frames = run.steps.get(number)
+        if frames is None:
+            if len(run.steps) >= _DEPTH:
+                run.trim()
+            frames = run.steps[number] = {}
+        if unit in frames:
+            self.refused += frames[unit] != frame
+            return
+        frames[unit] = frame
+        if len(frames) == len(self._lengths):
+            run.complete.append(number)
 
     def steps(self) -> Iterator[Step]:
-        """Yield the steps that are complete now, each once and in order."""
+        """
+        Yield the steps that are complete now, each once and in order.
+
+        What is complete of one run comes before the first step of the next.
+        """
         while True:
-            heads = []
-            for frames in self._frames.values():
-                while frames and (frames[0][0] < self.run or (
-                        self._next is not None and frames[0][0] == self.run
-                        and frames[0][1] < self._next)):
-                    frames.popleft()
-                if not frames or frames[0][0] != self.run or not self.run:
-                    return
-                heads.append(frames[0])
-            number = int(max(head[1] for head in heads))
-            if self._next is None:
-                self._next = number
-            if number > self._next:
-                self.lost += number - self._next
-                self._next = number
-            if any(head[1] != number for head in heads):
-                continue  # somebody is behind: his frames up to here go unused
+            if self.run:
+                yield from self._complete(self._runs[self.run])
+            following = self._runs.get(self._announced)
+            if self._announced == self.run or following is None or not following.complete:
+                return
+            self._turn(following)
+
+    def _complete(self, run: _Run) -> Iterator[Step]:
+        while run.complete:
+            number = run.complete.popleft()
+            frames = run.steps.pop(number)
+            if run.next is not None and number != run.next:
+                if number < run.next:
+                    continue
+                # each unit sends in order: what is incomplete before a complete step stays so
+                self.lost += number - run.next
+                for older in [known for known in run.steps if known < number]:
+                    del run.steps[older]
+            run.next = number + 1
             values: list[float] = []
-            for frames in self._frames.values():
-                values += frames.popleft()[len(HEADER)::2]
-            self._next = number + 1
-            yield Step(self.run, number, heads[0][2], values)
+            for unit in self._lengths:
+                values += frames[unit][len(HEADER)::2]
+            yield Step(self.run, number, frames[self._conductor][2], values)
+
+    def _turn(self, following: _Run) -> None:
+        if self.run:
+            over = self._runs.pop(self.run)
+            self._past.append(self.run)
+            # The conductor makes no step before all have made the last: that one we have missed.
+            self.lost += sum(self._conductor in frames and number > (over.next or 0)
+                             for number, frames in over.steps.items())
+            following.next = 0
+        self.run = int(self._announced)
+
+
+def _is_count(number: float) -> bool:
+    return 0.0 <= number < LARGEST_RUN and number % 1.0 == 0.0

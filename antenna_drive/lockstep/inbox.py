@@ -25,7 +25,7 @@ from collections.abc import Collection, Mapping
 from enum import Enum
 import math
 
-from antenna_drive.lockstep.frame import all_finite, LARGEST_RUN, NO_RUN
+from antenna_drive.lockstep.frame import all_finite, LARGEST_RUN, LATEST_BIRTH, NO_RUN
 
 # A neighbour may be one step ahead and its neighbour two; four is the next power of two.
 DEPTH = 4
@@ -57,6 +57,7 @@ class Inbox:
     Attributes
     ----------
     run, step : the run in progress (0.0: none) and the step whose frames are wanted next
+    announced : the run that may follow (0.0: none); its frames are kept for then
     refused : how many frames were refused, by (peer, reason)
     hellos : births [us] of peers that said hello, in order of arrival; the owner empties it
 
@@ -70,6 +71,7 @@ class Inbox:
         """
         self.run = NO_RUN
         self.step = 0
+        self.announced = NO_RUN
         self.refused: Counter[tuple[str, Refusal]] = Counter()
         self.hellos: list[tuple[str, float]] = []
         self.slots: dict[str, list[Frame | None]] = {peer: [None] * DEPTH for peer in lengths}
@@ -85,6 +87,7 @@ class Inbox:
         self.forget(self.run)
         self.run = run
         self.step = step
+        self.announced = NO_RUN
         self._awaited = (run, float(step))
         for slots in self.slots.values():
             slots[:] = [None] * DEPTH
@@ -97,6 +100,10 @@ class Inbox:
         if run != NO_RUN and run not in self._past_runs:
             self._past_runs.append(run)
 
+    def is_over(self, run: float) -> bool:
+        """Return whether this is a past run that is remembered."""
+        return run in self._past_runs
+
     def refuse(self, peer: str, reason: Refusal) -> None:
         """Count a frame as refused."""
         self.refused[peer, reason] += 1
@@ -108,7 +115,7 @@ class Inbox:
         elif not all_finite(frame):
             nan = any(map(math.isnan, frame))
             self.refuse(peer, Refusal.NAN if nan else Refusal.INFINITE)
-        elif frame[1] < 0.0 or frame[1] % 1.0 != 0.0:
+        elif not 0.0 <= frame[1] < LATEST_BIRTH or frame[1] % 1.0 != 0.0:
             self.refuse(peer, Refusal.NOT_A_STEP)
         elif not 0.0 <= frame[0] < LARGEST_RUN or frame[0] % 1.0 != 0.0:
             self.refuse(peer, Refusal.WRONG_RUN)
@@ -139,7 +146,7 @@ class Inbox:
             self._file(peer, frame)
         elif run == NO_RUN:
             self.hellos.append((peer, frame[1]))
-        elif run > self.run:
+        elif run > self.run or run == self.announced:
             self._early.append((peer, frame, self.step))
             if len(self._early) > EARLY_FRAMES:
                 self.refuse(self._early.popleft()[0], Refusal.WRONG_RUN)
@@ -161,6 +168,12 @@ class Inbox:
     def holds(self, peer: str) -> bool:
         """Return whether the peer's frame of the current step is there."""
         return self.slots[peer][self.step % DEPTH] is not None
+
+    def reached(self, peer: str) -> int:
+        """Return the last step of this run of which the peer has sent its frame."""
+        slots = self.slots[peer]
+        return max((step for step in range(self.step, self.step + DEPTH)
+                    if slots[step % DEPTH] is not None), default=self.step - 1)
 
     def missing(self) -> tuple[str, ...]:
         """Return the peers whose frame of the current step is not there."""

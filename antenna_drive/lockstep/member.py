@@ -21,11 +21,12 @@ out of `go_on`. Who carries the frames, and how fast, is somebody else's affair.
 from __future__ import annotations
 
 from array import array
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
-from antenna_drive.lockstep.frame import all_finite, FrameLayout, HEADER, NO_RUN
+from antenna_drive.lockstep.frame import all_finite, FrameLayout, HEADER, LATEST_BIRTH, NO_RUN
 from antenna_drive.lockstep.inbox import DEPTH, Frame, Inbox, Refusal
 import numpy as np
 
@@ -38,8 +39,14 @@ class Member:
     """
     A unit's part in the lock-step.
 
-    It starts afresh whenever the conductor announces a new run, puts out its frame 0, and goes
-    from step k to k + 1 when it holds step k of the conductor and of each of its inputs.
+    It starts afresh when the conductor announces a new run, puts out its frame 0, and goes from
+    step k to k + 1 when it holds step k of the conductor and of each of its inputs.
+
+    Anybody can publish an announcement. The conductor makes no step of a run once it has
+    announced the next; so whoever announces a run while this one goes on is not the conductor.
+    An announcement waits until the run stands still, and is refused if the run goes on. Should
+    it have been an invention all the same, the conductor's next announcement is followed from
+    there, whichever of the two runs has the greater id.
 
     Attributes
     ----------
@@ -95,6 +102,7 @@ class Member:
         self.resting = False
         self.fault = ''
         self._announced: Frame | None = None
+        self._announced_at = 0
         # one memory: a numpy array is slow to write single numbers to
         self._numbers = array('d', bytes(2 * 8 * len(columns)))
         self._inputs = np.asarray(self._numbers).reshape(-1, 2)
@@ -132,8 +140,10 @@ class Member:
             self.inbox.offer(self.conductor, frame)
         elif run <= self.birth:
             self.inbox.forget(run)
-        elif run > self.run and step == 0.0 and step_s > 0.0:
+        elif step == 0.0 and step_s > 0.0 and not self.inbox.is_over(run):
             self._announced = frame
+            self._announced_at = self.inbox.reached(self.conductor)
+            self.inbox.announced = run
         else:
             self.inbox.refuse(self.conductor, Refusal.WRONG_RUN)
 
@@ -152,9 +162,15 @@ class Member:
             return (self.conductor,)
         return self.inbox.missing()
 
-    def go_on(self) -> FloatArray | None:
+    def go_on(self, stands_still: bool = True) -> FloatArray | None:
         """
         Start the run that was announced or make the next step, if everything for it is there.
+
+        Parameters
+        ----------
+        stands_still
+            whether the run in progress has made no step for a while: only then is it left for
+            another
 
         Returns
         -------
@@ -163,13 +179,21 @@ class Member:
 
         """
         if self._announced is not None:
-            frame, self._announced = self._announced, None
-            outputs = self._begin(frame[0], frame[2])
-            self.inbox.offer(self.conductor, frame)
-            return outputs
+            if self.inbox.reached(self.conductor) > self._announced_at:
+                self._announced = None
+                self.inbox.announced = NO_RUN
+                self.inbox.refuse(self.conductor, Refusal.WRONG_RUN)
+            elif stands_still or self.run == NO_RUN or self.fault:
+                return self._begin_announced(self._announced)
         if self.run == NO_RUN or self.fault:
             return None
         return None if self.inbox.missing() else self._advance()
+
+    def _begin_announced(self, frame: Frame) -> FloatArray | None:
+        self._announced = None
+        outputs = self._begin(frame[0], frame[2])
+        self.inbox.offer(self.conductor, frame)
+        return outputs
 
     def message(self) -> bytes:
         """Return the serialised message of the step last put out."""
@@ -231,22 +255,25 @@ class Guest(Member):
                  conductor: str = TEST_SIGNAL) -> None:
         """Prepare to follow; see Member."""
         super().__init__(unit, 0.0, outputs, conductor)
-        self._joining = NO_RUN
         self._first: dict[str, Frame] = {}
 
     def receive(self, peer: str, frame: Frame) -> None:
         """Take in a frame or refuse it."""
         if self.run != NO_RUN:
             super().receive(peer, frame)
-        elif self.inbox.well_formed(peer, frame):
-            if frame[0] > self._joining:
-                self._joining = frame[0]
-                self._first.clear()
-            if frame[0] == self._joining != NO_RUN and frame[1] >= self._earliest():
-                self._first[peer] = frame
+        elif (self.inbox.well_formed(peer, frame) and frame[0] != NO_RUN
+              and peer in self.missing()):
+            self._first[peer] = frame
+
+    def _joining(self) -> float:
+        """Return the run that most peers speak of: one frame of one of them may be invented."""
+        runs = Counter(frame[0] for frame in self._first.values())
+        return max(runs, key=lambda run: (runs[run], run), default=NO_RUN)
 
     def _earliest(self) -> float:
-        return max((frame[1] for frame in self._first.values()), default=0.0)
+        joining = self._joining()
+        return max((frame[1] for frame in self._first.values() if frame[0] == joining),
+                   default=0.0)
 
     def wanted(self) -> tuple[str, ...]:
         """Return the peers from whom a frame would be of use now."""
@@ -256,15 +283,15 @@ class Guest(Member):
         """Return the peers without whom it cannot go on."""
         if self.run != NO_RUN:
             return super().missing()
-        earliest = self._earliest()
-        return tuple(peer for peer in self.peers
-                     if peer not in self._first or self._first[peer][1] < earliest)
+        joining, earliest = self._joining(), self._earliest()
+        return tuple(peer for peer in self.peers if peer not in self._first
+                     or self._first[peer][0] != joining or self._first[peer][1] < earliest)
 
-    def go_on(self) -> FloatArray | None:
+    def go_on(self, stands_still: bool = True) -> FloatArray | None:
         """Join the run in progress or make the next step; see Member."""
         if self.run != NO_RUN or self.missing():
-            return super().go_on()
-        outputs = self._begin(self._joining, self._first[self.conductor][2],
+            return super().go_on(stands_still)
+        outputs = self._begin(self._joining(), self._first[self.conductor][2],
                               int(self._earliest()))
         for peer, frame in self._first.items():
             self.inbox.offer(peer, frame)
@@ -276,8 +303,9 @@ class Conductor(Member):
     The member that owns the run: its id, its macro-step, its beginning and its end.
 
     It begins a run when it has heard from every other member, publishes step k + 1 only when
-    it holds step k of every one, and begins afresh when one of them says hello: that is a node
-    that was started again. Observers are waited for too, but not at every step: they may read
+    it holds step k of every one, and begins afresh when one of them says hello and makes no more
+    steps: that is a node that was started again. So it does when one has left for another run,
+    which somebody invented. Observers are waited for too, but not at every step: they may read
     in bulk, as long as they stay within what the others remember.
     """
 
@@ -307,29 +335,43 @@ class Conductor(Member):
         self._used = dict.fromkeys(observers, 0.0)
         self._heard: dict[str, float] = {}
         self._begin_again = True
+        # Our step when a member said hello, or last spoke of another run.
+        self._hello_at: dict[str, int] = {}
+        self._elsewhere_at: dict[str, int] = {}
 
     def receive(self, peer: str, frame: Frame) -> None:
         """Take in a frame or refuse it; note who is there."""
         if self.inbox.accept(peer, frame) or not self.inbox.well_formed(peer, frame):
             return
         if self.run == NO_RUN:
-            self._heard[peer] = max(self._heard.get(peer, 0.0), frame[0], self._birth_in(frame))
+            self._heard.setdefault(peer, 0.0)
+            self._hear(peer, frame)
             self.inbox.forget(frame[0])
-        elif frame[0] > self.run:
+        elif frame[0] not in (NO_RUN, self.run) and not self.inbox.is_over(frame[0]):
             # nobody but the conductor makes runs
             self.inbox.refuse(peer, Refusal.WRONG_RUN)
+            self._hear(peer, frame)
+            self._elsewhere_at[peer] = self.step
         elif peer in self._used and frame[0] == self.run:
             self._used[peer] = max(self._used[peer], frame[1])
         else:
             self.inbox.offer(peer, frame)
             for name, birth in self.inbox.hellos:
                 self._heard[name] = max(self._heard[name], birth)
-                self._begin_again = True
+                if name in self._used or self.ended or self.fault:
+                    self._begin_again = True
+                self._hello_at[name] = self.step
             self.inbox.hellos.clear()
 
-    @staticmethod
-    def _birth_in(frame: Frame) -> float:
-        return frame[1] if frame[0] == NO_RUN else 0.0
+    def _hear(self, peer: str, frame: Frame) -> None:
+        # A run beyond every birth is an invention, and no measure for runs to come.
+        known = frame[1] if frame[0] == NO_RUN else frame[0]
+        if known < LATEST_BIRTH:
+            self._heard[peer] = max(self._heard[peer], known)
+
+    def _left(self, at: Mapping[str, int]) -> bool:
+        """Tell whether one of these is missed since: whoever goes on was spoken for."""
+        return any(peer in at and self.step - at[peer] <= DEPTH for peer in self.inbox.missing())
 
     def unheard(self) -> tuple[str, ...]:
         """Return the members that have not been heard of yet."""
@@ -357,7 +399,7 @@ class Conductor(Member):
             least = self.step
         return tuple(name for name, used in self._used.items() if used < least)
 
-    def new_run(self, now: float) -> FloatArray | None:
+    def new_run(self, now: float, stands_still: bool = False) -> FloatArray | None:
         """
         Begin a run if one is due and everybody is there.
 
@@ -365,22 +407,30 @@ class Conductor(Member):
         ----------
         now
             wall time [us]; the run's id, unless somebody was born later by his own clock
+        stands_still
+            whether the run in progress has made no step for a while: only then is a member
+            that speaks of another run believed to be in it
 
         Returns
         -------
         array of shape (len(outputs), 2), to be published as frame 0; None if no run is due
 
         """
+        if self.run != NO_RUN and not self.ended:
+            if self._left(self._hello_at) or stands_still and self._left(self._elsewhere_at):
+                self._begin_again = True
         if not self._begin_again or self.unheard():
             return None
         self._begin_again = False
+        self._hello_at.clear()
+        self._elsewhere_at.clear()
         self.ended = False
         self._used = dict.fromkeys(self._used, 0.0)
         run = max(float(int(now)), self.birth + 1.0, self.run + 1.0,
                   *(heard + 1.0 for heard in self._heard.values()))
         return self._begin(run, self.wanted_step_s)
 
-    def go_on(self) -> FloatArray | None:
+    def go_on(self, stands_still: bool = True) -> FloatArray | None:
         """Make the next step if every member has made the last, and the run has not ended."""
         if self.run == NO_RUN or self.fault or self.ended or self._begin_again:
             return None

@@ -18,9 +18,7 @@ from __future__ import annotations
 from collections.abc import Collection
 import gc
 import json
-from threading import Thread
 import time
-from typing import Any
 
 from antenna_drive.emulator.unit import FloatArray, Unit
 from antenna_drive.emulator.wiring import TEST_SIGNAL
@@ -30,8 +28,8 @@ from antenna_drive.lockstep.pace import LEAD_S, Pace
 from antenna_drive.lockstep.readings import ChangeRecord, READING_QOS, Readings
 from antenna_drive.lockstep.report import Report
 from antenna_drive.lockstep.ros_link import FrameLink
+from antenna_drive.lockstep.serving import Serving
 from antenna_drive.parameters.schema import Entry, Value
-from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
@@ -117,6 +115,7 @@ class DriveNode:
             node, {name: entry for name, (entry, _) in {**settings, **own}.items()}, self._change)
         self._every = 0
         self._quiet = False
+        self._stands_still = False
         self._said_end = False
 
     def _make_member(self, birth: float, overrides: ros_parameters.Overrides,
@@ -168,10 +167,7 @@ class DriveNode:
 
     def spin(self) -> None:
         """Take part in runs until `stop` is called."""
-        executor = SingleThreadedExecutor(context=self._node.context)
-        executor.add_node(self._node)
-        services = Thread(target=_serve, args=(executor,), daemon=True)
-        services.start()
+        serving = Serving(self._node)
         try:
             # What is there now stays: the collector need not look through all of it again.
             gc.freeze()
@@ -183,8 +179,7 @@ class DriveNode:
                 if self._quiet or not self._gather():
                     self._wait_for_anything()
         finally:
-            executor.shutdown(timeout_sec=0.5)
-            services.join(0.5)
+            serving.close()
 
     def _hello(self) -> None:
         self._link.publish(self._member.layout.hello(self._member.birth))
@@ -194,10 +189,10 @@ class DriveNode:
             self._apply_changes()
         member = self._member
         if self._pace is None:
-            return member.go_on()
+            return member.go_on(self._stands_still)
         assert isinstance(member, Conductor)
         if self._quiet:
-            outputs = member.new_run(time.time_ns() / 1e3)
+            outputs = member.new_run(time.time_ns() / 1e3, stands_still=True)
             if outputs is not None:
                 self._pace.begin()
                 return outputs
@@ -226,7 +221,7 @@ class DriveNode:
             self._begun()
         if self._every and step % self._every == 0:
             self._readings.publish(step, member.step_s, outputs)
-        self._quiet = False
+        self._quiet = self._stands_still = False
         self._report.stepped()
         now = time.monotonic()
         if now >= self._report.next_s:
@@ -288,6 +283,7 @@ class DriveNode:
                 member.receive(peer, frame)
         self._quiet = not ready
         now = time.monotonic()
+        self._stands_still = self._report.stands_still(now)
         if now >= self._report.next_s:
             self._report.publish(now)
 
@@ -299,10 +295,3 @@ def _as_float(value: Value) -> float:
 
 def _number(setting: tuple[Entry, Value] | None) -> float | None:
     return None if setting is None else _as_float(setting[1])
-
-
-def _serve(executor: Any) -> None:
-    try:
-        executor.spin()
-    except (ExternalShutdownException, ShutdownException):
-        pass

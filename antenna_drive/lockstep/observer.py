@@ -23,22 +23,22 @@ long as it keeps within what they remember, the last thousand steps.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-import json
 import os
-from threading import Thread
 import time
 from types import TracebackType
 from typing import Any
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.wiring import OUTPUTS
+from antenna_drive.lockstep.changes import read_record
 from antenna_drive.lockstep.entry import choose_transport
 from antenna_drive.lockstep.member import Guest, Member
 from antenna_drive.lockstep.readings import CHANGES_QOS
+from antenna_drive.lockstep.report import STANDSTILL_S
 from antenna_drive.lockstep.ros_link import FrameLink
+from antenna_drive.lockstep.serving import Serving
 import numpy as np
 from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String
 
@@ -79,6 +79,7 @@ class Observer:
     Attributes
     ----------
     names : the signals, 'unit/signal', in the order of the rows given to `on_step`
+    refused_records : messages on `<unit>/changes` that are no record of a change
 
     """
 
@@ -102,7 +103,7 @@ class Observer:
             need not be step 0
         on_change
             called as on_change(unit, record) with what a node says on `<unit>/changes`,
-            see ChangeRecord; from another thread
+            see `changes`; from another thread
         namespace, domain_id
             where the drive is; None for the domain in the environment
         guest
@@ -124,8 +125,8 @@ class Observer:
         self._run = 0.0
         self._told = -1
         self._link = FrameLink(self._node, self._member.layouts)
-        self._executor: SingleThreadedExecutor | None = None
-        self._thread: Thread | None = None
+        self._serving: Serving | None = None
+        self.refused_records = 0
         if on_change is not None:
             self._listen(outputs, on_change)
         if not guest:
@@ -134,13 +135,14 @@ class Observer:
     def _listen(self, outputs: Mapping[str, Sequence[Signal]], on_change: OnChange) -> None:
         for unit in outputs:
             def pass_on(message: String, unit: str = unit) -> None:
-                on_change(unit, json.loads(message.data))
+                record = read_record(message.data)
+                if record is None:
+                    self.refused_records += 1
+                else:
+                    on_change(unit, record)
 
             self._node.create_subscription(String, f'{unit}/changes', pass_on, CHANGES_QOS)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
-        self._thread = Thread(target=_serve, args=(self._executor,), daemon=True)
-        self._thread.start()
+        self._serving = Serving(self._node)
 
     @property
     def node(self) -> Node:
@@ -168,13 +170,20 @@ class Observer:
     def spin(self, until: Callable[[], bool]) -> None:
         """Follow the drive until `until()` is true; it is asked every 0.1 s and at each step."""
         member = self._member
+        waiting_since: float | None = None
+        stands_still = False
         while not until():
-            if member.go_on() is None:
+            if member.go_on(stands_still) is None:
+                now = time.monotonic()
+                waiting_since = now if waiting_since is None else waiting_since
+                stands_still = now - waiting_since >= STANDSTILL_S
                 if not self._take():
                     self._tell()
                     self._link.wait(member.wanted(), _LONGEST_WAIT_S)
                     time.sleep(_NAP_S)
-            elif member.run != self._run:
+                continue
+            waiting_since, stands_still = None, False
+            if member.run != self._run:
                 self._run = member.run
                 self._told = -1
                 if self._on_begin is not None:
@@ -199,10 +208,8 @@ class Observer:
 
     def close(self) -> None:
         """Leave the drive."""
-        if self._executor is not None:
-            self._executor.shutdown(timeout_sec=0.5)
-        if self._thread is not None:
-            self._thread.join(0.5)
+        if self._serving is not None:
+            self._serving.close()
         self._node.destroy_node()
         self._context.try_shutdown()
 
@@ -214,10 +221,3 @@ class Observer:
                  traceback: TracebackType | None) -> None:
         """Leave the drive."""
         self.close()
-
-
-def _serve(executor: SingleThreadedExecutor) -> None:
-    try:
-        executor.spin()
-    except (ExternalShutdownException, ShutdownException):
-        pass

@@ -16,10 +16,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-import json
 import struct
 
 from antenna_drive.emulator.unit import FloatArray, Signal
+from antenna_drive.lockstep.changes import CHANGES, SETTINGS, write_record
 from antenna_drive.parameters.schema import Value
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -84,10 +84,9 @@ class Readings:
 
 class ChangeRecord:
     """
-    Publish `<node>/changes`: what took effect at which step of which run, as JSON.
+    Publish `<node>/changes`: what took effect at which step of which run.
 
-    A run begins with {"run", "step": 0, "settings": {...}}, every parameter in force; each live
-    change follows as {"run", "step", "changes": {...}}: in force from that step to the next.
+    A change is in force from the step that it names to the next; `changes` has the format.
     """
 
     def __init__(self, node: Node) -> None:
@@ -97,12 +96,11 @@ class ChangeRecord:
 
     def begin(self, run: float, settings: Mapping[str, Value]) -> None:
         """Record what is in force as a run begins."""
-        self._publish(run, 0, 'settings', settings)
+        self._publish(run, 0, SETTINGS, settings)
 
     def add(self, run: float, step: int, changes: Mapping[str, Value]) -> None:
         """Record changes that take effect at `step`."""
-        self._publish(run, step, 'changes', changes)
+        self._publish(run, step, CHANGES, changes)
 
     def _publish(self, run: float, step: int, key: str, values: Mapping[str, Value]) -> None:
-        text = json.dumps({'run': int(run), 'step': step, key: dict(values)})
-        self._publisher.publish(String(data=text))
+        self._publisher.publish(String(data=write_record(run, step, key, values)))

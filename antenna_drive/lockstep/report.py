@@ -25,6 +25,8 @@ from rclpy.node import Node
 PERIOD_S = 1.0
 # A wait is told after this; with the period above that is within two seconds.
 PATIENCE_S = 0.9
+# A run that goes on makes a step within this; else another that was announced takes its place.
+STANDSTILL_S = 0.2
 
 
 class Report:
@@ -79,6 +81,10 @@ class Report:
         if not self._told and not fault and self._waits_long(now):
             self._node.get_logger().warning(f'{self._waits_for()}')
             self._told = True
+
+    def stands_still(self, now: float) -> bool:
+        """Tell at `now` [s] whether the node has made no step for a while."""
+        return self._waiting_since is not None and now - self._waiting_since >= STANDSTILL_S
 
     def _waits_long(self, now: float) -> bool:
         return (self._waiting_since is not None and not self._at_rest()

@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from antenna_drive.limits import FRAME
 from antenna_drive.lockstep.frame import FrameLayout
 from rclpy.callback_groups import CallbackGroup
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
@@ -124,6 +125,8 @@ class FrameLink:
 
 def _read(message: bytes) -> tuple[float, ...]:
     # Somebody else's layout or byte order, or no Float64MultiArray at all.
+    if len(message) > FRAME.value():
+        return ()
     try:
         return tuple(deserialize_message(message, Float64MultiArray).data)
     except RuntimeError:

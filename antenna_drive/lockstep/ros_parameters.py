@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 import math
-from threading import Event
+from threading import Event, Lock
 from typing import Any
 
 from antenna_drive.emulator.unit import Unit
@@ -39,7 +39,7 @@ from rclpy.parameter import Parameter
 _RCLPY_OWN = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
 
 # How long a service call waits for the lock-step thread; a step takes a thousandth of this.
-_PATIENCE_S = 5.0
+PATIENCE_S = 5.0
 
 Settings = Mapping[str, tuple[Entry, Value]]
 
@@ -60,6 +60,7 @@ class Tuning:
         """Take changes for `unit`."""
         self._unit = unit
         self._queue: deque[_Request] = deque()
+        self._lock = Lock()  # held while changes are put in force or withdrawn
         self.wake: Callable[[], None] = _nothing
         self.refused = 0
 
@@ -74,7 +75,8 @@ class Tuning:
 
         Returns
         -------
-        why all of them are refused, or '' if they are in force (with wait) or will be
+        why all of them are refused, or '' if they are in force (with wait) or will be; what is
+        refused is never put in force
 
         """
         try:
@@ -85,21 +87,26 @@ class Tuning:
         request = _Request(changes)
         self._queue.append(request)
         self.wake()
-        if wait and not request.done.wait(_PATIENCE_S):
-            return 'the lock-step thread does not answer'
+        if wait and not request.done.wait(PATIENCE_S):
+            with self._lock:
+                if not request.done.is_set():
+                    self._queue.remove(request)
+                    self.refused += 1
+                    return f'the node has not come to its next step for {PATIENCE_S:g} s'
         return request.refusal
 
     def apply(self) -> dict[str, Value]:
         """Apply what was asked for; called by the lock-step thread between two steps."""
         applied: dict[str, Value] = {}
-        while self._queue:
-            request = self._queue.popleft()
-            try:
-                self._unit.tune(request.changes)
-                applied.update(request.changes)
-            except ParameterError as error:
-                request.refusal = str(error)
-            request.done.set()
+        with self._lock:
+            while self._queue:
+                request = self._queue.popleft()
+                try:
+                    self._unit.tune(request.changes)
+                    applied.update(request.changes)
+                except ParameterError as error:
+                    request.refusal = str(error)
+                request.done.set()
         return applied
 
 

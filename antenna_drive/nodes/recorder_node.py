@@ -15,29 +15,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import datetime
-import json
 import os
 from pathlib import Path
 import signal
-from threading import Thread
 import time
 from types import FrameType
 from typing import Any
 
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.errors import UserError
+from antenna_drive.lockstep.changes import read_record
 from antenna_drive.lockstep.entry import choose_transport
 from antenna_drive.lockstep.following import Follower, Step
 from antenna_drive.lockstep.frame import FrameLayout
 from antenna_drive.lockstep.readings import CHANGES_QOS
 from antenna_drive.lockstep.ros_link import FrameLink
+from antenna_drive.lockstep.serving import Serving
 from antenna_drive.recording.recorder import RunRecorder
 from antenna_drive.recording.recording import RecordingError
 from antenna_drive.recording.sheet import load_sheet
+from rcl_interfaces.msg import ParameterDescriptor
 import rclpy
-from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
@@ -86,6 +86,15 @@ def run(arguments: Sequence[str]) -> int:
         rclpy.try_shutdown()
 
 
+def _sync_s(node: Node) -> float | None:
+    given: Any = node.declare_parameter('sync', 0.0, ParameterDescriptor(
+        description='after how long the disk is made to hold what was written, 0: at the end [s]',
+        dynamic_typing=True)).value
+    if isinstance(given, bool) or not isinstance(given, (int, float)) or not given >= 0.0:
+        raise UserError(f'sync: {given!r} given, allowed is a time in seconds, 0 or more')
+    return float(given) or None
+
+
 class _RecorderNode:
     """Follows the drive's frames and hands its steps to a RunRecorder."""
 
@@ -97,15 +106,17 @@ class _RecorderNode:
         sheet = str(node.declare_parameter('sheet', '').value or '')
         self._recorder = RunRecorder(
             out, {f'{unit}/{s.name}': s.unit for unit, own in OUTPUTS.items() for s in own},
-            load_sheet(Path(sheet)) if sheet else None, recorded_by=NAME)
+            load_sheet(Path(sheet)) if sheet else None, sync_s=_sync_s(node), recorded_by=NAME)
         layouts = {unit: FrameLayout(signals) for unit, signals in OUTPUTS.items()}
         self._follower = Follower({u: layout.length for u, layout in layouts.items()}, TEST_SIGNAL)
         self._own = FrameLayout(())
         self._link = FrameLink(node, layouts)
         self._run = 0
-        self._failed = False
+        self._failed = False  # in this run
+        self._ever_failed = False
         self._stop = False
         self._told_lost = 0
+        self._told_refused = 0
         self._ask_by = float('inf')
         for unit in OUTPUTS:
             node.create_subscription(String, f'{unit}/changes', self._listener(unit), CHANGES_QOS)
@@ -114,12 +125,7 @@ class _RecorderNode:
 
     def _listener(self, unit: str) -> Any:
         def listen(message: String) -> None:
-            try:
-                record = json.loads(message.data)
-            except ValueError:
-                return
-            if isinstance(record, dict):
-                self._recorder.told(unit, record)
+            self._recorder.told(unit, read_record(message.data))
         return listen
 
     def _end(self, number: int, frame: FrameType | None) -> None:
@@ -127,34 +133,35 @@ class _RecorderNode:
 
     def spin(self) -> int:
         """Record until told to stop; return the exit code."""
-        executor = SingleThreadedExecutor()
-        executor.add_node(self._node)
-        listening = Thread(target=_serve, args=(executor,), daemon=True)
-        listening.start()
-        peers = tuple(OUTPUTS)
+        serving = Serving(self._node)
         self._link.publish(self._own.hello(float(time.time_ns() // 1000)))
         try:
             while not self._stop:
-                came = self._link.wait(peers, _LONGEST_WAIT_S)
-                for peer in came:
-                    while (frame := self._link.take(peer)) is not None:
-                        self._follower.receive(peer, frame)
-                for step in self._follower.steps():
-                    self._take(step)
+                came = self._link.wait(tuple(OUTPUTS), _LONGEST_WAIT_S)
+                self._gather(came)
                 if not came:
                     self._guarded(self._recorder.idle)
                 self._look()
+            self._gather(OUTPUTS)
             self._guarded(self._recorder.close)
+            self._look()
         finally:
-            executor.shutdown(timeout_sec=0.5)
-            listening.join(0.5)
+            serving.close()
         if self._recorder.steps and not self._failed:
             self._log.info(f'{self._recorder.steps} steps recorded to {self._recorder.path}')
-        return FAILED if self._failed or self._told_lost else OK
+        return FAILED if self._ever_failed or self._follower.lost else OK
+
+    def _gather(self, peers: Iterable[str]) -> None:
+        for peer in peers:
+            while (frame := self._link.take(peer)) is not None:
+                self._follower.receive(peer, frame)
+        for step in self._follower.steps():
+            self._take(step)
 
     def _take(self, step: Step) -> None:
         if step.run != self._run:
             self._run = step.run
+            self._guarded(self._recorder.close)
             self._failed = False
             self._ask_by = time.monotonic() + _PATIENCE_S
             if self._guarded(self._recorder.begin, step.run, step.step_s):
@@ -175,7 +182,7 @@ class _RecorderNode:
         try:
             write(*arguments)
         except RecordingError as error:
-            self._failed = True
+            self._failed = self._ever_failed = True
             self._log.error(f'{error}; the drive goes on without being recorded')
             return False
         return True
@@ -186,14 +193,12 @@ class _RecorderNode:
             self._log.error(f'{lost} steps lost: the recorder or the machine is too slow; '
                             '-p run.observers:=[recorder] on test_signal makes the drive wait')
         self._told_lost = lost
+        refused = self._recorder.refused + self._follower.refused
+        if refused > self._told_refused:
+            self._log.warning(f'{refused} messages refused: they are no frame or no change of '
+                              'this drive')
+        self._told_refused = refused
         if time.monotonic() > self._ask_by:
             self._ask_by = float('inf')
             if not self._recorder.knows_configuration:
                 self._log.warning('not every node tells its parameters: the bag lacks them')
-
-
-def _serve(executor: SingleThreadedExecutor) -> None:
-    try:
-        executor.spin()
-    except (ExternalShutdownException, ShutdownException):
-        pass

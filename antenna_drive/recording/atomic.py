@@ -45,6 +45,23 @@ def refuse_io(path: Path, error: OSError) -> RecordingError:
     return RecordingError(f'{path}: cannot be written, {error.strerror or error}')
 
 
+def sync_folder(path: Path) -> None:
+    """
+    Make the disk hold the names of the files in a folder, and of the folder.
+
+    Raises
+    ------
+    OSError : it cannot be done
+
+    """
+    for folder in (path, path.absolute().parent):
+        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
 @contextmanager
 def new_file(path: Path) -> Iterator[IO[bytes]]:
     """

@@ -24,6 +24,7 @@ docs/recording.md describes the columns.
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterator, Sequence
 import csv
 from dataclasses import replace
@@ -36,6 +37,7 @@ from typing import Any, IO, NamedTuple, TextIO
 import warnings
 
 from antenna_drive.errors import one_line
+from antenna_drive.limits import CSV_LINE, SAMPLES, SIGNALS, TEXT
 from antenna_drive.recording.atomic import new_file, refuse_existing
 from antenna_drive.recording.plain import from_json, PlainDataError, to_json
 from antenna_drive.recording.recording import (
@@ -134,14 +136,19 @@ def rows(path: Path, stream: TextIO, delimiter: str = ',') -> Iterator[tuple[int
 
     Raises
     ------
-    RecordingError : no CSV or no text; the message names file and line
+    RecordingError : no CSV, no text or too long a line; the message names file and line
 
     """
     last = ''
 
+    longest = CSV_LINE.value()
+
     def lines() -> Iterator[str]:
         nonlocal last
-        for line in stream:
+        while line := stream.readline(longest + 1):
+            if len(line) > longest:
+                raise RecordingError(f'{path}: line {reader.line_num + 1}: '
+                                     f'{CSV_LINE.exceeded()}')
             last = line
             yield line
 
@@ -206,7 +213,8 @@ def read_csv(path: str | Path) -> Recording:
         table = rows(path, stream)
         line, header = next(table, (1, []))
         names = _header(path, line, header)
-        columns: list[tuple[list[int], list[float]]] = [([], []) for _ in names]
+        columns = [(array('q'), array('d')) for _ in names]
+        room = SAMPLES.value()
         time_column = names.index(TIME)
         previous, count = -2**63, 0
         for line, row in table:
@@ -218,6 +226,9 @@ def read_csv(path: str | Path) -> Recording:
             if stamp <= previous:
                 raise cell.refuse('the time is not later than in the row before')
             previous, count = stamp, count + 1
+            room -= len(row) - 1 - row.count('')
+            if room < 0:
+                raise RecordingError(f'{path}: line {line}: {SAMPLES.exceeded()}')
             for i, text in enumerate(row):
                 text = text.strip()
                 if i != time_column and text:
@@ -228,7 +239,7 @@ def read_csv(path: str | Path) -> Recording:
     for i, (name, (stamps, values)) in enumerate(zip(names, columns, strict=True)):
         if i != time_column:
             unit = unit_of(name) if header[i].strip() in FIELD_COLUMNS else _unit(header[i])
-            channels[name] = make_channel(name, unit, np.array(stamps, dtype=np.int64), values)
+            channels[name] = make_channel(name, unit, np.array(stamps), np.array(values))
     sheet_path = path.with_suffix('.yaml')
     sheet = load_sheet(sheet_path) if sheet_path.is_file() else TestSheet()
     return replace(_with_meta(path, Recording(channels), count), sheet=sheet)
@@ -236,6 +247,8 @@ def read_csv(path: str | Path) -> Recording:
 
 def _header(path: Path, line: int, header: list[str]) -> list[str]:
     names: list[str] = []
+    if len(header) > SIGNALS.value():
+        raise RecordingError(f'{path}: line {line}: {SIGNALS.exceeded()}')
     for number, column in enumerate(header, 1):
         column = column.strip()
         cell = Cell(path, line, str(number))
@@ -274,6 +287,24 @@ def _unit(column: str) -> str:
     return own.group(2) if own else ''
 
 
+def read_text(path: Path) -> bytes:
+    """
+    Read a file of text that lies beside a recording.
+
+    Raises
+    ------
+    OSError : it cannot be read
+    RecordingError : it is longer than allowed
+
+    """
+    most = TEXT.value()
+    with path.open('rb') as file:
+        text = file.read(most + 1)
+    if len(text) > most:
+        raise RecordingError(f'{path}: {TEXT.exceeded()}')
+    return text
+
+
 def meta_path(path: Path) -> Path:
     """Return the file beside a CSV that holds what its cells cannot."""
     return path.with_suffix('.meta.json')
@@ -284,7 +315,7 @@ def _with_meta(path: Path, recording: Recording, count: int) -> Recording:
     if not beside.is_file():
         return recording
     try:
-        meta = from_json(beside.read_bytes())
+        meta = from_json(read_text(beside))
         if not isinstance(meta, dict) or not isinstance(meta.get('rows'), int):
             raise PlainDataError('no description of a CSV')
         if meta['rows'] != count:

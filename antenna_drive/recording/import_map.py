@@ -19,6 +19,7 @@ docs/recording.md describes the map's entries with an example.
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta, timezone
@@ -31,6 +32,7 @@ import warnings
 
 from antenna_drive.emulator.wiring import OUTPUTS, signal_names
 from antenna_drive.errors import one_line
+from antenna_drive.limits import SAMPLES
 from antenna_drive.parameters.plain_yaml import read_yaml
 from antenna_drive.parameters.schema import Entry, nearest, ParameterError
 from antenna_drive.recording.csv_format import (
@@ -289,13 +291,14 @@ def import_csv(path: str | Path, import_map: ImportMap) -> Recording:
     """
     path = Path(path)
     clocks: dict[str, _Clock] = {}
-    samples: dict[str, tuple[list[int], list[float]]] = {}
+    samples: dict[str, tuple[array[int], array[float]]] = {}
+    room = SAMPLES.value()
     with open_text(path, import_map.encoding) as stream:
         table = _table(path, stream, import_map)
         line, header = next(table, (import_map.skip_lines + 1, []))
         place = _places(path, line, [cell.strip() for cell in header], import_map)
         for name in import_map.signals:
-            samples[name] = ([], [])
+            samples[name] = (array('q'), array('d'))
         for signal in import_map.signals.values():
             column = signal.time_column or import_map.time.column
             clocks.setdefault(column, _Clock(path, column, import_map))
@@ -303,6 +306,9 @@ def import_csv(path: str | Path, import_map: ImportMap) -> Recording:
             if len(row) != len(header):
                 raise RecordingError(f'{path}: line {line}: {len(row)} cells, but the header has '
                                      f'{len(header)}')
+            room -= len(samples)
+            if room < 0:
+                raise RecordingError(f'{path}: line {line}: {SAMPLES.exceeded()}')
             stamps = {column: clock.read(line, row[place[column]].strip())
                       for column, clock in clocks.items()}
             for name, signal in import_map.signals.items():
@@ -334,7 +340,7 @@ def import_csv(path: str | Path, import_map: ImportMap) -> Recording:
                      notes={'source': path.name, 'import_map': import_map.source})
 
 
-def _append(samples: tuple[list[int], list[float]], stamp: int, value: float, cell: Cell,
+def _append(samples: tuple[array[int], array[float]], stamp: int, value: float, cell: Cell,
             duplicates: str) -> None:
     stamps, values = samples
     if not math.isfinite(value) or abs(stamp) >= 2**63:

@@ -20,7 +20,8 @@ sheet (YAML); a metadata record holds each live change. The mcap library writes 
 storage; nothing here needs ROS 2.
 
 A chunk is complete at least every half second, and a reader needs nothing behind it: whatever
-happens to the process that records, at most the last half second is lost.
+happens to the process that records, at most the last half second is lost. Should the power fail,
+what was synchronised is safe, see `sync_s`.
 """
 
 from __future__ import annotations
@@ -38,11 +39,13 @@ from typing import Any, BinaryIO
 import warnings
 import zlib
 
+from antenna_drive.drafts import drafted
 from antenna_drive.emulator.wiring import signal_names
 from antenna_drive.errors import one_line
+from antenna_drive.limits import BAG, BAG_RECORD, SAMPLES, SIGNALS
 from antenna_drive.parameters.plain_yaml import parse_yaml, read_yaml
 from antenna_drive.parameters.schema import ParameterError
-from antenna_drive.recording.atomic import new_folder, refuse_existing, refuse_io
+from antenna_drive.recording.atomic import new_folder, refuse_existing, refuse_io, sync_folder
 from antenna_drive.recording.csv_format import parse_known
 from antenna_drive.recording.plain import freeze, from_json, PlainDataError, to_json
 from antenna_drive.recording.recording import (
@@ -54,7 +57,7 @@ from mcap.opcode import Opcode
 from mcap.records import (
     Attachment, Channel as Topic, Chunk, Footer, Header, Message, Metadata, Schema, Statistics,
 )
-from mcap.stream_reader import get_chunk_data_stream, StreamReader
+from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 import numpy as np
 from numpy.typing import NDArray
@@ -80,6 +83,7 @@ _MESSAGE = np.dtype([
     ('opcode', 'u1'), ('length', '<u8'), ('topic', '<u2'), ('sequence', '<u4'),
     ('log_time', '<u8'), ('publish_time', '<u8'), ('cdr', 'S4'), ('value', '<f8')])
 _MESSAGE_LENGTH = _MESSAGE.itemsize - 9
+_FEW = 1024  # messages that are looked at at first
 _FOOTER_TAIL = 12  # the summary's checksum and the magic
 
 
@@ -95,13 +99,14 @@ class BagWriter:
     ----------
     path : the folder
     written_ns : time stamp of the last sample that is safe in the file [ns], -1 if none is
+    synced_ns : time stamp of the last sample that a failure of the power leaves [ns], -1 if none
 
     """
 
     def __init__(self, path: str | Path, signals: Mapping[str, str], *,
                  configuration: Mapping[str, Any] | None = None, sheet: TestSheet | None = None,
                  notes: Mapping[str, Any] | None = None, stem: str | None = None,
-                 flush_s: float = FLUSH_S,
+                 flush_s: float = FLUSH_S, sync_s: float | None = None,
                  clock: Callable[[], float] = time.monotonic) -> None:
         """
         Create the folder and write everything that is known before the first sample.
@@ -118,6 +123,9 @@ class BagWriter:
             first part of the storage file's name; the folder's name if not given
         flush_s
             longest time between chunks, by `clock` and by the time stamps [s]
+        sync_s
+            after how long by `clock` the disk is made to hold what was written [s], at the end
+            of a chunk; None for at the end only
         clock
             a steady clock [s]
 
@@ -128,12 +136,13 @@ class BagWriter:
 
         """
         self.path = Path(path)
-        self.written_ns = -1
+        self.written_ns = self.synced_ns = -1
+        self._sync_s = sync_s
         self._signals = dict(signals)
         self._flush_s = flush_s
         self._flush_ns = flush_s * NANOSECONDS
         self._clock = clock
-        self._flushed_at = clock()
+        self._flushed_at = self._synced_at = clock()
         self._flushed_ns = 0
         self._counts = [0] * len(self._signals)
         self._first_ns, self._last_ns = 2**63 - 1, -1
@@ -159,6 +168,8 @@ class BagWriter:
         self._writer: Writer | None = Writer(self._raw, enable_data_crcs=True)
         with self._guarded() as writer:
             self._topics = self._begin(writer, attachments)
+            if sync_s is not None:
+                self._sync()
 
     def _begin(self, writer: Writer, attachments: Mapping[str, str]) -> list[int]:
         writer.start('ros2')
@@ -298,6 +309,15 @@ class BagWriter:
         self.written_ns = self._last_ns
         self._flushed_ns = max(self._last_ns, 0)
         self._flushed_at = self._clock()
+        if self._sync_s is not None and self._flushed_at - self._synced_at >= self._sync_s:
+            with self._guarded():
+                self._sync()
+
+    def _sync(self) -> None:
+        os.fsync(self._raw.fileno())
+        sync_folder(self.path)
+        self.synced_ns = self.written_ns
+        self._synced_at = self._clock()
 
     def close(self) -> None:
         """
@@ -313,11 +333,11 @@ class BagWriter:
         with self._guarded() as writer:
             writer.finish()
             writer.flush()
-            os.fsync(self._raw.fileno())
             self.written_ns = self._last_ns
-            draft = self.path / f'.{METADATA}'
-            draft.write_text(self._metadata(), encoding='utf-8')
-            draft.replace(self.path / METADATA)
+            self._sync()
+            with drafted(self.path / METADATA) as stream:
+                stream.write(self._metadata().encode())
+            sync_folder(self.path)
         self._abandon()
 
     def _metadata(self) -> str:
@@ -433,6 +453,7 @@ class _Storage:
     attachments: dict[str, bytes] = field(default_factory=dict)
     changes: list[Any] = field(default_factory=list)
     messages: int = 0
+    unpacked: int = 0
 
     def take(self, record: object) -> None:
         """Take in one record of a file."""
@@ -464,21 +485,27 @@ class _Storage:
         if schema.name != MESSAGE_TYPE or topic.message_encoding != 'cdr':
             self.skipped.add(topic.topic)
             return
+        if len(self.samples) >= SIGNALS.value():
+            raise RecordingError(SIGNALS.exceeded())
         self.units.setdefault(topic.topic, topic.metadata.get('unit', ''))
         self.samples.setdefault(topic.topic, [])
 
     def _take_chunk(self, chunk: Chunk) -> None:
-        stream, length = get_chunk_data_stream(chunk, validate_crc=True)
-        data = stream.read(length)
-        if length != chunk.uncompressed_size:
-            raise _DamageError('a chunk has another size than it says')
+        data = _unpacked(chunk)
+        length = len(data)
+        self.unpacked += length
+        if self.unpacked > BAG.value():
+            raise RecordingError(BAG.exceeded())
         place = 0
+        ahead = _FEW
         while place < length:
-            many = (length - place) // _MESSAGE.itemsize
+            # looked at in pieces that grow: other records in between may be many
+            many = min(ahead, (length - place) // _MESSAGE.itemsize)
             block = np.frombuffer(data, dtype=_MESSAGE, count=many, offset=place)
             other = np.flatnonzero((block['opcode'] != Opcode.MESSAGE)
                                    | (block['length'] != _MESSAGE_LENGTH))
             block = block[:int(other[0])] if len(other) else block
+            ahead = _FEW if len(other) else 2 * ahead
             if len(block):
                 self._take_messages(block)
                 place += block.nbytes
@@ -509,13 +536,16 @@ class _Storage:
 
     def _take_messages(self, block: NDArray[Any]) -> None:
         self.messages += len(block)
-        for number in np.unique(block['topic']).tolist():
+        if self.messages > SAMPLES.value():
+            raise RecordingError(SAMPLES.exceeded())
+        block = block[np.argsort(block['topic'], kind='stable')]
+        for own in np.split(block, np.flatnonzero(np.diff(block['topic'])) + 1):
+            number = int(own['topic'][0])
             topic = self.topics.get(number)
             if topic is None:
                 raise _DamageError(f'a message of a topic {number} that is not there')
             if topic.topic in self.skipped:
                 continue
-            own = block[block['topic'] == number]
             # numpy leaves out the zero bytes at the end
             if not np.all(own['cdr'] == _CDR_HEADER.rstrip(b'\0')):
                 raise RecordingError(f'{one_line(topic.topic)}: a message is not in little-endian '
@@ -538,6 +568,46 @@ class _Storage:
                     for part in parts if len(part)), default=-1)
 
 
+def _unpacked(chunk: Chunk) -> bytes:
+    """Return what is packed in a chunk, which is no longer than it says and than is allowed."""
+    size = chunk.uncompressed_size
+    if size > BAG_RECORD.value():
+        raise RecordingError(BAG_RECORD.exceeded())
+    if chunk.compression == 'zstd':
+        import zstandard
+        data = zstandard.ZstdDecompressor().stream_reader(chunk.data).read(size + 1)
+    elif chunk.compression == 'lz4':
+        import lz4.frame
+        data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, size + 1)
+    elif chunk.compression == '':
+        data = chunk.data
+    else:
+        raise _DamageError(f'a chunk is packed by {one_line(repr(chunk.compression), 30)}')
+    if len(data) != size:
+        raise _DamageError('a chunk has another size than it says')
+    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+        raise _DamageError('the checksum of a chunk is another')
+    return data
+
+
+class _Within:
+    """A file of which no record is read that is longer than what is left of it, or allowed."""
+
+    def __init__(self, file: BinaryIO, size: int) -> None:
+        self._file = file
+        self._left = size
+        self._most = BAG_RECORD.value()
+
+    def read(self, count: int) -> bytes:
+        """Return the next `count` bytes."""
+        if count > self._left:
+            raise _DamageError('the file ends early')
+        if count > self._most:
+            raise RecordingError(BAG_RECORD.exceeded())
+        self._left -= count
+        return self._file.read(count)
+
+
 def _message_bytes(record: Message) -> bytes:
     content = struct.pack('<HIQQ', record.channel_id, record.sequence, record.log_time,
                           record.publish_time) + record.data
@@ -548,13 +618,17 @@ def _message_bytes(record: Message) -> bytes:
 
 def _records(file: BinaryIO, size: int) -> Iterator[object]:
     """Yield the records of a storage file; whatever the library meets in it is damage."""
-    reader = StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=size)
+    within: Any = _Within(file, size)
+    reader = StreamReader(within, emit_chunks=True, validate_crcs=True,
+                          record_size_limit=None)
     records = reader.records
     while True:
         try:
             record = next(records)
         except StopIteration:
             return
+        except (_DamageError, RecordingError):
+            raise
         except Exception as error:  # noqa: B902 (a damaged file can raise anything in there)
             if file.read(1) == b'' and size:
                 raise _DamageError('the file ends early') from None

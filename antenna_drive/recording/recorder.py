@@ -25,11 +25,16 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
 
+from antenna_drive.lockstep.changes import CHANGES, is_record, SETTINGS
 from antenna_drive.recording.atomic import refuse_existing
 from antenna_drive.recording.mcap_format import BagWriter
 from antenna_drive.recording.recording import nanoseconds
 from antenna_drive.recording.runs import STEP
 from antenna_drive.recording.sheet import TestSheet
+
+# How many other runs, and how many records, are kept until the steps have come that far.
+_MOST_RUNS = 16
+_MOST_RECORDS = 10_000
 
 
 class RunRecorder:
@@ -40,11 +45,13 @@ class RunRecorder:
     ----------
     path : folder of the run in progress, or of the first
     steps : how many steps of it were written
+    refused : how often `told` was given what is no record, or too many to keep
 
     """
 
     def __init__(self, path: str | Path, signals: Mapping[str, str],
-                 sheet: TestSheet | None = None, **notes: Any) -> None:
+                 sheet: TestSheet | None = None, *, sync_s: float | None = None,
+                 **notes: Any) -> None:
         """
         Prepare to record.
 
@@ -56,6 +63,8 @@ class RunRecorder:
             name -> unit of every signal, in the order in which `step` gives them
         sheet, notes
             see Recording
+        sync_s
+            see BagWriter
 
         Raises
         ------
@@ -64,8 +73,10 @@ class RunRecorder:
         """
         self.path = self._base = Path(path)
         self.steps = 0
+        self.refused = 0
         self._signals = dict(signals)
         self._sheet = sheet
+        self._sync_s = sync_s
         self._notes = notes
         self._bag: BagWriter | None = None
         self._count = 0
@@ -91,9 +102,10 @@ class RunRecorder:
         self._count += 1
         if self._count > 1:
             self.path = self._base.with_name(f'{self._base.name}_run_{self._count}')
+        self._settings.pop(self._run, None)
         self._run, self.steps = run, 0
         self._step_s = step_s
-        self._bag = BagWriter(self.path, self._signals, sheet=self._sheet,
+        self._bag = BagWriter(self.path, self._signals, sheet=self._sheet, sync_s=self._sync_s,
                               notes={**self._notes, STEP: step_s, 'run': run})
         self._catch_up()
 
@@ -119,9 +131,16 @@ class RunRecorder:
         if not self._told.empty():
             self._catch_up()
 
-    def told(self, unit: str, record: Mapping[str, Any]) -> None:
-        """Take what a node says on `<unit>/changes`; from any thread."""
-        self._told.put((unit, record))
+    def told(self, unit: str, record: Mapping[str, Any] | None) -> None:
+        """
+        Take what was said on `<unit>/changes`; from any thread.
+
+        Anybody can say anything there: what is no record of a change is counted and left out.
+        """
+        if record is None or not is_record(record) or self._told.qsize() >= _MOST_RECORDS:
+            self.refused += 1
+        else:
+            self._told.put((unit, record))
 
     def idle(self) -> None:
         """
@@ -162,12 +181,13 @@ class RunRecorder:
                 unit, record = self._told.get_nowait()
             except Empty:
                 break
-            run, step = int(record.get('run', 0)), int(record.get('step', 0))
-            if isinstance(record.get('settings'), dict):
-                self._settings.setdefault(run, {})[unit] = record['settings']
+            run = record['run']
+            if SETTINGS in record:
+                self._settings.setdefault(run, {})[unit] = record[SETTINGS]
                 fresh = fresh or run == self._run
-            elif isinstance(record.get('changes'), dict):
-                self._changes.append((run, step, unit, record['changes']))
+            else:
+                self._changes.append((run, record['step'], unit, record[CHANGES]))
+        self._forget_most()
         if self._bag is None or self._bag.closed:
             return
         if fresh or (self._run in self._settings and not self.steps):
@@ -176,6 +196,16 @@ class RunRecorder:
         for run, step, unit, values in self._changes:
             if run == self._run:
                 self._bag.change(step, unit, values)
-            elif run > self._run:
+            else:  # of another run, which may be the next
                 later.append((run, step, unit, values))
         self._changes = later
+
+    def _forget_most(self) -> None:
+        # Nobody is several runs ahead: what is kept of many is somebody's invention.
+        while len(self._settings) > _MOST_RUNS:
+            of_another = [run for run in self._settings if run != self._run]
+            del self._settings[of_another[0]]
+            self.refused += 1
+        if len(self._changes) > _MOST_RECORDS:
+            self.refused += len(self._changes) - _MOST_RECORDS
+            del self._changes[:-_MOST_RECORDS]

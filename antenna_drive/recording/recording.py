@@ -139,6 +139,15 @@ class Channel:
             raise RecordingError(f'sample {k} at {self.time_ns[k] / NANOSECONDS:.9f} s is '
                                  f'{self.values[k]}, no finite number')
 
+    def __repr__(self) -> str:
+        """Return a line instead of the arrays."""
+        unit = f' [{self.unit}]' if self.unit else ''
+        if not len(self):
+            return f'Channel{unit}: no sample'
+        first, last = self.time_ns[0] / NANOSECONDS, self.time_ns[-1] / NANOSECONDS
+        return (f'Channel{unit}: {len(self)} samples from {first:g} to {last:g} s, '
+                f'{self.values.min():g} to {self.values.max():g}')
+
     def __len__(self) -> int:
         """Return the number of samples."""
         return len(self.values)
@@ -274,6 +283,20 @@ class Recording:
                 for step, unit, values in self.changes))
         except PlainDataError as error:
             raise RecordingError(str(error)) from None
+
+    def __repr__(self) -> str:
+        """Return two lines instead of the arrays: how much there is, and the signals."""
+        count = sum(map(len, self.channels.values()))
+        parts = [f'{len(self.channels)} signals, {count} samples']
+        if count:
+            parts.append(f'{self.start_ns / NANOSECONDS:g} to {self.end_ns / NANOSECONDS:g} s')
+        if self.changes:
+            parts.append(f'live changes: {len(self.changes)}')
+        known = [name for name, there in (('configuration', self.configuration),
+                                          ('test sheet', self.sheet)) if there]
+        if known:
+            parts.append('with ' + ' and '.join(known))
+        return f'Recording: {", ".join(parts)}\n  {one_line(", ".join(self.channels), 96)}'
 
     # -- making one ---------------------------------------------------------------------------
 

@@ -16,6 +16,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import os
 from pathlib import Path
 import signal
 import subprocess
@@ -179,6 +180,96 @@ def test_interrupt(tmp_path: Path) -> None:
     process.send_signal(signal.SIGINT)
     _, error = process.communicate(timeout=30)
     assert (process.returncode, error) == (130, 'antenna-drive fake: interrupted\n')
+
+
+THREADS = """from antenna_drive.workers import worker_threads
+    with worker_threads(2) as pool:
+        tasks = [pool.submit(time.sleep, 3600) for _ in range(5)]
+        print('ready', flush=True)
+        tasks[0].result()"""
+THREADS_OF_A_LIBRARY = """from concurrent.futures import ThreadPoolExecutor
+    pool = ThreadPoolExecutor(2)
+    tasks = [pool.submit(time.sleep, 3600) for _ in range(5)]
+    print('ready', flush=True)
+    tasks[0].result()"""
+HANGING = """print('ready', flush=True)
+    try:
+        while True: time.sleep(0.05)
+    finally:
+        print('unwinding', flush=True)
+        while True: time.sleep(0.05)"""
+PROCESSES = """from antenna_drive.workers import worker_processes
+    import os
+    with worker_processes(2) as pool:
+        print(*{pool.submit(os.getpid).result() for _ in range(5)}, flush=True)
+        pids = [pool.submit(os.getpid) for _ in range(50)]
+        tasks = [pool.submit(time.sleep, 3600) for _ in range(5)]
+        print(*{pid.result() for pid in pids}, flush=True)
+        print('ready', flush=True)
+        tasks[0].result()"""
+
+
+@pytest.mark.parametrize('body', [THREADS, THREADS_OF_A_LIBRARY])
+def test_interrupt_with_threads_at_work(tmp_path: Path, body: str) -> None:
+    """Threads that still compute are not waited for."""
+    process = start(tmp_path, body)
+    assert process.stdout is not None
+    assert process.stdout.readline() == 'ready\n'
+    process.send_signal(signal.SIGINT)
+    _, error = process.communicate(timeout=30)
+    assert (process.returncode, error) == (130, 'antenna-drive fake: interrupted\n')
+
+
+def test_second_interrupt(tmp_path: Path) -> None:
+    """Whatever hangs while the first interrupt goes through it, the second ends it."""
+    process = start(tmp_path, HANGING)
+    assert process.stdout is not None
+    assert process.stdout.readline() == 'ready\n'
+    process.send_signal(signal.SIGINT)
+    assert process.stdout.readline() == 'unwinding\n'
+    process.send_signal(signal.SIGINT)
+    _, error = process.communicate(timeout=30)
+    assert (process.returncode, error) == (130, 'antenna-drive fake: interrupted\n')
+
+
+@pytest.mark.skipif(not sys.platform.startswith('linux'), reason='no /proc')
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGKILL])
+def test_no_worker_outlives_the_command(tmp_path: Path, number: signal.Signals) -> None:
+    """Ctrl-C reaches the workers too; a parent that is killed says nothing to them."""
+    process = start(tmp_path, PROCESSES)
+    assert process.stdout is not None and process.stderr is not None
+    pids: set[int] = set()
+    for line in process.stdout:
+        if line == 'ready\n':
+            break
+        pids |= {int(word) for word in line.split()}
+    assert pids and all(Path(f'/proc/{pid}').exists() for pid in pids)
+    if number == signal.SIGINT:
+        for pid in pids:
+            os.kill(pid, number)
+    process.send_signal(number)
+    # the end of what is written is the end of the last who could write
+    assert process.stdout.read() == ''
+    error = process.stderr.read()
+    code = process.wait(timeout=30)
+    process.stdout.close()
+    process.stderr.close()
+    assert (code, error) == ((130, 'antenna-drive fake: interrupted\n')
+                             if number == signal.SIGINT else (-9, ''))
+
+
+def test_overflow_in_a_search_is_not_told(tmp_path: Path) -> None:
+    """A trial that runs away is given up; the warnings of the arithmetic help nobody."""
+    process = start(tmp_path, """import numpy as np
+    x = np.array([1e300, -1.0])
+    print(float((x * x)[0]), np.sqrt(x)[1], (x / 0.0)[0])
+    import warnings
+    warnings.warn('of another kind')
+    return 0""")
+    out, error = process.communicate(timeout=60)
+    assert (process.returncode, out) == (0, 'inf nan inf\n')
+    assert 'encountered' not in error
+    assert 'of another kind' in error
 
 
 def test_reader_gone(tmp_path: Path) -> None:

@@ -196,3 +196,12 @@ def test_a_longer_macro_step_still_integrates_the_fast_states() -> None:
     difference = reference['motor_2/current'] - reference['motor_1/current']
     error = coarse['motor_2/current'] - coarse['motor_1/current'] - difference
     assert math.sqrt(np.mean(error ** 2) / np.mean(difference ** 2)) < 0.01
+
+
+def test_a_run_shows_itself_in_two_lines() -> None:
+    run = simulate(load(), 0.5, changes={7: {'torque_share': {'bias_pot': 0.5}}})
+    for text in (repr(run), str(run)):
+        assert len(text.splitlines()) == 2
+        assert max(map(len, text.splitlines())) < 100
+        assert '501 steps of 0.001 s kept from 0 to 0.5 s, live changes: 1' in text
+        assert f'{len(run.names)} signals' in text and 'test_signal/rate_command, ' in text

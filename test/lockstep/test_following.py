@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 import random
+import tracemalloc
 
 from antenna_drive.lockstep.following import Follower
 from antenna_drive.recording.mcap_format import read_bag
@@ -109,6 +110,80 @@ def test_lost_steps_are_counted_and_the_rest_goes_on() -> None:
                 follower.receive(unit, frame(unit, k))
     assert [step.number for step in follower.steps()] == [3, 6, 7]
     assert follower.lost == 2
+
+
+def test_losses_of_one_run_are_not_forgotten_in_the_next() -> None:
+    follower = Follower(LENGTHS, 'test_signal')
+    feed(follower, range(3))
+    feed(follower, range(7, 9))
+    assert follower.lost == 4
+    assert feed(follower, range(4), RUN + 1) == [0, 1, 2, 3]
+    assert follower.lost == 4
+    feed(follower, range(2, 4), RUN + 2)
+    assert follower.lost == 6, 'a run that follows another is there from step 0 on'
+
+
+def test_what_is_complete_of_a_run_comes_before_the_next() -> None:
+    follower = Follower(LENGTHS, 'test_signal')
+    feed(follower, range(3))
+    # the conductor's frames are read first, and the next run stands behind those of this one
+    for unit in UNITS:
+        for k in range(3, 6):
+            follower.receive(unit, frame(unit, k))
+        follower.receive(unit, frame(unit, 0, RUN + 1))
+    assert [step[:2] for step in follower.steps()] == [
+        (RUN, 3), (RUN, 4), (RUN, 5), (RUN + 1, 0)]
+    assert follower.lost == 0
+
+
+def test_steps_that_stay_incomplete_at_the_end_of_a_run_are_lost_if_all_have_made_them() -> None:
+    follower = Follower(LENGTHS, 'test_signal')
+    feed(follower, range(3))
+    for k in range(3, 6):
+        follower.receive('test_signal', frame('test_signal', k))
+    follower.receive('motor_1', frame('motor_1', 3))
+    assert feed(follower, range(2), RUN + 1) == [0, 1]
+    assert follower.lost == 2, 'steps 3 and 4: without them the conductor had not made step 5'
+
+
+@pytest.mark.parametrize('run', [RUN + 1, 2**51, 2**52 - 1])
+def test_an_invented_announcement_begins_no_run(run: int) -> None:
+    follower = Follower(LENGTHS, 'test_signal')
+    feed(follower, range(3))
+    follower.receive('test_signal', frame('test_signal', 0, run))
+    assert feed(follower, range(3, 6)) == [3, 4, 5]
+    assert follower.run == RUN
+    assert feed(follower, range(3), RUN + 2) == [0, 1, 2], 'nor does it stand in the way of one'
+    assert follower.lost == 0
+
+
+@given(st.lists(st.tuples(
+    st.sampled_from(list(UNITS)), st.sampled_from([RUN - 1, RUN, RUN + 1, 2**52, 1.5, -1.0]),
+    st.one_of(st.integers(50, 2**60), st.sampled_from([-1.0, 0.5, 1e300])))))
+def test_invented_frames_take_no_step_away(
+        invented: list[tuple[str, float, float]]) -> None:
+    follower = Follower(LENGTHS, 'test_signal')
+    found = feed(follower, range(2))
+    for unit, run, step in invented:
+        follower.receive(unit, (float(run), float(step), 1e-3, *frame(unit, 0)[3:]))
+    found += feed(follower, range(2, 20))
+    assert found == list(range(20))
+    assert follower.lost == 0
+
+
+def test_a_flood_of_invented_steps_is_not_kept() -> None:
+    follower = Follower(LENGTHS, 'test_signal')
+    feed(follower, range(2))
+    tracemalloc.start()
+    try:
+        for k in range(100_000, 120_000):
+            follower.receive('plant', frame('plant', k))
+            follower.receive('plant', frame('plant', k, RUN + k))
+        held, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert held < 5e6
+    assert feed(follower, range(2, 20)) == list(range(2, 20))
 
 
 @pytest.mark.parametrize('bad', [

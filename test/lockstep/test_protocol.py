@@ -86,6 +86,9 @@ class Network:
         self.clock = 1000.0
         self.step_s = step_s
         self.last_step = last_step
+        self.quiet = True  # nothing has come to the conductor for a while
+        self.stands_still = True  # as each member sees it
+        self.members_stray = False  # whether the conductor believes that they can
 
     def start(self, name: str) -> None:
         """Start a node, or start it again after it was killed."""
@@ -125,11 +128,11 @@ class Network:
         if member is None:
             return
         outputs = None
-        if isinstance(member, Conductor):
+        if isinstance(member, Conductor) and self.quiet:
             self.clock += 1.0
-            outputs = member.new_run(self.clock)
+            outputs = member.new_run(self.clock, self.members_stray)
         if outputs is None:
-            outputs = member.go_on()
+            outputs = member.go_on(self.stands_still)
         if outputs is not None:
             self.sent.setdefault((name, member.run), []).append(outputs.copy())
             assert len(self.sent[name, member.run]) == member.step + 1
@@ -244,6 +247,95 @@ def test_foreign_frames_change_nothing_and_are_counted(
     assert_as_expected(network, at_least=10)
     refused = sum(sum(member.inbox.refused.values()) for member in network.members.values())
     assert refused >= counted
+
+
+invented_runs = st.sampled_from([-9.0, 1.0, 7.0, 2.0**51, 2.0**52 - 2.0**40, 2.0**52 - 1.0])
+
+
+def invent(network: Network, target: str, run: float) -> None:
+    """Let a member hear of another run, as if from the conductor."""
+    if run < 1000.0:
+        run += network.members['test_signal'].run
+    network.members[target].receive('test_signal', (run, 0.0, 1e-3, *[0.25] * 4))
+
+
+def begun_network() -> Network:
+    network = Network()
+    for name in UNITS:
+        network.start(name)
+    network.clock += 20.0  # so that a run may be invented that is younger than all nodes
+    network.hello_to_late()
+    network.settle(10)
+    return network
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(st.tuples(st.sampled_from(UNITS[1:]), invented_runs, moves), max_size=5))
+def test_an_invented_run_is_refused_while_the_run_goes_on(
+        attacks: list[tuple[str, float, list[tuple[str, str, bool]]]]) -> None:
+    network = begun_network()
+    network.stands_still = False
+    run = network.members['plant'].run
+    for target, invented, choices in attacks:
+        invent(network, target, invented)
+        shake(network, choices)
+    network.settle(40)
+    assert {member.run for member in network.members.values()} == {run}
+    assert_as_expected(network, at_least=40)
+    for target, _, _ in attacks:
+        assert network.members[target].inbox.refused['test_signal', Refusal.WRONG_RUN]
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.sets(st.sampled_from(UNITS[1:]), min_size=1), invented_runs, moves, st.booleans())
+def test_who_was_led_into_an_invented_run_comes_back(
+        victims: set[str], invented: float, choices: list[tuple[str, str, bool]],
+        again: bool) -> None:
+    network = begun_network()
+    for target in victims:
+        invent(network, target, invented)
+        network.act(target)  # the run stood still just then: it is followed
+        assert network.members[target].run != network.members['test_signal'].run
+    network.members_stray = True
+    network.settle(80)
+    shake(network, choices)
+    if again:
+        network.start('plant')
+    network.settle(80)
+    assert len({member.run for member in network.members.values()}) == 1
+    assert_as_expected(network, at_least=10)
+
+
+@pytest.mark.parametrize('run', [1.0, 2000.0, 2.0**51, 2.0**52 - 1.0])
+def test_an_invented_run_before_the_first_does_not_keep_anybody_from_it(run: float) -> None:
+    network = Network()
+    for name in UNITS[1:]:
+        network.start(name)
+        invent(network, name, run + 1000.0)
+        network.act(name)
+    network.start('test_signal')
+    network.hello_to_late()
+    network.members_stray = True
+    network.settle(80)
+    assert len({member.run for member in network.members.values()}) == 1
+    assert_as_expected(network, at_least=10)
+
+
+@pytest.mark.parametrize('birth', [5000.0, 2.0**51, 2.0**52 - 1.0, 1e300])
+def test_an_invented_hello_ends_no_run_and_leaves_room_for_the_next(birth: float) -> None:
+    network = begun_network()
+    run = network.members['test_signal'].run
+    conductor = network.members['test_signal']
+    conductor.receive('plant', (0.0, birth, *[0.0] * 5))
+    network.quiet = False  # the plant goes on
+    network.settle(20)
+    network.quiet = True
+    network.settle(20)
+    assert {member.run for member in network.members.values()} == {run}
+    network.start('plant')
+    network.settle(40)
+    assert network.members['plant'].run > run
+    assert_as_expected(network, at_least=10)
 
 
 def test_the_run_ends_when_everybody_has_used_the_last_step() -> None:
@@ -365,9 +457,12 @@ class Listener(Unit):
 
 @settings(deadline=None, max_examples=60)
 @given(st.lists(st.integers(0, 15), min_size=5, max_size=5),
-       st.lists(st.sampled_from(UNITS), max_size=200))
+       st.lists(st.sampled_from(UNITS), max_size=200),
+       st.sampled_from([[], [('test_signal', (2.0**51, 0.0, 1e-3, *[0.25] * 4))],
+                        [('plant', (10.0, 7.0, 1e-3, *[0.25] * 4))]]))
 def test_a_guest_joins_in_the_middle_and_misses_nothing_from_there(
-        forgotten: list[int], choices: list[str]) -> None:
+        forgotten: list[int], choices: list[str],
+        invented: list[tuple[str, tuple[float, ...]]]) -> None:
     history = expected(40, 1e-3)
     queues = {name: deque((9.0, float(k), 1e-3, *history[name][k].ravel().tolist())
                           for k in range(first, 41))
@@ -380,12 +475,18 @@ def test_a_guest_joins_in_the_middle_and_misses_nothing_from_there(
             guest.receive(name, queues[name].popleft())
         guest.go_on()
 
+    for name, frame in invented:
+        if name in guest.wanted():
+            guest.receive(name, frame)
     for name in choices:
         give(name)
     for _ in range(60):
         for name in UNITS:
             give(name)
-    assert list(listener.read) == list(range(max(forgotten), 41))
+    # an invention may cost the first steps, but none in between
+    first = next(iter(listener.read))
+    assert first - max(forgotten) in range(3 if invented else 1)
+    assert list(listener.read) == list(range(first, 41))
     for k, read in listener.read.items():
         assert read.tobytes() == np.array([history[name][k][0] for name in UNITS]).tobytes()
     assert not guest.inbox.refused

@@ -197,6 +197,37 @@ def test_each_node_killed_is_missed_and_started_again_begins_a_new_run() -> None
     assert codes == dict.fromkeys(UNITS, 0)
 
 
+@pytest.mark.usefixtures('fresh_domain')
+def test_a_run_that_somebody_invents_stops_no_drive() -> None:
+    with Watch() as watch, Recorder(NAME) as recorder, DriveProcesses(
+            {'test_signal': ENDLESS}) as processes:
+        watch.until(lambda: _at_step(recorder, processes, 100), 'step 100')
+        length = 3 + 2 * sum(
+            name.startswith('test_signal/') for name in recorder.observer.names)
+        rest = [1e-3, *[0.5] * (length - 3)]
+        runs = (recorder.runs[-1] + 5.0, 2.0**51, 2.0**52 - 1.0)
+        watch.publish_frames('test_signal/frame', [[run, 0.0, *rest] for run in runs], readers=5)
+        for reader in UNITS[1:]:
+            watch.until(lambda reader=reader: watch.value(  # type: ignore[misc]
+                reader, 'refused: test_signal, wrong run') not in ('', '0'), f'{reader} to refuse')
+        target = recorder.steps + 500
+        watch.until(lambda: _at_step(recorder, processes, target), f'step {target}')
+        assert len(recorder.runs) == 1, 'the run goes on'
+        samples = recorder.array()
+        # a drive at a pace of one step in five seconds stands still, as far as anybody can see
+        assert watch.set_together('test_signal', {'run.pace': 2e-4}).successful
+        watch.publish_frames('test_signal/frame', [[2.0**52 - 1.0, 0.0, *rest]], readers=5)
+        watch.until(lambda: watch.value('plant', 'run') == str(2**52 - 1), 'the invention')
+        assert watch.set_together('test_signal', {'run.pace': 0.0}).successful
+        watch.until(lambda: recorder.runs[-1] not in (recorder.runs[0], 2**52 - 1)
+                    and _at_step(recorder, processes, 300), 'a run of the conductor')
+        again = recorder.array()
+        codes = processes.stop(signal.SIGTERM)
+    assert_same_bits(samples, in_process(samples.shape[0] - 1, 1e-3))
+    assert_same_bits(again, in_process(again.shape[0] - 1, 1e-3))
+    assert codes == dict.fromkeys(UNITS, 0)
+
+
 def _missed(watch: Watch, neighbour: str, victim: str) -> bool:
     status = watch.reports.get(neighbour)
     return (status is not None and 'at step' in status.message

@@ -19,7 +19,7 @@ import os
 from pathlib import Path
 import subprocess
 
-from installations import ROOT
+from installations import NODES, ROOT
 import pytest
 
 PYTHON = """\
@@ -106,6 +106,25 @@ def test_what_is_missing(machine: Path, lack: str, remedy: str) -> None:
     code, said, did = set_up(machine, **{lack: '1'}, **NO_ROS)
     assert code == 1 and did == ''
     assert said.count('\n') == 1 and remedy in said
+
+
+def test_what_ros2_run_looks_for(machine: Path, tmp_path: Path) -> None:
+    """The environment holds the index entry, and a launcher of every node."""
+    become(machine, 'Linux x86_64')
+    assert set_up(machine, **NO_ROS)[0] == 0
+    venv = tmp_path / 'venv'
+    index = venv / 'share' / 'ament_index' / 'resource_index' / 'packages' / 'antenna_drive'
+    assert index.is_file()
+    assert (venv / 'share' / 'antenna_drive' / 'package.xml').is_file()
+    launchers = {path.name: path for path in (venv / 'lib' / 'antenna_drive').iterdir()}
+    assert sorted(launchers) == NODES
+    for node, launcher in launchers.items():
+        executable = venv / 'bin' / node
+        executable.write_text('#!/bin/sh\nprintf "%s\\n" "${0##*/}" "$@"\n')
+        executable.chmod(0o755)
+        printed = subprocess.run([launcher, '--ros-args', 'a b'], cwd='/', text=True,
+                                 capture_output=True, check=True).stdout
+        assert printed == f'{node}\n--ros-args\na b\n'
 
 
 def test_again(machine: Path) -> None:

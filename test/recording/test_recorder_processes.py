@@ -33,6 +33,7 @@ from antenna_drive.emulator.run import Emulator  # noqa: E402, I100
 from antenna_drive.emulator.wiring import signal_names, UNITS  # noqa: E402
 from antenna_drive.lockstep.observer import Observer  # noqa: E402
 from antenna_drive.lockstep.processes import DriveProcesses  # noqa: E402
+from antenna_drive.lockstep.readings import CHANGES_QOS  # noqa: E402
 from antenna_drive.parameters.loading import load  # noqa: E402
 from antenna_drive.parameters.sets import changed  # noqa: E402
 from antenna_drive.recording.csv_format import read_csv, write_csv  # noqa: E402
@@ -45,6 +46,7 @@ import numpy as np  # noqa: E402
 from rcl_interfaces.srv import SetParameters  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rosbags.highlevel import AnyReader  # noqa: E402
+from std_msgs.msg import String  # noqa: E402
 
 # Times real time: what two cores keep up with while they run the tests as well.
 KEPT_PACE = 0.4
@@ -115,6 +117,10 @@ class RecorderProcess:
         assert self.process.poll() is None or not self._reader.is_alive() or self.lines
         return any(words in line for line in self.lines)
 
+    @property
+    def gone(self) -> bool:
+        return self.process.poll() is not None
+
     def end(self, number: signal.Signals = signal.SIGINT) -> int:
         """Send a signal; return the exit code once everything said has been read."""
         self.process.send_signal(number)
@@ -173,7 +179,7 @@ def test_a_recorder_joins_a_running_drive_and_keeps_every_step(
             client.call_async(SetParameters.Request(parameters=[
                 Parameter('bias_pot', value=0.5).to_parameter_msg()]))
             drive.until(lambda: drive.step > began + 1500)
-            assert process.end() == 0
+            assert process.end() == 0, process.lines
             assert process.said('steps recorded to')
     for topic, steps in steps_by_rosbags(tmp_path / 'run').items():
         assert len(steps) > 1000
@@ -183,6 +189,37 @@ def test_a_recorder_joins_a_running_drive_and_keeps_every_step(
     assert set(recording.configuration) == set(UNITS)
     assert [(c.unit, dict(c.values)) for c in recording.changes] == [
         ('torque_share', {'bias_pot': 0.5})]
+
+
+WRONG_CHANGES = (
+    '{"run": "abc", "step": 0, "settings": {}}', '{"run": null, "step": 0, "changes": {}}',
+    '{"run": Infinity, "step": 0, "changes": {}}', '{"run": 1e999, "step": 0, "changes": {}}',
+    '{"run": 5, "step": {}, "changes": {"a": 1}}', '[]', 'no JSON', '[' * 100_000,
+    '{"run": 5, "step": 0, "changes": {"a": NaN}}',
+    '{"run": 5, "step": 0, "changes": {"a": "\\ud800"}}')
+
+
+def test_whatever_is_said_of_changes_the_recorder_goes_on(
+        tmp_path: Path, fresh_domain: int) -> None:
+    with Drive(pace=KEPT_PACE) as drive:
+        speaker = drive.node.create_publisher(String, 'motor_1/changes', CHANGES_QOS)
+        for text in WRONG_CHANGES:
+            speaker.publish(String(data=text))  # remembered for whoever comes later
+        with recorder(f'out:={tmp_path}/run') as process:
+            drive.until(lambda: process.gone or process.said('recording from step'))
+            for text in WRONG_CHANGES:
+                speaker.publish(String(data=text))
+            drive.until(lambda: process.gone or process.said(
+                f'{2 * len(WRONG_CHANGES)} messages refused'))
+            assert not process.gone, process.lines
+            began = drive.step
+            drive.until(lambda: drive.step > began + 300)
+            assert process.end() == 0, process.lines
+            assert not process.said('Traceback'), process.lines
+    for topic, steps in steps_by_rosbags(tmp_path / 'run').items():
+        assert len(steps) > 300
+        assert steps == list(range(steps[0], steps[-1] + 1)), topic
+    assert set(read_bag(tmp_path / 'run').configuration) == set(UNITS)
 
 
 def test_a_killed_recorder_loses_a_second_at_most(tmp_path: Path, fresh_domain: int) -> None:
@@ -213,7 +250,7 @@ def test_a_new_run_gets_a_new_bag(tmp_path: Path, fresh_domain: int) -> None:
         drive.processes.kill('motor_1')
         drive.processes.start('motor_1')
         drive.until(lambda: process.said('run_run_2') and drive.step > 300)
-        assert process.end(signal.SIGTERM) == 0
+        assert process.end(signal.SIGTERM) == 0, process.lines
     assert len(drive.runs) == 2
     for name in ('run', 'run_run_2'):
         for steps in steps_by_rosbags(tmp_path / name).values():
@@ -251,6 +288,17 @@ def test_a_full_disk_is_told_and_stops_nothing_else(tmp_path: Path, fresh_domain
         assert process.said('File too large; recorded up to')
     with pytest.warns(RecordingWarning, match='read up to'):
         assert len(read_bag(tmp_path / 'run', partial=True)['plant/encoder']) > 100
+
+
+def test_a_good_run_does_not_make_up_for_a_bad_one(tmp_path: Path, fresh_domain: int) -> None:
+    with Drive(pace=KEPT_PACE) as drive, recorder(
+            f'out:={tmp_path}/run', program=('-c', FULL_DISK)) as process:
+        drive.until(lambda: process.said('cannot be written'))
+        drive.processes.kill('motor_1')
+        drive.processes.start('motor_1')
+        drive.until(lambda: process.said('run_run_2'))
+        assert process.end() == 1
+    assert read_bag(tmp_path / 'run_run_2').start_ns == 0
 
 
 def test_a_recorded_command_is_played_by_a_node_as_in_one_process(

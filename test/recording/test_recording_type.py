@@ -230,3 +230,21 @@ def test_live_changes_are_kept_and_frozen() -> None:
     assert recording.changes == (change,)
     with pytest.raises(TypeError):
         recording.changes[0].values['bias_pot'] = 1.0  # type: ignore[index]
+
+
+def test_a_recording_shows_itself_in_two_lines() -> None:
+    time = np.arange(20_000) * 1e-3
+    recording = Recording.from_arrays(
+        time, {name: np.sin(time) for name in signal_names()},
+        configuration={'plant': {'modes': [1.0] * 1000}},
+        changes=[Change(k, 'motor_1', {'pot': 0.5}) for k in range(500)])
+    for text in (repr(recording), str(recording)):
+        assert len(text.splitlines()) == 2
+        assert max(map(len, text.splitlines())) < 100
+        assert f'{len(signal_names())} signals, {20_000 * len(signal_names())} samples' in text
+        assert '0 to 19.999 s' in text and 'live changes: 500' in text
+        assert 'test_signal/rate_command, ' in text
+    assert repr(recording['motor_1/current']) == (
+        'Channel [A]: 20000 samples from 0 to 19.999 s, -1 to 1')
+    assert repr(Recording({})) == 'Recording: 0 signals, 0 samples\n  '
+    assert repr(Channel('', np.empty(0, np.int64), np.empty(0))) == 'Channel: no sample'

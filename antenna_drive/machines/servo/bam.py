@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from antenna_drive.errors import one_line
+from antenna_drive.recording.csv_format import read_text
 from antenna_drive.recording.plain import from_json, PlainDataError
 from antenna_drive.recording.recording import make_channel, nanoseconds, Recording, RecordingError
 import numpy as np
@@ -59,7 +60,7 @@ def read_bam(path: str | Path) -> Recording:
     """
     path = Path(path)
     try:
-        log = from_json(path.read_bytes())
+        log = from_json(read_text(path))
     except OSError as error:
         raise RecordingError(f'{path}: {error.strerror}') from error
     except PlainDataError as error:

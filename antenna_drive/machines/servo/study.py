@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass
 import hashlib
 from itertools import combinations
@@ -33,12 +33,14 @@ from pathlib import Path
 import time
 from typing import Any
 
+from antenna_drive import diagnosis
 from antenna_drive.errors import UserError
 from antenna_drive.machines.servo import refit as servo_refit
 from antenna_drive.machines.servo.catalogue import catalogue, vector
 from antenna_drive.machines.servo.log import ServoLog
 from antenna_drive.machines.servo.refit import Fit, LADDER, PARENTS
 from antenna_drive.machines.servo.rounds import Effort, lacking, plain
+from antenna_drive.workers import worker_processes
 import numpy as np
 
 Progress = Callable[[float, str], None]
@@ -170,7 +172,7 @@ def study(tests: Sequence[ServoLog], chosen: Sequence[Direction], effort: Effort
     began = time.monotonic()
     results: dict[int, dict[str, Any]] = {}
     kept = _KeptResults(keep, tests, effort, without)
-    with ProcessPoolExecutor(jobs) as pool:
+    with worker_processes(jobs) as pool:
         running = {}
         for i, direction in enumerate(chosen):
             known = kept.find(direction)
@@ -187,9 +189,12 @@ def study(tests: Sequence[ServoLog], chosen: Sequence[Direction], effort: Effort
                     i = running[future]
                     results[i] = future.result()
                     kept.put(chosen[i], results[i])
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+        finally:
+            # an interrupt may come between the end of a direction and its being kept
+            for future, i in running.items():
+                if i not in results and future.done() and not future.cancelled() \
+                        and future.exception() is None:
+                    kept.put(chosen[i], future.result())
     progress(1.0, 'directions')
     ordered = [results[i] for i in range(len(chosen))]
     return {'recordings': [test.name for test in tests],
@@ -210,8 +215,10 @@ class _KeptResults:
         for test in tests:
             for part in (test.time, test.goal, test.measured):
                 digest.update(part.tobytes())
-        for source in sorted(Path(__file__).parent.glob('*.py')):
-            digest.update(source.read_bytes())
+        # the results depend on this room and on the engine
+        for room in (Path(__file__).parent, Path(diagnosis.__file__).parent):
+            for source in sorted(room.glob('*.py')):
+                digest.update(source.read_bytes())
         self._key = digest.hexdigest()
 
     def _path(self, direction: Direction) -> Path | None:

@@ -1,0 +1,62 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The callbacks of a node, served in a thread of their own."""
+
+from __future__ import annotations
+
+from threading import Thread
+
+from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+
+_PATIENCE_S = 0.5
+
+
+class Serving:
+    """
+    Serves a node's subscriptions, services and timers until it is closed.
+
+    Whatever arrives may be wrong: a callback that fails is told and counted, and the next one
+    is served.
+
+    Attributes
+    ----------
+    faults : how many callbacks have failed
+
+    """
+
+    def __init__(self, node: Node) -> None:
+        """Begin to serve."""
+        self.faults = 0
+        self._log = node.get_logger()
+        self._executor = SingleThreadedExecutor(context=node.context)
+        self._executor.add_node(node)
+        self._thread = Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        while True:
+            try:
+                self._executor.spin()
+                return
+            except (ExternalShutdownException, ShutdownException):
+                return
+            except Exception as error:  # noqa: B902 (whatever a message makes a library raise)
+                self.faults += 1
+                self._log.error(f'a message could not be served, {type(error).__name__}: {error}')
+
+    def close(self) -> None:
+        """Serve no more."""
+        self._executor.shutdown(timeout_sec=_PATIENCE_S)
+        self._thread.join(_PATIENCE_S)

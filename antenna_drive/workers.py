@@ -1,0 +1,89 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Work that is done side by side, and that ends with whoever asked for it.
+
+An executor of the standard library finishes everything in its queue before it lets an error or
+Ctrl-C through, and its processes outlive a parent that is killed. These do neither.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
+import os
+import signal
+import sys
+import warnings
+
+
+@contextmanager
+def worker_threads(count: int) -> Iterator[ThreadPoolExecutor]:
+    """Give a pool of threads; after an error nothing that waits in it is begun."""
+    pool = ThreadPoolExecutor(count)
+    try:
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        raise
+    pool.shutdown()
+
+
+@contextmanager
+def worker_processes(count: int) -> Iterator[ProcessPoolExecutor]:
+    """
+    Give a pool of processes; after an error they are ended, whatever they are at.
+
+    Ctrl-C in a terminal goes to all of them: only the process that asked answers it. Should that
+    one be killed, the kernel ends them (on Linux).
+    """
+    pool = ProcessPoolExecutor(count, initializer=_become_worker, initargs=(os.getpid(),))
+    try:
+        yield pool
+    except BaseException:
+        # public from Python 3.14 on, as terminate_workers
+        for process in list((pool._processes or {}).values()):
+            process.terminate()
+        pool.shutdown(cancel_futures=True)
+        raise
+    pool.shutdown()
+
+
+def expect_overflow() -> None:
+    """
+    Say nothing where a number overflows or is none.
+
+    A search tries values with which a model runs away. It gives the trial up; the warnings of
+    the arithmetic tell the user nothing.
+    """
+    warnings.filterwarnings('ignore', '(overflow|underflow|invalid value|divide by zero) '
+                                      'encountered', RuntimeWarning)
+
+
+def end_with(parent: int) -> None:
+    """Let the kernel end this process when its parent ends (on Linux); at once if it has."""
+    if sys.platform.startswith('linux'):
+        import ctypes
+        pr_set_pdeathsig = 1  # linux/prctl.h
+        ctypes.CDLL(None).prctl(pr_set_pdeathsig, int(signal.SIGTERM))
+        if os.getppid() != parent:
+            os._exit(0)
+
+
+def _become_worker(parent: int) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    end_with(parent)
+    expect_overflow()
