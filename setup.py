@@ -19,8 +19,8 @@ import sys
 from setuptools import find_packages, setup
 
 PACKAGE = 'antenna_drive'
-NODES = ('rate_loop_plant', 'motor_drive', 'torque_share', 'test_signal', 'recorder',
-         'command_player')
+# Executables whose module has another name; any other module of nodes/ with a main has its own.
+NAMES = {'signal_generator': 'test_signal'}
 
 # ROS 2 Kilted as wheels: CPython 3.10 to 3.14 on x86-64 Linux, and nowhere else. The wheels of
 # one release fit each other alone (ros-rclpy pins its own to the patch), so each is held to
@@ -37,9 +37,11 @@ def config_files() -> list[tuple[str, list[str]]]:
             for folder in folders if folder.is_dir()]
 
 
-def nodes() -> list[str]:
-    """Return the executables whose module is there."""
-    return [node for node in NODES if Path(PACKAGE, 'nodes', f'{node}.py').is_file()]
+def nodes() -> dict[str, str]:
+    """Return the module of each executable of nodes/."""
+    modules = sorted(path.stem for path in Path(PACKAGE, 'nodes').glob('*.py')
+                     if '\ndef main(' in path.read_text())
+    return {NAMES.get(module, module): module for module in modules}
 
 
 def launchers() -> list[tuple[str, list[str]]]:
@@ -128,7 +130,7 @@ setup(
     entry_points={
         'console_scripts': [
             f'antenna-drive = {PACKAGE}.cli:main',
-            *(f'{node} = {PACKAGE}.nodes.{node}:main' for node in nodes()),
+            *(f'{name} = {PACKAGE}.nodes.{module}:main' for name, module in nodes().items()),
         ],
     },
 )

@@ -25,7 +25,7 @@ import subprocess
 import tempfile
 from typing import Any
 
-from antenna_drive.emulator.units import inner_steps, TestSignalUnit
+from antenna_drive.emulator.units import build, inner_steps, SourceUnit
 from antenna_drive.emulator.wiring import signal_names, TEST_SIGNAL
 from antenna_drive.errors import UserError
 from antenna_drive.parameters.sets import Axis, Drive, MODES_LIMIT, MotorDrive, Share
@@ -46,7 +46,7 @@ class CDrive:
         self._run.argtypes = [ctypes.c_void_p, ctypes.c_long, ctypes.c_double, ctypes.c_int,
                               ctypes.c_long, ctypes.c_void_p, ctypes.c_void_p]
         self._run.restype = None
-        self._test_signal = drive
+        self._drive = drive
         self._parameters = np.array([*_motor(drive.motor_1), *_motor(drive.motor_2),
                                      *_share(drive.torque_share), *_axis(drive.plant.axis)])
 
@@ -67,7 +67,8 @@ class CDrive:
 
         """
         count = round(duration / step_s)
-        unit = TestSignalUnit(TEST_SIGNAL, self._test_signal)
+        unit = build(TEST_SIGNAL, self._drive)
+        assert isinstance(unit, SourceUnit)
         first = unit.start(step_s)
         commands = np.concatenate((first[np.newaxis], unit.ahead(0, count)))
 

@@ -23,7 +23,7 @@ import importlib
 import sys
 
 from antenna_drive.bench.stamps import Stamps
-from antenna_drive.lockstep.processes import MODULES
+from antenna_drive.emulator.wiring import DRIVE
 
 
 def main() -> int:
@@ -43,7 +43,7 @@ def main() -> int:
             super()._publish(outputs)
 
     node.DriveNode = MeasuredNode  # type: ignore[misc]
-    return int(importlib.import_module(MODULES[unit]).main(arguments))
+    return int(importlib.import_module(DRIVE.units[unit].node).main(arguments))
 
 
 if __name__ == '__main__':

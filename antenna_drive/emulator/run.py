@@ -21,14 +21,14 @@ macro-step of `FINE_STEP` is the converged reference that longer ones are measur
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from antenna_drive.emulator import units as drive_units
-from antenna_drive.emulator import wiring
-from antenna_drive.emulator.steps import advance
+from antenna_drive.emulator.kernels import of_drive
 from antenna_drive.emulator.unit import FloatArray, Unit
+from antenna_drive.emulator.units import BlockUnit, build, inner_steps, SourceUnit
+from antenna_drive.emulator.wiring import DRIVE, Wiring
 from antenna_drive.errors import one_line
 from antenna_drive.parameters.schema import ParameterError, Value
 from antenna_drive.parameters.sets import Drive
@@ -99,11 +99,13 @@ class Emulator:
     Parameters
     ----------
     drive
-        parameters of the whole drive
+        parameters of the whole drive, a `wiring.parameters`
     step_s
         macro-step [s]
     replaced
         units of your own, by the name of the unit that each replaces
+    wiring
+        which units there are and what feeds them, the drive's own unless said otherwise
 
     Raises
     ------
@@ -113,22 +115,23 @@ class Emulator:
     """
 
     def __init__(self, drive: Drive, step_s: float = MACRO_STEP,
-                 replaced: Mapping[str, Unit] | None = None) -> None:
+                 replaced: Mapping[str, Unit] | None = None, wiring: Wiring = DRIVE) -> None:
         """Build the units and start them."""
         if not 0.0 < step_s < np.inf:
             raise ParameterError(f'step_s: {step_s!r} given, allowed is a number above 0 s')
         replaced = dict(replaced or {})
         for name in replaced:
-            if name not in wiring.UNITS:
+            if name not in wiring.units:
                 raise ParameterError(f'{name}: no such unit, allowed are '
-                                     f'{", ".join(wiring.UNITS)}')
+                                     f'{", ".join(wiring.units)}')
         self.step_s = step_s
-        self.units = {name: replaced.get(name) or drive_units.build(name, drive)
-                      for name in wiring.UNITS}
+        self._wiring = wiring
+        self.units: dict[str, Unit] = {
+            name: replaced.get(name) or build(name, drive, wiring=wiring)
+            for name in wiring.units}
         self.names = tuple(f'{name}/{signal.name}' for name, unit in self.units.items()
                            for signal in unit.outputs)
         self._columns = {name: column for column, name in enumerate(self.names)}
-        self._own_physics = not replaced
         self._check_wiring()
         self._inputs = {name: np.array([self._columns[source] for source in unit.inputs], np.intp)
                         for name, unit in self.units.items()}
@@ -141,7 +144,7 @@ class Emulator:
 
     def _check_wiring(self) -> None:
         for name, unit in self.units.items():
-            lacking = ({f'{name}/{signal.name}' for signal in wiring.OUTPUTS[name]
+            lacking = ({f'{name}/{signal.name}' for signal in self._wiring.outputs[name]
                         if signal.exchanged} - set(self.names))
             if lacking:
                 raise ParameterError(f'{name}: lacks the output {min(lacking)}')
@@ -204,8 +207,10 @@ class Emulator:
         numbers of the kept steps, shape (n,), and their samples, shape (n, len(names), 2)
 
         """
-        if self._own_physics:
-            return self._advance_compiled(count, every)
+        blocks = [unit for unit in self.units.values() if isinstance(unit, BlockUnit)]
+        sources = [unit for unit in self.units.values() if isinstance(unit, SourceUnit)]
+        if len(sources) == 1 and len(blocks) + 1 == len(self.units):
+            return self._advance_compiled(sources[0], blocks, count, every)
         steps, samples = [], []
         for _ in range(count):
             after = self.step()
@@ -215,18 +220,14 @@ class Emulator:
         return (np.array(steps, np.int64),
                 np.array(samples).reshape(-1, len(self.names), 2))
 
-    def _advance_compiled(self, count: int, every: int) -> tuple[Any, FloatArray]:
-        units: Any = self.units
-        commands = units[wiring.TEST_SIGNAL].ahead(self.k, count)
+    def _advance_compiled(self, source: SourceUnit, blocks: Sequence[BlockUnit], count: int,
+                          every: int) -> tuple[Any, FloatArray]:
         numbers = np.arange(self.k + 1, self.k + count + 1)
         numbers = numbers[numbers % every == 0]
         kept = np.empty((numbers.size, *self.now.shape))
-        stepped = wiring.UNITS[1:]
-        advance(self.k, self.step_s, drive_units.inner_steps(self.step_s), every, commands,
-                self.now, np.empty_like(self.now), kept,
-                tuple(self._inputs[name] for name in stepped),
-                np.array([self._outputs[name].start for name in wiring.UNITS]),
-                *(units[name].memory() for name in stepped))
+        of_drive(self._wiring).advance(
+            self.k, self.step_s, inner_steps(self.step_s), every, source.ahead(self.k, count),
+            self.now, np.empty_like(self.now), kept, tuple(unit.memory() for unit in blocks))
         self.k += count
         return numbers, kept
 
@@ -284,7 +285,7 @@ class Emulator:
 
 
 def simulate(drive: Drive, duration: float, step_s: float = MACRO_STEP,
-             changes: Changes | None = None, every: int = 1) -> Run:
+             changes: Changes | None = None, every: int = 1, wiring: Wiring = DRIVE) -> Run:
     """
     Run a drive from rest in one process; see `Emulator` and `Emulator.run`.
 
@@ -300,6 +301,8 @@ def simulate(drive: Drive, duration: float, step_s: float = MACRO_STEP,
         live changes by the step at which each takes effect
     every
         keep the samples of the steps that this number divides
+    wiring
+        which units there are and what feeds them
 
     """
-    return Emulator(drive, step_s).run(duration, changes, every)
+    return Emulator(drive, step_s, wiring=wiring).run(duration, changes, every)

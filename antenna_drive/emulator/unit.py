@@ -22,34 +22,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 from antenna_drive.parameters.schema import check_changes, Entry, Value
 from antenna_drive.physics.arrays import FloatArray
+from antenna_drive.physics.block import Signal
 
 __all__ = ['FloatArray', 'Signal', 'Unit']
-
-
-@dataclass(frozen=True)
-class Signal:
-    """
-    One quantity that a unit puts out at every macro-step.
-
-    `exchanged` signals feed other units; the rest are readings, for people and recordings.
-    """
-
-    name: str
-    unit: str
-    description: str
-    exchanged: bool = True
-
-    @property
-    def rate_unit(self) -> str:
-        """Return the unit of the signal's time derivative."""
-        if self.unit.endswith('/s'):
-            return f'{self.unit}^2'
-        return f'{self.unit}/s'
 
 
 class Unit(ABC):

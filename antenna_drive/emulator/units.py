@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The five units of the drive: the compiled physics behind the interface of `Unit`."""
+"""The units of a wiring: their compiled physics behind the interface of `Unit`."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 import math
-from typing import Any, ClassVar
+from typing import Any
 
-from antenna_drive.emulator import steps, wiring
-from antenna_drive.emulator.unit import FloatArray, Signal, Unit
+from antenna_drive.emulator.kernels import of_unit
+from antenna_drive.emulator.unit import FloatArray, Unit
+from antenna_drive.emulator.wiring import DRIVE, Wired, Wiring
 from antenna_drive.parameters.loading import check_waveform
 from antenna_drive.parameters.records import record_of
-from antenna_drive.parameters.schema import (
-    check_changes, Entry, nearest, ParameterError, Value,
-)
+from antenna_drive.parameters.schema import check_changes, Entry, nearest, ParameterError, Value
 from antenna_drive.parameters.sets import changed, Drive, TestSignal, values
-from antenna_drive.physics import motor_drive, structure, test_signal, torque_share
+from antenna_drive.physics import signal_generator
+from antenna_drive.physics.block import Block, Source
 from antenna_drive.physics.integrator import work_space
 import numpy as np
 
@@ -45,11 +45,12 @@ def inner_steps(step_s: float) -> int:
 class _DriveUnit(Unit):
     """What our units share: a parameter set, its record, and names for its settings."""
 
-    # The set whose parameters go by their bare names; others carry theirs: 'filter_1.gain'.
-    _own: ClassVar[str] = ''
-
-    def __init__(self, name: str, parameters: Any) -> None:
+    def __init__(self, name: str, wired: Wired, parameters: Any) -> None:
         super().__init__(name)
+        self.inputs = wired.sources  # type: ignore[misc]
+        self.outputs = wired.interface.outputs  # type: ignore[misc]
+        # The set whose parameters go by their bare names; others carry theirs: 'filter_1.gain'.
+        self._bare = wired.interface.bare
         self._set = parameters
         self._record = record_of(parameters)
         self._step_s = 0.0
@@ -62,11 +63,11 @@ class _DriveUnit(Unit):
     def _path(self, name: str) -> str:
         """Return the dotted name of a setting in the parameter set."""
         head = name.partition('.')[0]
-        return name if not self._own or hasattr(self._set, head) else f'{self._own}.{name}'
+        return name if not self._bare or hasattr(self._set, head) else f'{self._bare}.{name}'
 
     def settings(self) -> Mapping[str, tuple[Entry, Value]]:
         """Return every parameter of this unit: its name, what may be said of it, its value."""
-        prefix = f'{self._own}.' if self._own else ''
+        prefix = f'{self._bare}.' if self._bare else ''
         return {name.removeprefix(prefix): (entry, value)
                 for name, entry, value in values(self._set)}
 
@@ -85,94 +86,51 @@ class _DriveUnit(Unit):
         return changed(self._set, {self._path(name): value for name, value in checked.items()})
 
 
-class _SteppedUnit(_DriveUnit):
+class BlockUnit(_DriveUnit):
     """A unit with states of its own, advanced by its compiled physics."""
 
-    _physics: ClassVar[Any]
-    _advance: ClassVar[Any]
-
-    def __init__(self, name: str, parameters: Any, states: int) -> None:
-        super().__init__(name, parameters)
+    def __init__(self, name: str, wired: Wired, parameters: Any) -> None:
+        """Take the unit's place in the wiring, and its parameter set."""
+        super().__init__(name, wired, parameters)
+        assert isinstance(wired.interface, Block)
+        self.block = wired.interface
+        kernels = of_unit(self.block)
+        self._start, self._step = kernels.start.dispatcher, kernels.step.dispatcher
+        states = self.block.count_states(self._record[0])
         self._x = np.zeros(states)
-        self._mode = np.zeros(self._physics.MODES, np.int64)
+        self._mode = np.zeros(len(self.block.modes), np.int64)
         self._work = work_space(states)
         self._u = np.zeros((len(self.inputs), 2))
         self._y = np.zeros((len(self.outputs), 2))
         self._inner_steps = 1
 
     def memory(self) -> tuple[Any, ...]:
-        """Return record, states, mode, inputs, work space and outputs, for a compiled loop."""
+        """Return record, states, modes, inputs, work space and outputs, for a compiled loop."""
         return self._record, self._x, self._mode, self._u, self._work, self._y
 
     def start(self, step_s: float) -> FloatArray:
         """Return to the state at rest and give the outputs at t = 0; see `Unit.start`."""
         self._step_s = step_s
         self._inner_steps = inner_steps(step_s)
-        self._physics.start(self._record[0], self._x, self._mode, self._y)
+        self._start(self._record, self._x, self._mode, self._u, self._y)
         return self._y.copy()
 
     def step(self, k: int, inputs: FloatArray) -> FloatArray:
         """Advance from t_k to t_k+1 and give the outputs there; see `Unit.step`."""
-        self._advance(self._x, self._mode, inputs, self._record, self._step_s,
-                      self._inner_steps, self._work, self._y)
+        self._step(self._x, self._mode, inputs, self._record, self._step_s,
+                   self._inner_steps, self._work, self._y)
         return self._y.copy()
 
 
-class MotorDriveUnit(_SteppedUnit):
-    """One motor with its amplifiers and its gearbox: G_o of Fig. 6."""
-
-    inputs: ClassVar[tuple[str, ...]] = wiring.MOTOR_INPUTS
-    outputs: ClassVar[tuple[Signal, ...]] = wiring.MOTOR_OUTPUTS
-    _physics: ClassVar[Any] = motor_drive
-    _advance: ClassVar[Any] = staticmethod(steps.motor_step)
-
-    def __init__(self, name: str, drive: Drive) -> None:
-        """Take motor_1's or motor_2's parameters, whichever `name` says."""
-        super().__init__(name, getattr(drive, name), motor_drive.STATES)
-
-
-class TorqueShareUnit(_SteppedUnit):
-    """The torque-share circuit of Fig. 14 with Filter 1 behind it."""
-
-    inputs: ClassVar[tuple[str, ...]] = wiring.INPUTS[wiring.TORQUE_SHARE]
-    outputs: ClassVar[tuple[Signal, ...]] = wiring.TORQUE_SHARE_OUTPUTS
-    _physics: ClassVar[Any] = torque_share
-    _advance: ClassVar[Any] = staticmethod(steps.share_step)
-    _own = 'circuit'
-
-    def __init__(self, name: str, drive: Drive) -> None:
-        """Take the torque share's parameters from the drive's."""
-        super().__init__(name, drive.torque_share, torque_share.STATES)
-
-
-class PlantUnit(_SteppedUnit):
-    """The rate-loop plant: hub, flexible modes, axis friction, encoder; Fig. 4."""
-
-    inputs: ClassVar[tuple[str, ...]] = wiring.INPUTS[wiring.PLANT]
-    outputs: ClassVar[tuple[Signal, ...]] = wiring.PLANT_OUTPUTS
-    _physics: ClassVar[Any] = structure
-    _advance: ClassVar[Any] = staticmethod(steps.plant_step)
-    _own = 'axis'
-
-    def __init__(self, name: str, drive: Drive) -> None:
-        """Take the plant's parameters from the drive's."""
-        super().__init__(name, drive.plant,
-                         structure.states(len(drive.plant.axis.mode_inertias)))
-
-
-class TestSignalUnit(_DriveUnit):
+class SourceUnit(_DriveUnit):
     """The test signals: the axis rate command, and a torque on the axis."""
 
-    __test__ = False  # not a test case, whatever its name suggests to pytest
-
-    outputs: ClassVar[tuple[Signal, ...]] = wiring.TEST_SIGNAL_OUTPUTS
-    _own = 'rate'
     # A change of one of these goes on within the waveform; any other begins it anew.
     _SCALES = ('amplitude', 'offset', 'external')
 
-    def __init__(self, name: str, drive: Drive) -> None:
-        """Take the test signal's parameters from the drive's."""
-        super().__init__(name, drive.test_signal)
+    def __init__(self, name: str, wired: Wired, parameters: TestSignal) -> None:
+        """Take the unit's place in the wiring, and its parameter set."""
+        super().__init__(name, wired, parameters)
         self._bits = _bits_for(self._set)
         self._origins = np.zeros(2)
         self._next = 0
@@ -217,8 +175,8 @@ class TestSignalUnit(_DriveUnit):
 
     def _sample(self, first: int, count: int) -> FloatArray:
         y = np.zeros((count, len(self.outputs), 2))
-        steps.sample_signals(first, count, self._step_s, self._origins, self._record,
-                             self._bits, y)
+        signal_generator.sample(first, count, self._step_s, self._origins, self._record,
+                                self._bits, y)
         return y
 
     def _changed(self, changes: Mapping[str, Value]) -> Any:
@@ -230,21 +188,13 @@ class TestSignalUnit(_DriveUnit):
 
 
 _NO_BITS = np.ones(1)
-_prbs_bits = cache(test_signal.prbs_bits)
+_prbs_bits = cache(signal_generator.prbs_bits)
 
 
 def _bits_for(parameters: TestSignal) -> FloatArray:
     """Return the binary sequence if a waveform needs it: to make it imports half of scipy."""
     kinds = (parameters.rate.waveform, parameters.torque.waveform)
     return _prbs_bits() if 'prbs' in kinds else _NO_BITS
-
-
-_UNITS: dict[str, type[Any]] = {
-    wiring.TEST_SIGNAL: TestSignalUnit,
-    **dict.fromkeys(wiring.MOTORS, MotorDriveUnit),
-    wiring.TORQUE_SHARE: TorqueShareUnit,
-    wiring.PLANT: PlantUnit,
-}
 
 
 def home(parameter: str) -> tuple[str, str]:
@@ -259,8 +209,8 @@ def home(parameter: str) -> tuple[str, str]:
 
     """
     name, _, rest = parameter.partition('.')
-    own = _UNITS[name]._own
-    return name, rest.removeprefix(f'{own}.') if own else rest
+    bare = DRIVE.units[name].interface.bare
+    return name, rest.removeprefix(f'{bare}.') if bare else rest
 
 
 def overridden(drive: Drive, overrides: Mapping[str, Mapping[str, Value]]) -> Drive:
@@ -284,34 +234,44 @@ def overridden(drive: Drive, overrides: Mapping[str, Mapping[str, Value]]) -> Dr
     return replace(drive, **sets)
 
 
-def build(name: str, drive: Drive, overrides: Mapping[str, Value] | None = None) -> Unit:
+def build(name: str, drive: Drive, overrides: Mapping[str, Value] | None = None,
+          wiring: Wiring = DRIVE) -> Unit:
     """
-    Build one of the drive's units.
+    Build one of the units of a wiring.
 
     Parameters
     ----------
     name
-        one of wiring.UNITS
+        one of wiring.units
     drive
-        the parameters of the whole drive
+        the parameters of the whole drive, a `wiring.parameters`
     overrides
         settings of the unit, constants too, that differ from the drive's
+    wiring
+        the drive's own unless said otherwise
 
     Raises
     ------
     KeyError : there is no unit of that name
-    ParameterError : an override is unknown or its value is not allowed
+    ParameterError : an override is unknown or its value is not allowed; the wiring says what the
+        unit looks like but not what it does
 
     """
-    unit = _UNITS[name](name, drive)
+    wired = wiring.units[name]
+    if isinstance(wired.interface, Block):
+        kind: Any = BlockUnit
+    elif isinstance(wired.interface, Source):
+        kind = SourceUnit
+    else:
+        raise ParameterError(f'{name}: has no physics of its own, give a unit in its place')
+    unit = kind(name, wired, getattr(drive, name))
     if overrides:
         settings = unit.settings()
         for key in overrides:
             if key not in settings:
                 raise ParameterError(f'{key}: no such parameter{nearest(key, tuple(settings))}')
-        # the drive calls each unit's set by the unit's name
-        unit = _UNITS[name](name, changed(drive, {
-            f'{name}.{unit._path(key)}': settings[key][0].check(key, value)
+        unit = kind(name, wired, changed(unit.parameters, {
+            unit._path(key): settings[key][0].check(key, value)
             for key, value in overrides.items()}))
         unit.check({})
     result: Unit = unit

@@ -32,6 +32,7 @@ from antenna_drive.remedies import remedy
 
 if TYPE_CHECKING:
     from antenna_drive.emulator.unit import Unit
+    from antenna_drive.emulator.wiring import Wiring
     from antenna_drive.parameters.schema import Value
     from rclpy.node import Node
 
@@ -40,14 +41,15 @@ OK, BAD_INPUT, NOT_INSTALLED = 0, 2, 3
 # The process that a node must not outlive, by number; set by whoever starts nodes for himself.
 PARENT = 'ANTENNA_DRIVE_PARENT'
 
-# Makes the unit of a node: its name, configuration files, what else was given by name.
-MakeUnit = Callable[[str, Sequence[str], Mapping[str, Any]], 'Unit']
+# Makes the unit of a node: its name, the wiring, configuration files, what else was given by name.
+MakeUnit = Callable[[str, 'Wiring', Sequence[str], Mapping[str, Any]], 'Unit']
 
 
 def run_drive_unit(default_name: str, names: Sequence[str], args: Sequence[str] | None = None,
-                   fed_by_topic: Sequence[str] = (), description: str = '') -> int:
+                   fed_by_topic: Sequence[str] = (), description: str = '',
+                   wiring: str = '') -> int:
     """
-    Run one of the drive's units as a ROS 2 node; SIGINT or SIGTERM ends the process.
+    Run a unit of the wiring as a ROS 2 node; SIGINT or SIGTERM ends the process.
 
     Parameters
     ----------
@@ -61,31 +63,32 @@ def run_drive_unit(default_name: str, names: Sequence[str], args: Sequence[str] 
         settings that follow a Float64 topic `<node>/<setting>`
     description
         what --help says first
+    wiring
+        module:NAME of the wiring unless the parameter `wiring` names another; '' is the drive's
 
     Returns
     -------
     exit code of a node that did not start: 2 wrong input, 3 no ROS 2; 0 after --help
 
     """
-    def make(name: str, config: Sequence[str], given: Mapping[str, Any]) -> Unit:
+    def make(name: str, wired: Wiring, config: Sequence[str], given: Mapping[str, Any]) -> Unit:
         from antenna_drive.emulator import units
-        from antenna_drive.parameters import load
         import numpy as np
         if name not in names:
             raise UserError(f'{name}: no such unit, allowed for this node are {", ".join(names)}; '
                             f'choose with --ros-args -r __node:={names[-1]}')
-        unit = units.build(name, load(*config), given)
+        unit = units.build(name, wired.load(*config), given, wired)
         # compile now, not in the first step
         unit.start(1e-3)
         unit.step(0, np.zeros((len(unit.inputs), 2)))
         return unit
 
-    return _run(default_name, make, args, fed_by_topic, description)
+    return _run(default_name, make, args, fed_by_topic, description, wiring)
 
 
-def run_unit(unit: Unit, args: Sequence[str] | None = None) -> int:
+def run_unit(unit: Unit, args: Sequence[str] | None = None, wiring: str = '') -> int:
     """
-    Run a unit of your own in the place of one of ours; SIGINT or SIGTERM ends the process.
+    Run a unit of your own in the place of one of the wiring; SIGINT or SIGTERM ends the process.
 
     Parameters
     ----------
@@ -93,17 +96,18 @@ def run_unit(unit: Unit, args: Sequence[str] | None = None) -> int:
         its name is the name of the unit that it stands in for
     args
         command line without the program's name; None for the process's own
+    wiring
+        as for `run_drive_unit`
 
     Returns
     -------
     exit code of a node that did not start: 2 wrong input, 3 no ROS 2; 0 after --help
 
     """
-    def make(name: str, config: Sequence[str], given: Mapping[str, Any]) -> Unit:
-        from antenna_drive.emulator.wiring import UNITS
+    def make(name: str, wired: Wiring, config: Sequence[str], given: Mapping[str, Any]) -> Unit:
         from antenna_drive.parameters.schema import nearest, ParameterError
-        if name not in UNITS:
-            raise UserError(f'{name}: no such unit, allowed are {", ".join(UNITS)}')
+        if name not in wired.units:
+            raise UserError(f'{name}: no such unit, allowed are {", ".join(wired.units)}')
         unit.name = name
         settings = unit.settings()
         changes: dict[str, Value] = {}
@@ -114,11 +118,11 @@ def run_unit(unit: Unit, args: Sequence[str] | None = None) -> int:
         unit.tune(changes)
         return unit
 
-    return _run(unit.name, make, args, (), type(unit).__doc__ or '')
+    return _run(unit.name, make, args, (), type(unit).__doc__ or '', wiring)
 
 
 def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None,
-         fed_by_topic: Sequence[str], description: str) -> int:
+         fed_by_topic: Sequence[str], description: str, wiring: str) -> int:
     ending = _Ending()
     _follow(os.environ.get(PARENT))
     arguments = list(sys.argv[1:] if args is None else args)
@@ -128,7 +132,7 @@ def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None,
             print(_help(program, description))
             return OK
         choose_transport(os.environ)
-        status = _run_node(default_name, make, arguments, fed_by_topic, ending)
+        status = _run_node(default_name, make, arguments, fed_by_topic, wiring, ending)
     except UserError as error:
         return _say(program, str(error), BAD_INPUT)
     except ModuleNotFoundError as error:
@@ -180,7 +184,7 @@ def _follow(parent: str | None) -> None:
 
 
 def _run_node(default_name: str, make: MakeUnit, arguments: list[str],
-              fed_by_topic: Sequence[str], ending: _Ending) -> int:
+              fed_by_topic: Sequence[str], wiring: str, ending: _Ending) -> int:
     import rclpy
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
@@ -197,7 +201,7 @@ def _run_node(default_name: str, make: MakeUnit, arguments: list[str],
     try:
         node = _bare_node(default_name)
         try:
-            return _spin(node, make, fed_by_topic, ending)
+            return _spin(node, make, fed_by_topic, wiring, ending)
         finally:
             node.destroy_node()
     finally:
@@ -215,7 +219,9 @@ def _bare_node(default_name: str) -> Node:
         raise UserError(_first_line(error)) from error
 
 
-def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], ending: _Ending) -> int:
+def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], wiring: str,
+          ending: _Ending) -> int:
+    from antenna_drive.emulator.wiring import find
     from antenna_drive.lockstep.node import DriveNode, OWN_PARAMETERS
     from antenna_drive.lockstep.ros_parameters import Overrides
 
@@ -223,8 +229,10 @@ def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], ending: _Endi
     config = [name for name in overrides.names('config', ()) if name != 'reference']
     given = {name: value for name, value in overrides.rest().items()
              if name not in OWN_PARAMETERS}
-    unit = make(node.get_name(), config, given)
-    drive_node = DriveNode(node, unit, overrides, config, fed_by_topic)
+    wiring = ''.join(overrides.names('wiring', [wiring]))
+    wired = find(wiring)
+    unit = make(node.get_name(), wired, config, given)
+    drive_node = DriveNode(node, unit, overrides, config, fed_by_topic, wiring, wired.outputs)
     ending.by(drive_node.stop)
     if not ending.asked:
         drive_node.spin()
@@ -253,6 +261,7 @@ def _help(program: str, description: str) -> str:
         f'usage: {program} [--ros-args ROS_ARGUMENTS]', '', description.strip(), '',
         'Useful ROS 2 arguments:',
         "  -p config:=\"['old_circuit']\"   configuration files or sets, later over earlier",
+        '  -p wiring:=MODULE:NAME        units and what feeds them, if not those of the drive',
         '  --params-file FILE            parameters from a YAML file',
         '  -r __ns:=/east                put the node into a namespace',
         '  -r __node:=NAME               give it another name',

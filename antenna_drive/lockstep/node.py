@@ -15,13 +15,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping, Sequence
 import gc
 import json
 import time
 
-from antenna_drive.emulator.unit import FloatArray, Unit
-from antenna_drive.emulator.wiring import TEST_SIGNAL
+from antenna_drive.emulator.unit import FloatArray, Signal, Unit
+from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.lockstep import ros_parameters
 from antenna_drive.lockstep.member import Conductor, Member
 from antenna_drive.lockstep.pace import LEAD_S, Pace
@@ -50,7 +50,7 @@ STEP = Entry('s', 1e-5, 0.1, 'macro-step')
 DURATION = Entry('s', 0.0, 1e9, 'simulated time after which the run ends, 0: never')
 
 # What a node itself may be told, beside the settings of its unit.
-OWN_PARAMETERS = ('config', 'publish_rate', 'run.step', 'run.pace', 'run.lead',
+OWN_PARAMETERS = ('config', 'wiring', 'publish_rate', 'run.step', 'run.pace', 'run.lead',
                   'run.duration', 'run.observers')
 
 
@@ -63,7 +63,8 @@ class DriveNode:
     """
 
     def __init__(self, node: Node, unit: Unit, overrides: ros_parameters.Overrides,
-                 config: Collection[str] = (), fed_by_topic: Collection[str] = ()) -> None:
+                 config: Collection[str] = (), fed_by_topic: Collection[str] = (),
+                 wiring: str = '', outputs: Mapping[str, Sequence[Signal]] = OUTPUTS) -> None:
         """
         Declare parameters and topics.
 
@@ -80,6 +81,8 @@ class DriveNode:
         fed_by_topic
             live settings that follow a Float64 topic `<node>/<setting>` instead of
             being parameters
+        wiring, outputs
+            what the wiring of the drive is called, and the signals of each of its units
 
         Raises
         ------
@@ -89,6 +92,7 @@ class DriveNode:
         self._node = node
         self._unit = unit
         self._fed_by_topic = tuple(fed_by_topic)
+        self._outputs = outputs
         self.tuning = ros_parameters.Tuning(unit)
         self._stop = False
         birth = float(time.time_ns() // 1000)
@@ -101,6 +105,8 @@ class DriveNode:
         overrides.check_all_known([*settings, *own])
         ros_parameters.declare_names(node, 'config', [*config] or ['reference'],
                                      'configuration files or sets of config/, later over earlier')
+        ros_parameters.declare_names(node, 'wiring', [wiring],
+                                     "module:NAME of the wiring, '' for the drive's own")
         ros_parameters.declare(node, {**settings, **own})
         self._own_entries = {name: entry for name, (entry, _) in own.items()}
         self._link = FrameLink(node, self._member.layouts)
@@ -121,7 +127,7 @@ class DriveNode:
     def _make_member(self, birth: float, overrides: ros_parameters.Overrides,
                      own: dict[str, tuple[Entry, Value]]) -> Member:
         if self._unit.name != TEST_SIGNAL:
-            return Member(self._unit, birth)
+            return Member(self._unit, birth, self._outputs)
         step_s = overrides.number('run.step', STEP, 1e-3)
         pace = overrides.number('run.pace', PACE, 1.0)
         lead_s = overrides.number('run.lead', LEAD, LEAD_S)
@@ -135,7 +141,7 @@ class DriveNode:
                                      'names of recorders that every step waits for')
         self._pace = Pace(pace, lead_s)
         return Conductor(self._unit, birth, step_s, round(duration / step_s) or None,
-                         observers=observers)
+                         self._outputs, observers)
 
     def _follow(self, setting: str) -> None:
         def follow(message: Float64) -> None:

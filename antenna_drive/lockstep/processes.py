@@ -26,17 +26,10 @@ import time
 from types import TracebackType
 from typing import IO
 
-from antenna_drive.emulator.wiring import MOTORS, PLANT, TEST_SIGNAL, TORQUE_SHARE, UNITS
+from antenna_drive.emulator.wiring import find, TEST_SIGNAL
 from antenna_drive.errors import UserError
 from antenna_drive.lockstep.entry import choose_transport, PARENT
 from antenna_drive.lockstep.placement import hasten, machine_is_idle
-
-MODULES = {
-    TEST_SIGNAL: 'antenna_drive.nodes.test_signal',
-    **dict.fromkeys(MOTORS, 'antenna_drive.nodes.motor_drive'),
-    TORQUE_SHARE: 'antenna_drive.nodes.torque_share',
-    PLANT: 'antenna_drive.nodes.rate_loop_plant',
-}
 
 # Nodes end within two seconds of a signal; after this something is wrong with them.
 END_PATIENCE_S = 5.0
@@ -46,7 +39,7 @@ Parameter = float | int | bool | str | Sequence[float] | Sequence[str]
 
 class DriveProcesses:
     """
-    The five processes of a drive, as a context manager that leaves none behind.
+    The processes of a drive, one for each unit, as a context manager that leaves none behind.
 
     Those of a drive that is to run as fast as possible (run.pace 0), on a machine that is idle
     when they are started, are placed for speed, see `placement`.
@@ -56,7 +49,7 @@ class DriveProcesses:
 
     def __init__(self, parameters: Mapping[str, Mapping[str, Parameter]] | None = None, *,
                  config: Sequence[str] = (), namespace: str = '', domain_id: int | None = None,
-                 order: Sequence[str] = UNITS,
+                 order: Sequence[str] = (), wiring: str = '',
                  commands: Mapping[str, Sequence[str]] | None = None,
                  environment: Mapping[str, str] | None = None) -> None:
         """
@@ -72,14 +65,18 @@ class DriveProcesses:
         domain_id
             the ROS 2 domain; None for the one in the environment
         order
-            the units, in the order in which they are started
+            the units, in the order in which they are started; that of the wiring if empty
+        wiring
+            module:NAME of the wiring, '' for the drive's own
         commands
             commands to run in place of our own nodes, by unit
         environment
             variables to set beside those of this process
 
         """
-        self.order = tuple(order)
+        self._wiring = wiring
+        self._units = find(wiring).units
+        self.order = tuple(order or self._units)
         self._parameters = {name: dict(values) for name, values in (parameters or {}).items()}
         self._config = [str(item) for item in config]
         self._namespace = namespace
@@ -95,13 +92,15 @@ class DriveProcesses:
 
     def command(self, unit: str) -> list[str]:
         """Return the command line of a unit's process."""
-        start = self._commands.get(unit, (sys.executable, '-m', MODULES.get(unit, '')))
+        start = self._commands.get(unit) or (sys.executable, '-m', self._units[unit].node)
         arguments = [*start, '--ros-args', '-r', f'__node:={unit}']
         if self._namespace:
             arguments += ['-r', f'__ns:={self._namespace}']
         parameters: dict[str, Parameter] = dict(self._parameters.get(unit, {}))
         if self._config:
             parameters.setdefault('config', self._config)
+        if self._wiring and unit in self._units:
+            parameters.setdefault('wiring', self._wiring)
         for name, value in parameters.items():
             arguments += ['-p', f'{name}:={_yaml(value)}']
         return arguments

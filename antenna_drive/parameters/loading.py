@@ -25,7 +25,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields, MISSING
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 from antenna_drive.parameters import files
 from antenna_drive.parameters.plain_yaml import read_yaml
@@ -52,7 +52,7 @@ _ENTRY_KEYS = ('value', 'unit', 'range', 'source', 'note')
 _Given = dict[str, tuple[Value, str]]
 
 
-def load(*sources: str | Path) -> Drive:
+def load(*sources: str | Path, kind: Any = Drive) -> Drive:
     """
     Load configuration files, each over the one before, and check everything.
 
@@ -60,6 +60,9 @@ def load(*sources: str | Path) -> Drive:
     ----------
     sources
         paths, or names of the sets in config/ ('new_circuit'); none is the reference set
+    kind
+        Drive, or a subclass with further parameter sets; a file gives each in a section of its
+        field's name
 
     Raises
     ------
@@ -69,13 +72,15 @@ def load(*sources: str | Path) -> Drive:
     """
     given: _Given = {}
     alone = False
+    own = {item.name for item in fields(Drive)}
+    more = {name: hint for name, hint in get_type_hints(kind).items() if name not in own}
     for source in sources:
-        base, content = _read(find(source))
+        base, content = _read(find(source), {**SECTIONS, **more})
         alone = alone or base == 'none'
         given.update(content)
     if not alone:
-        given = {**_read(find('reference'))[1], **given}
-    return _drive(given, str(sources[-1]) if sources else 'reference')
+        given = {**_read(find('reference'), SECTIONS)[1], **given}
+    return _drive(given, str(sources[-1]) if sources else 'reference', kind, more)
 
 
 def find(source: str | Path) -> Path:
@@ -98,7 +103,7 @@ def find(source: str | Path) -> Path:
                          f'({", ".join(known)}){nearest(str(source), known)}')
 
 
-def _read(path: Path) -> tuple[str, _Given]:
+def _read(path: Path, sections: Mapping[str, type]) -> tuple[str, _Given]:
     content = read_yaml(path)
     if content is None:
         content = {}
@@ -109,10 +114,10 @@ def _read(path: Path) -> tuple[str, _Given]:
     if base not in ('reference', 'none'):
         raise ParameterError(f'{path}: base: {base!r} given, allowed is reference or none')
     given: _Given = {}
-    allowed = (*SECTIONS, *MOTOR_SIGNS, 'test_signal')
+    allowed = (*sections, *MOTOR_SIGNS, 'test_signal')
     for section, body in content.items():
-        if section in SECTIONS:
-            _section(path, str(section), SECTIONS[section], body, given)
+        if section in sections:
+            _section(path, str(section), sections[section], body, given)
         elif section in MOTOR_SIGNS:
             _motor_section(path, str(section), body, given)
         elif section == 'test_signal':
@@ -202,7 +207,7 @@ def _narrowed(key: str, entry: Entry, item: Mapping[str, Any]) -> Entry:
                  entry.choices, entry.lengths, entry.whole)
 
 
-def _drive(given: _Given, source: str) -> Drive:
+def _drive(given: _Given, source: str, kind: Any, more: Mapping[str, type]) -> Drive:
     axis = _set(Axis, ('axis',), given, source)
     _check_modes(axis, given)
     torque_share = _set(TorqueShare, ('torque_share',), given, source)
@@ -216,13 +221,15 @@ def _drive(given: _Given, source: str) -> Drive:
              for part in TEST_SIGNAL_PARTS}
     for part, waveform in parts.items():
         check_waveform(waveform, f'{source}: test_signal.{part}')
-    return Drive(
+    drive: Drive = kind(
         test_signal=_set(TestSignal, ('test_signal',), given, source, **parts),
         motor_1=_motor('motor_1', axis, given, source),
         motor_2=_motor('motor_2', axis, given, source),
         torque_share=Share(circuit=torque_share,
                            filter_1=_set(Filter1, ('filter_1',), given, source)),
-        plant=Plant(axis=axis, encoder=_set(Encoder, ('encoder',), given, source)))
+        plant=Plant(axis=axis, encoder=_set(Encoder, ('encoder',), given, source)),
+        **{name: _set(item, (name,), given, source) for name, item in more.items()})
+    return drive
 
 
 def _motor(motor: str, axis: Axis, given: _Given, source: str) -> MotorDrive:

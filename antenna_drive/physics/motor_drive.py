@@ -17,51 +17,45 @@ One motor with its amplifiers and its gearbox: the subsystem G_o of Figs. 6 and 
 States: command voltage [V], integral of amplifier 1 [article A], lagged demand [article A],
 current [article A], motor angle [rad], motor rate [rad/s], hysteresis of the gearbox [1], and
 the gear torque's impulse since the start of the macro-step [N m s].
-Mode: friction (+1, -1 slips, 0 sticks), contact (+1, -1 flank, 0 gap), integral of
+Modes: friction (+1, -1 slips, 0 sticks), contact (+1, -1 flank, 0 gap), integral of
 amplifier 1 (FREE, FROZEN, HELD).
 Inputs: rate command [rad/s], counter torque [V], axis angle [rad], axis rate [rad/s].
-Outputs: current [article A], gear torque [N m], impulse missed [N m s], tachometer [rad/s],
-ammeter [article A].
 """
 
 from __future__ import annotations
 
 from antenna_drive.parameters.sets import MotorDrive
 from antenna_drive.physics.amplifier import (
-    armature_voltage, error_slope, FREE, HELD, integral_rate, limit_centre, limited,
-    next_winding, rate_error,
+    armature_voltage, error_slope, FREE, HELD, integral_rate, limit_centre, limited, next_winding,
+    rate_error,
 )
 from antenna_drive.physics.armature import current_rate
 from antenna_drive.physics.arrays import FloatArray, IntArray
 from antenna_drive.physics.backlash import contact_side, contact_torque_rate
-from antenna_drive.physics.compiling import compiled, inner, shared
+from antenna_drive.physics.block import Block, Equation, held, output_rows, put, rows, Signal
+from antenna_drive.physics.compiling import inner, shared
 from antenna_drive.physics.friction import next_slip
 from antenna_drive.physics.gearbox import gear_torque, presliding_rate, twist, twist_rate
-from antenna_drive.physics.integrator import located_runge_kutta
 from antenna_drive.physics.motor import ammeter, driving_torque, friction_level, tachometer
 from antenna_drive.physics.rate_command import command_voltage_rate
-import numpy as np
 
-VOLTAGE, INTEGRAL, DEMAND, CURRENT, ANGLE, RATE, PRESLIDING, IMPULSE = range(8)
-STATES = 8
-SLIP, SIDE, WINDING = range(3)
-MODES = 3
-RATE_COMMAND, COUNTER_TORQUE, AXIS_ANGLE, AXIS_RATE = range(4)
-INPUTS = 4
-OUTPUTS = 5
-_AT_REST = np.zeros((INPUTS, 2))
-
-
-@inner
-def _held(u: FloatArray, signal: int, t: float) -> float:
-    """Return an input at t after the start of the macro-step: the first-order hold."""
-    return u[signal, 0] + u[signal, 1] * t
+STATE = rows('voltage', 'integral', 'demand', 'current', 'angle', 'rate', 'presliding', 'impulse')
+MODE = rows('slip', 'side', 'winding')
+INPUT = rows('rate_command', 'counter_torque', 'axis_angle', 'axis_rate')
+OUTPUTS = (
+    Signal('current', 'A', 'motor current, article amperes'),
+    Signal('gear_torque', 'N m', 'gearbox torque at the motor shaft, positive drives the axis'),
+    Signal('missed_impulse', 'N m s', 'impulse of the gear torque that its extrapolation missed'),
+    Signal('tach_rate', 'rad/s', 'tachometer reading', exchanged=False),
+    Signal('ammeter', 'A', 'ammeter reading, article amperes', exchanged=False),
+)
+OUTPUT = output_rows(OUTPUTS)
 
 
 @inner
 def _axis_angle(u: FloatArray, t: float) -> float:
     """Return the axis angle at t; its second derivative is known, so the hold is a parabola."""
-    return u[AXIS_ANGLE, 0] + (u[AXIS_RATE, 0] + 0.5 * u[AXIS_RATE, 1] * t) * t
+    return u[INPUT.axis_angle, 0] + (u[INPUT.axis_rate, 0] + 0.5 * u[INPUT.axis_rate, 1] * t) * t
 
 
 @inner
@@ -69,19 +63,27 @@ def _gear(
         t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: MotorDrive,
 ) -> tuple[float, float]:
     """Return twist rate [rad/s] and gear torque [N m] at t."""
-    angle = twist(x[ANGLE], _axis_angle(u, t), p.gear_ratio, p.gearbox)
-    rate = twist_rate(x[ANGLE], x[RATE], _held(u, AXIS_RATE, t), p.gear_ratio, p.gearbox)
-    return rate, gear_torque(mode[SIDE], angle, rate, x[PRESLIDING], p.gearbox)
+    angle = twist(x[STATE.angle], _axis_angle(u, t), p.gear_ratio, p.gearbox)
+    rate = twist_rate(x[STATE.angle], x[STATE.rate], held(u, INPUT.axis_rate, t), p.gear_ratio,
+                      p.gearbox)
+    return rate, gear_torque(mode[MODE.side], angle, rate, x[STATE.presliding], p.gearbox)
 
 
 @inner
 def _acceleration(x: FloatArray, mode: IntArray, torque: float, p: MotorDrive) -> float:
     """Return the rotor's acceleration [rad/s^2] against the gear torque [N m], Eq. (2)."""
-    if mode[SLIP] == 0:
+    if mode[MODE.slip] == 0:
         return 0.0
-    applied = driving_torque(x[CURRENT], x[ANGLE], p.motor) - torque
-    friction = mode[SLIP] * friction_level(x[RATE], torque, p.motor)
+    applied = driving_torque(x[STATE.current], x[STATE.angle], p.motor) - torque
+    friction = mode[MODE.slip] * friction_level(x[STATE.rate], torque, p.motor)
     return (applied - friction) / p.motor.rotor_inertia
+
+
+@inner
+def _voltage_rate(t: float, x: FloatArray, u: FloatArray, p: MotorDrive) -> float:
+    """Return the time derivative of the command voltage [V/s]."""
+    command = held(u, INPUT.rate_command, t)
+    return command_voltage_rate(x[STATE.voltage], command, p.rate_command)
 
 
 @inner
@@ -90,9 +92,8 @@ def _error_slope(
 ) -> float:
     """Return the time derivative of the rate error [article A/s]."""
     return error_slope(
-        error, command_voltage_rate(x[VOLTAGE], _held(u, RATE_COMMAND, t), p.rate_command),
-        p.tachometer.gain * acceleration,
-        p.sign * p.amplifier.bias_command_gain * u[COUNTER_TORQUE, 1], p.amplifier)
+        error, _voltage_rate(t, x, u, p), p.tachometer.gain * acceleration,
+        p.sign * p.amplifier.bias_command_gain * u[INPUT.counter_torque, 1], p.amplifier)
 
 
 @inner
@@ -100,15 +101,15 @@ def _demand(
         t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: MotorDrive,
 ) -> tuple[float, float, float]:
     """Return error, demand before its limit, and centre of the limit [article A] at t."""
-    bias_command = p.sign * p.amplifier.bias_command_gain * _held(u, COUNTER_TORQUE, t)
-    tach_rate = tachometer(x[RATE], x[ANGLE], p.tachometer)
-    error = rate_error(x[VOLTAGE], tach_rate, bias_command, p.amplifier)
+    bias_command = p.sign * p.amplifier.bias_command_gain * held(u, INPUT.counter_torque, t)
+    tach_rate = tachometer(x[STATE.rate], x[STATE.angle], p.tachometer)
+    error = rate_error(x[STATE.voltage], tach_rate, bias_command, p.amplifier)
     if p.amplifier.delay > 0.0:
         # the error of a little while ago, to first order
         _, torque = _gear(t, x, mode, u, p)
         error -= p.amplifier.delay * _error_slope(
             t, x, u, error, _acceleration(x, mode, torque, p), p)
-    return error, error + x[INTEGRAL], limit_centre(x[RATE], p.amplifier, p.armature)
+    return error, error + x[STATE.integral], limit_centre(x[STATE.rate], p.amplifier, p.armature)
 
 
 @inner
@@ -123,143 +124,117 @@ def _needed(
 
 @inner
 def _current_rate(x: FloatArray, p: MotorDrive) -> float:
-    volts = armature_voltage(x[DEMAND], x[CURRENT], p.amplifier, p.armature)
-    return current_rate(volts, x[CURRENT], x[RATE], p.armature)
+    volts = armature_voltage(x[STATE.demand], x[STATE.current], p.amplifier, p.armature)
+    return current_rate(volts, x[STATE.current], x[STATE.rate], p.armature)
 
 
 @shared
-def _rates(
+def rates(
         t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: MotorDrive, dx: FloatArray,
 ) -> None:
+    """Write the time derivatives of the states."""
     error, demand, centre = _demand(t, x, mode, u, p)
     rate, torque = _gear(t, x, mode, u, p)
-    dx[VOLTAGE] = command_voltage_rate(x[VOLTAGE], _held(u, RATE_COMMAND, t), p.rate_command)
+    dx[STATE.voltage] = _voltage_rate(t, x, u, p)
     acceleration = _acceleration(x, mode, torque, p)
-    needed = _needed(t, x, u, error, acceleration, p) if mode[WINDING] == HELD else 0.0
-    dx[INTEGRAL] = integral_rate(mode[WINDING], error, needed, p.amplifier)
-    dx[DEMAND] = (limited(demand, centre, p.motor.current_limit) - x[DEMAND]) / p.amplifier.lag
-    dx[CURRENT] = _current_rate(x, p)
-    dx[ANGLE] = x[RATE]
-    dx[RATE] = acceleration
-    dx[PRESLIDING] = presliding_rate(mode[SIDE], rate, x[PRESLIDING], p.gearbox)
-    dx[IMPULSE] = torque
+    needed = _needed(t, x, u, error, acceleration, p) if mode[MODE.winding] == HELD else 0.0
+    dx[STATE.integral] = integral_rate(mode[MODE.winding], error, needed, p.amplifier)
+    demand = limited(demand, centre, p.motor.current_limit)
+    dx[STATE.demand] = (demand - x[STATE.demand]) / p.amplifier.lag
+    dx[STATE.current] = _current_rate(x, p)
+    dx[STATE.angle] = x[STATE.rate]
+    dx[STATE.rate] = acceleration
+    dx[STATE.presliding] = presliding_rate(mode[MODE.side], rate, x[STATE.presliding], p.gearbox)
+    dx[STATE.impulse] = torque
 
 
 @shared
-def _switch(
+def switch(
         t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: MotorDrive, commit: bool,
 ) -> bool:
+    """Return whether the modes no longer hold; write the new ones if `commit`."""
     gear = p.gearbox
     side = contact_side(
-        twist(x[ANGLE], _axis_angle(u, t), p.gear_ratio, gear),
-        twist_rate(x[ANGLE], x[RATE], _held(u, AXIS_RATE, t), p.gear_ratio, gear),
+        twist(x[STATE.angle], _axis_angle(u, t), p.gear_ratio, gear),
+        twist_rate(x[STATE.angle], x[STATE.rate], held(u, INPUT.axis_rate, t), p.gear_ratio, gear),
         gear.half_gap, gear.stiffness, gear.contact_damping)
     error, demand, centre = _demand(t, x, mode, u, p)
     excess = (demand - centre if error > 0.0 else centre - demand) - p.motor.current_limit
-    winding = mode[WINDING]
+    winding = mode[MODE.winding]
     if excess > 0.0 or winding != FREE:
         _, torque = _gear(t, x, mode, u, p)
         needed = _needed(t, x, u, error, _acceleration(x, mode, torque, p), p)
         winding = next_winding(winding, error, excess, needed, p.amplifier)
-    slip = mode[SLIP]
-    if slip == 0 or slip * x[RATE] <= p.motor.velocity_threshold:
+    slip = mode[MODE.slip]
+    if slip == 0 or slip * x[STATE.rate] <= p.motor.velocity_threshold:
         _, torque = _gear(t, x, mode, u, p)
-        applied = driving_torque(x[CURRENT], x[ANGLE], p.motor) - torque
+        applied = driving_torque(x[STATE.current], x[STATE.angle], p.motor) - torque
         level = friction_level(0.0, torque, p.motor)
-        slip = next_slip(slip, x[RATE], applied, level, p.motor.stiction_ratio * level,
+        slip = next_slip(slip, x[STATE.rate], applied, level, p.motor.stiction_ratio * level,
                          p.motor.velocity_threshold)
-    changed = (slip != mode[SLIP]) or (side != mode[SIDE]) or (winding != mode[WINDING])
+    changed = (slip != mode[MODE.slip] or side != mode[MODE.side]
+               or winding != mode[MODE.winding])
     if commit and changed:
-        mode[SLIP] = slip
-        mode[SIDE] = side
-        mode[WINDING] = winding
+        mode[MODE.slip] = slip
+        mode[MODE.side] = side
+        mode[MODE.winding] = winding
         if slip == 0:
-            x[RATE] = 0.0
+            x[STATE.rate] = 0.0
     return changed
 
 
-_advance = located_runge_kutta(_rates, _switch, STATES)
-
-
-@compiled
-def outputs(
+@shared
+def read(
         x: FloatArray, mode: IntArray, u: FloatArray, t: float, p: MotorDrive, y: FloatArray,
 ) -> None:
-    """
-    Write the outputs at t after the start of a macro-step, with their time derivatives.
-
-    Parameters
-    ----------
-    x, mode
-        states and mode at t, shapes (8,) and (3,)
-    u
-        inputs at the start of the macro-step, shape (4, 2)
-    t
-        [s]
-    p
-        record of MotorDrive
-    y
-        receives value and derivative of each output, shape (5, 2)
-
-    """
+    """Write the outputs but for the missed impulse, which `end` knows."""
     rate, torque = _gear(t, x, mode, u, p)
     acceleration = _acceleration(x, mode, torque, p)
     current_slope = _current_rate(x, p)
-    y[0, 0] = x[CURRENT]
-    y[0, 1] = current_slope
-    y[1, 0] = torque
-    y[1, 1] = contact_torque_rate(
-        torque, rate, acceleration - p.gear_ratio * u[AXIS_RATE, 1],
+    torque_slope = contact_torque_rate(
+        torque, rate, acceleration - p.gear_ratio * u[INPUT.axis_rate, 1],
         p.gearbox.stiffness, p.gearbox.contact_damping)
-    y[2, 0] = 0.0
-    y[2, 1] = 0.0
-    y[3, 0] = tachometer(x[RATE], x[ANGLE], p.tachometer)
-    y[3, 1] = p.tachometer.gain * acceleration
-    y[4, 0] = ammeter(x[CURRENT], p.ammeter)
-    y[4, 1] = p.ammeter.gain * current_slope
+    put(y, OUTPUT.current, x[STATE.current], current_slope)
+    put(y, OUTPUT.gear_torque, torque, torque_slope)
+    put(y, OUTPUT.tach_rate, tachometer(x[STATE.rate], x[STATE.angle], p.tachometer),
+        p.tachometer.gain * acceleration)
+    put(y, OUTPUT.ammeter, ammeter(x[STATE.current], p.ammeter), p.ammeter.gain * current_slope)
 
 
-@compiled
-def start(p: MotorDrive, x: FloatArray, mode: IntArray, y: FloatArray) -> None:
-    """
-    Write the state at rest into x and mode, and its outputs into y; shapes as in `outputs`.
-
-    The axis is at zero; the motor stands where start_in_gap puts it inside its gap.
-    """
-    x[:] = 0.0
-    mode[:] = 0
-    x[ANGLE] = p.start_in_gap * p.gearbox.half_gap
-    outputs(x, mode, _AT_REST, 0.0, p, y)
+@inner
+def start(p: MotorDrive, x: FloatArray, mode: IntArray) -> None:
+    """Put the motor where start_in_gap says, inside its gap; the axis is at zero."""
+    x[STATE.angle] = p.start_in_gap * p.gearbox.half_gap
 
 
-@compiled
-def step(
-        x: FloatArray, mode: IntArray, u: FloatArray, p: MotorDrive, h: float, steps: int,
-        work: FloatArray, y: FloatArray,
+@inner
+def begin(
+        x: FloatArray, mode: IntArray, u: FloatArray, p: MotorDrive, h: float, y: FloatArray,
 ) -> None:
-    """
-    Advance the motor drive over one macro-step.
+    """Note the impulse that others expect of the macro-step, and measure the true one."""
+    torque, slope = y[OUTPUT.gear_torque, 0], y[OUTPUT.gear_torque, 1]
+    y[OUTPUT.missed_impulse, 0] = (torque + 0.5 * slope * h) * h
+    x[STATE.impulse] = 0.0
 
-    Parameters
-    ----------
-    x, mode
-        states and mode, advanced in place, shapes (8,) and (3,)
-    u
-        inputs, value and time derivative at the start of the macro-step, shape (4, 2)
-    p
-        record of MotorDrive
-    h
-        macro-step [s]
-    steps
-        inner steps in it
-    work
-        from `integrator.work_space`
-    y
-        receives the outputs at the end, shape (5, 2); still holds those at the start
 
-    """
-    held = (y[1, 0] + 0.5 * y[1, 1] * h) * h
-    x[IMPULSE] = 0.0
-    _advance(x, mode, u, p, h, steps, work)
-    outputs(x, mode, u, h, p, y)
-    y[2, 0] = x[IMPULSE] - held
+@inner
+def end(
+        x: FloatArray, mode: IntArray, u: FloatArray, p: MotorDrive, h: float, y: FloatArray,
+) -> None:
+    """Write the missed impulse."""
+    y[OUTPUT.missed_impulse, 0] = x[STATE.impulse] - y[OUTPUT.missed_impulse, 0]
+
+
+@inner
+def _gear_torque(
+        t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: MotorDrive,
+) -> float:
+    return _gear(t, x, mode, u, p)[1]
+
+
+BLOCK = Block(
+    kind=MotorDrive, states=STATE, modes=MODE, inputs=INPUT, outputs=OUTPUTS,
+    start=start, rates=rates, switch=switch, read=read, begin=begin, end=end,
+    values={'gear_torque': Equation(_gear_torque, ('axis_angle', 'axis_rate'), 'impulse'),
+            'missed_impulse': None},
+    slopes_used=('counter_torque',))

@@ -15,11 +15,9 @@
 The antenna's structure: a hub on friction, with flexible modes, and all outputs of Fig. 4.
 
 States: hub angle [rad], hub rate [rad/s], then angle and rate of each mode [rad], [rad/s].
-Mode: friction of the axis (+1, -1 slips, 0 sticks).
+Modes: friction of the axis (+1, -1 slips, 0 sticks).
 Inputs: gear torques of both motors at the motor shaft [N m], what their extrapolation missed in
 the last macro-step [N m s], external torque at the axis [N m].
-Outputs: axis angle [rad], axis rate [rad/s], encoder [rad], pinion rate [rad/s], pointing errors
-in elevation and cross-elevation [rad].
 """
 
 from __future__ import annotations
@@ -28,23 +26,26 @@ import math
 
 from antenna_drive.parameters.sets import Axis, Encoder, Plant
 from antenna_drive.physics.arrays import FloatArray, IntArray
-from antenna_drive.physics.compiling import compiled, inner, shared
+from antenna_drive.physics.block import Block, Equation, held, output_rows, put, rest, rows, Signal
+from antenna_drive.physics.compiling import inner, shared
 from antenna_drive.physics.friction import drag, next_slip, slip_level
 from antenna_drive.physics.harmonics import wave
-from antenna_drive.physics.integrator import located_runge_kutta
-import numpy as np
 
-ANGLE, RATE = range(2)
-MODES = 1
-GEAR_TORQUE_1, GEAR_TORQUE_2, MISSED_1, MISSED_2, EXTERNAL_TORQUE = range(5)
-INPUTS = 5
-OUTPUTS = 6
-_AT_REST = np.zeros((INPUTS, 2))
-
-
-def states(mode_count: int) -> int:
-    """Return the number of states of a structure with so many flexible modes."""
-    return 2 + 2 * mode_count
+STATE = rows('axis_angle', 'axis_rate')  # and two for each mode of the structure
+MODE = rows('slip')
+INPUT = rows('gear_torque_1', 'gear_torque_2', 'missed_impulse_1', 'missed_impulse_2',
+             'external_torque')
+OUTPUTS = (
+    Signal('axis_angle', 'rad', 'elevation of the hub from its start'),
+    Signal('axis_rate', 'rad/s', 'elevation rate of the hub'),
+    Signal('encoder', 'rad', 'elevation encoder reading', exchanged=False),
+    Signal('pinion_rate', 'rad/s', 'axis rate times the gear ratio', exchanged=False),
+    Signal('pointing_error_elevation', 'rad', 'beam minus encoder in elevation',
+           exchanged=False),
+    Signal('pointing_error_cross_elevation', 'rad', 'beam offset in cross-elevation',
+           exchanged=False),
+)
+OUTPUT = output_rows(OUTPUTS)
 
 
 @inner
@@ -52,18 +53,18 @@ def _mode_torque(x: FloatArray, j: int, p: Axis) -> float:
     """Return the torque of mode j on the hub [N m]."""
     omega = 2.0 * math.pi * p.mode_frequencies[j]
     return p.mode_inertias[j] * (
-        omega * omega * (x[2 + 2 * j] - x[ANGLE])
-        + 2.0 * p.mode_damping_ratios[j] * omega * (x[3 + 2 * j] - x[RATE]))
+        omega * omega * (x[2 + 2 * j] - x[STATE.axis_angle])
+        + 2.0 * p.mode_damping_ratios[j] * omega * (x[3 + 2 * j] - x[STATE.axis_rate]))
 
 
 @inner
 def _applied_torque(t: float, x: FloatArray, u: FloatArray, p: Axis) -> float:
     """Return T_o of Eq. (8): every torque on the hub but friction [N m], at t."""
-    torque = p.gear_ratio * (u[GEAR_TORQUE_1, 0] + u[GEAR_TORQUE_2, 0]
-                             + (u[GEAR_TORQUE_1, 1] + u[GEAR_TORQUE_2, 1]) * t)
-    torque += u[EXTERNAL_TORQUE, 0] + u[EXTERNAL_TORQUE, 1] * t + p.steady_wind_torque
+    one, two = INPUT.gear_torque_1, INPUT.gear_torque_2
+    torque = p.gear_ratio * (u[one, 0] + u[two, 0] + (u[one, 1] + u[two, 1]) * t)
+    torque += held(u, INPUT.external_torque, t) + p.steady_wind_torque
     if p.gravity_torque != 0.0:
-        torque -= p.gravity_torque * math.cos(p.start_elevation + x[ANGLE])
+        torque -= p.gravity_torque * math.cos(p.start_elevation + x[STATE.axis_angle])
     for j in range(p.mode_inertias_count):
         torque += _mode_torque(x, j, p)
     return torque
@@ -87,40 +88,43 @@ def _friction_level(rate: float, angle: float, p: Axis) -> float:
 @inner
 def _acceleration(t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: Axis) -> float:
     """Return the hub's acceleration [rad/s^2] at t, Eq. (2)."""
-    if mode[0] == 0:
+    if mode[MODE.slip] == 0:
         return 0.0
-    friction = mode[0] * _friction_level(x[RATE], x[ANGLE], p)
+    friction = mode[MODE.slip] * _friction_level(x[STATE.axis_rate], x[STATE.axis_angle], p)
     return (_applied_torque(t, x, u, p) - friction) / p.inertia_hub
 
 
 @shared
-def _rates(
-        t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: Axis, dx: FloatArray,
+def rates(
+        t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: Plant, dx: FloatArray,
 ) -> None:
-    dx[ANGLE] = x[RATE]
-    dx[RATE] = _acceleration(t, x, mode, u, p)
-    for j in range(p.mode_inertias_count):
+    """Write the time derivatives of the states."""
+    axis = p.axis
+    dx[STATE.axis_angle] = x[STATE.axis_rate]
+    dx[STATE.axis_rate] = _acceleration(t, x, mode, u, axis)
+    for j in range(axis.mode_inertias_count):
         dx[2 + 2 * j] = x[3 + 2 * j]
-        dx[3 + 2 * j] = -_mode_torque(x, j, p) / p.mode_inertias[j]
+        dx[3 + 2 * j] = -_mode_torque(x, j, axis) / axis.mode_inertias[j]
 
 
 @shared
-def _switch(t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: Axis, commit: bool) -> bool:
-    slip = mode[0]
-    if slip != 0 and slip * x[RATE] > p.velocity_threshold:
+def switch(
+        t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: Plant, commit: bool,
+) -> bool:
+    """Return whether the axis begins to slip or to stick; write the new mode if `commit`."""
+    axis = p.axis
+    slip = mode[MODE.slip]
+    if slip != 0 and slip * x[STATE.axis_rate] > axis.velocity_threshold:
         return False
-    level = _friction_level(0.0, x[ANGLE], p)
-    slip = next_slip(slip, x[RATE], _applied_torque(t, x, u, p), level,
-                     p.stiction_ratio * level, p.velocity_threshold)
-    changed = slip != mode[0]
+    level = _friction_level(0.0, x[STATE.axis_angle], axis)
+    slip = next_slip(slip, x[STATE.axis_rate], _applied_torque(t, x, u, axis), level,
+                     axis.stiction_ratio * level, axis.velocity_threshold)
+    changed = slip != mode[MODE.slip]
     if commit and changed:
-        mode[0] = slip
+        mode[MODE.slip] = slip
         if slip == 0:
-            x[RATE] = 0.0
+            x[STATE.axis_rate] = 0.0
     return changed
-
-
-_advance = located_runge_kutta(_rates, _switch)
 
 
 @inner
@@ -146,84 +150,47 @@ def encoder(angle: float, p: Encoder) -> float:
     return reading
 
 
-@compiled
-def outputs(
+@shared
+def read(
         x: FloatArray, mode: IntArray, u: FloatArray, t: float, p: Plant, y: FloatArray,
 ) -> None:
-    """
-    Write the outputs of Fig. 4 at t after the start of a macro-step, with their derivatives.
-
-    Parameters
-    ----------
-    x, mode
-        states and mode at t, shapes (2 + 2 modes,) and (1,)
-    u
-        inputs at the start of the macro-step, shape (5, 2)
-    t
-        [s]
-    p
-        record of Plant
-    y
-        receives value and derivative of each output, shape (6, 2)
-
-    """
+    """Write the outputs of Fig. 4."""
     axis = p.axis
+    angle, rate = x[STATE.axis_angle], x[STATE.axis_rate]
     acceleration = _acceleration(t, x, mode, u, axis)
-    y[0, 0] = x[ANGLE]
-    y[0, 1] = x[RATE]
-    y[1, 0] = x[RATE]
-    y[1, 1] = acceleration
-    y[2, 0] = encoder(x[ANGLE], p.encoder)
-    y[2, 1] = x[RATE]
-    y[3, 0] = axis.gear_ratio * x[RATE]
-    y[3, 1] = axis.gear_ratio * acceleration
-    y[4, :] = 0.0
-    y[5, :] = 0.0
+    put(y, OUTPUT.axis_angle, angle, rate)
+    put(y, OUTPUT.axis_rate, rate, acceleration)
+    put(y, OUTPUT.encoder, encoder(angle, p.encoder), rate)
+    put(y, OUTPUT.pinion_rate, axis.gear_ratio * rate, axis.gear_ratio * acceleration)
+    elevation = elevation_rate = cross = cross_rate = 0.0
     for j in range(axis.mode_inertias_count):
-        bend = x[2 + 2 * j] - x[ANGLE]
-        bend_rate = x[3 + 2 * j] - x[RATE]
-        y[4, 0] += axis.pointing_elevation[j] * bend
-        y[4, 1] += axis.pointing_elevation[j] * bend_rate
-        y[5, 0] += axis.pointing_cross_elevation[j] * bend
-        y[5, 1] += axis.pointing_cross_elevation[j] * bend_rate
+        bend = x[2 + 2 * j] - angle
+        bend_rate = x[3 + 2 * j] - rate
+        elevation += axis.pointing_elevation[j] * bend
+        elevation_rate += axis.pointing_elevation[j] * bend_rate
+        cross += axis.pointing_cross_elevation[j] * bend
+        cross_rate += axis.pointing_cross_elevation[j] * bend_rate
+    put(y, OUTPUT.pointing_error_elevation, elevation, elevation_rate)
+    put(y, OUTPUT.pointing_error_cross_elevation, cross, cross_rate)
 
 
-@compiled
-def start(p: Plant, x: FloatArray, mode: IntArray, y: FloatArray) -> None:
-    """Write the state at rest, at angle zero, into x and mode, and its outputs into y."""
-    x[:] = 0.0
-    mode[:] = 0
-    outputs(x, mode, _AT_REST, 0.0, p, y)
-
-
-@compiled
-def step(
-        x: FloatArray, mode: IntArray, u: FloatArray, p: Plant, h: float, steps: int,
-        work: FloatArray, y: FloatArray,
+@inner
+def begin(
+        x: FloatArray, mode: IntArray, u: FloatArray, p: Plant, h: float, y: FloatArray,
 ) -> None:
-    """
-    Advance the structure over one macro-step.
+    """Make up for teeth that met within the last macro-step, which nobody could extrapolate."""
+    if mode[MODE.slip] != 0:
+        missed = u[INPUT.missed_impulse_1, 0] + u[INPUT.missed_impulse_2, 0]
+        x[STATE.axis_rate] += p.axis.gear_ratio * missed / p.axis.inertia_hub
 
-    Parameters
-    ----------
-    x, mode
-        states and mode, advanced in place, shapes (2 + 2 modes,) and (1,)
-    u
-        inputs, value and time derivative at the start of the macro-step, shape (5, 2)
-    p
-        record of Plant
-    h
-        macro-step [s]
-    steps
-        inner steps in it
-    work
-        from `integrator.work_space`
-    y
-        receives the outputs at the end, shape (6, 2)
 
-    """
-    # teeth that met within the last macro-step pushed in a way that nobody could extrapolate
-    if mode[0] != 0:
-        x[RATE] += p.axis.gear_ratio * (u[MISSED_1, 0] + u[MISSED_2, 0]) / p.axis.inertia_hub
-    _advance(x, mode, u, p.axis, h, steps, work)
-    outputs(x, mode, u, h, p, y)
+@inner
+def _encoder(t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: Plant) -> float:
+    return encoder(x[STATE.axis_angle], p.encoder)
+
+
+BLOCK = Block(
+    kind=Plant, bare='axis', states=STATE, modes=MODE, inputs=INPUT, outputs=OUTPUTS,
+    more_states=lambda p: 2 * p['axis']['mode_inertias_count'],
+    start=rest, rates=rates, switch=switch, read=read, begin=begin,
+    values={'encoder': Equation(_encoder)})

@@ -15,27 +15,27 @@
 The torque-share circuit, Fig. 14 and Eq. (9)-(14), with Filter 1 behind it, Fig. 5.
 
 States: x_3 of transfer function 3 [V], x_2 of transfer functions 2 and 4 [V], x_F of Filter 1 [V].
-Mode: sign of x_3 (0 or 1), saturation of x_2 (-1 at the lower limit, +1 at the upper, 0 between).
-Inputs: currents of both motors [article A]. Outputs: counter torque x_F [V], bias voltage [V].
+Modes: sign of x_3 (0 or 1), saturation of x_2 (-1 at the lower limit, +1 at the upper, 0 between).
+Inputs: currents of both motors [article A].
 """
 
 from __future__ import annotations
 
 from antenna_drive.parameters.sets import Share, TorqueShare
 from antenna_drive.physics.arrays import FloatArray, IntArray
-from antenna_drive.physics.compiling import compiled, inner, shared
+from antenna_drive.physics.block import Block, Equation, held, output_rows, put, rows, Signal
+from antenna_drive.physics.compiling import inner, shared
 from antenna_drive.physics.filter_1 import counter_torque_rate
-from antenna_drive.physics.integrator import located_runge_kutta
-import numpy as np
 
-LOAD, SHARE, COUNTER_TORQUE = range(3)
-STATES = 3
-NEGATIVE_LOAD, SATURATION = range(2)
-MODES = 2
-CURRENT_1, CURRENT_2 = range(2)
-INPUTS = 2
-OUTPUTS = 2
-_AT_REST = np.zeros((INPUTS, 2))
+STATE = rows('load', 'share', 'counter_torque')
+MODE = rows('negative_load', 'saturation')
+INPUT = rows('current_1', 'current_2')
+OUTPUTS = (
+    Signal('counter_torque', 'V', 'output of Filter 1'),
+    Signal('bias_voltage', 'V', 'torque bias asked for, output of the torque-share circuit',
+           exchanged=False),
+)
+OUTPUT = output_rows(OUTPUTS)
 # bias_source: where v_b comes from
 CIRCUIT, FIXED = range(2)
 # start: state of the circuit at t = 0
@@ -69,7 +69,7 @@ def steady_bias_voltage(current_sum: float, p: TorqueShare) -> float:
 @inner
 def _share_rate(x: FloatArray, p: TorqueShare) -> float:
     """Return the time derivative of x_2 [V/s], transfer functions 2 and 4."""
-    return -p.s_2 * x[SHARE] + p.k_2 * (p.fade_out_voltage + p.g_4 * abs(x[LOAD]))
+    return -p.s_2 * x[STATE.share] + p.k_2 * (p.fade_out_voltage + p.g_4 * abs(x[STATE.load]))
 
 
 @inner
@@ -77,123 +77,85 @@ def _bias_voltage(x: FloatArray, p: TorqueShare) -> float:
     """Return v_b [V], Eq. (9), or the voltage of the source that is connected in its place."""
     if p.bias_source == FIXED:
         return p.fixed_voltage
-    return p.bias_pot * saturated(x[SHARE], p.saturation_low, p.saturation_high)
+    return p.bias_pot * saturated(x[STATE.share], p.saturation_low, p.saturation_high)
 
 
 @inner
 def voltmeter(x: FloatArray, mode: IntArray, p: TorqueShare) -> tuple[float, float]:
     """Return the bias voltage as it is read, and its time derivative [V], [V/s]."""
     rate = 0.0
-    if p.bias_source == CIRCUIT and mode[SATURATION] == 0:
+    if p.bias_source == CIRCUIT and mode[MODE.saturation] == 0:
         rate = p.voltmeter_gain * p.bias_pot * _share_rate(x, p)
     return p.voltmeter_gain * _bias_voltage(x, p), rate
 
 
 @inner
-def _counter_torque_rate(t: float, x: FloatArray, u: FloatArray, p: Share) -> float:
+def _counter_torque_rate(
+        t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: Share,
+) -> float:
+    """Return the time derivative of x_F [V/s]."""
     return counter_torque_rate(
-        x[COUNTER_TORQUE], _bias_voltage(x, p.circuit),
-        u[CURRENT_1, 0] + u[CURRENT_1, 1] * t, u[CURRENT_2, 0] + u[CURRENT_2, 1] * t, p.filter_1)
+        x[STATE.counter_torque], _bias_voltage(x, p.circuit),
+        held(u, INPUT.current_1, t), held(u, INPUT.current_2, t), p.filter_1)
 
 
 @shared
-def _rates(
+def rates(
         t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: Share, dx: FloatArray,
 ) -> None:
+    """Write the time derivatives of the states."""
     share = p.circuit
-    current_sum = u[CURRENT_1, 0] + u[CURRENT_2, 0] + (u[CURRENT_1, 1] + u[CURRENT_2, 1]) * t
-    dx[LOAD] = -share.k_3 * (x[LOAD] + share.current_to_voltage * current_sum)
-    dx[SHARE] = _share_rate(x, share)
-    dx[COUNTER_TORQUE] = _counter_torque_rate(t, x, u, p)
+    one, two = INPUT.current_1, INPUT.current_2
+    current_sum = u[one, 0] + u[two, 0] + (u[one, 1] + u[two, 1]) * t
+    dx[STATE.load] = -share.k_3 * (x[STATE.load] + share.current_to_voltage * current_sum)
+    dx[STATE.share] = _share_rate(x, share)
+    dx[STATE.counter_torque] = _counter_torque_rate(t, x, mode, u, p)
 
 
-@shared
-def _switch(
-        t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: Share, commit: bool,
-) -> bool:
-    negative = 1 if x[LOAD] < 0.0 else 0
+@inner
+def _switched(x: FloatArray, mode: IntArray, p: TorqueShare, commit: bool) -> bool:
+    negative = 1 if x[STATE.load] < 0.0 else 0
     saturation = 0
-    if x[SHARE] > p.circuit.saturation_high:
+    if x[STATE.share] > p.saturation_high:
         saturation = 1
-    elif x[SHARE] < p.circuit.saturation_low:
+    elif x[STATE.share] < p.saturation_low:
         saturation = -1
-    changed = negative != mode[NEGATIVE_LOAD] or saturation != mode[SATURATION]
+    changed = negative != mode[MODE.negative_load] or saturation != mode[MODE.saturation]
     if commit and changed:
-        mode[NEGATIVE_LOAD] = negative
-        mode[SATURATION] = saturation
+        mode[MODE.negative_load] = negative
+        mode[MODE.saturation] = saturation
     return changed
 
 
-_advance = located_runge_kutta(_rates, _switch, STATES)
+@shared
+def switch(
+        t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: Share, commit: bool,
+) -> bool:
+    """Return whether the modes no longer hold; write the new ones if `commit`."""
+    return _switched(x, mode, p.circuit, commit)
 
 
-@compiled
-def outputs(
+@inner
+def read(
         x: FloatArray, mode: IntArray, u: FloatArray, t: float, p: Share, y: FloatArray,
 ) -> None:
-    """
-    Write the outputs at t after the start of a macro-step, with their time derivatives.
-
-    Parameters
-    ----------
-    x, mode
-        states and mode at t, shapes (3,) and (2,)
-    u
-        inputs at the start of the macro-step, shape (2, 2)
-    t
-        [s]
-    p
-        record of TorqueShareUnit
-    y
-        receives value and derivative of each output, shape (2, 2)
-
-    """
-    y[0, 0] = x[COUNTER_TORQUE]
-    y[0, 1] = _counter_torque_rate(t, x, u, p)
-    y[1, 0], y[1, 1] = voltmeter(x, mode, p.circuit)
+    """Write the outputs."""
+    put(y, OUTPUT.counter_torque, x[STATE.counter_torque],
+        _counter_torque_rate(t, x, mode, u, p))
+    voltage, slope = voltmeter(x, mode, p.circuit)
+    put(y, OUTPUT.bias_voltage, voltage, slope)
 
 
-@compiled
-def start(p: Share, x: FloatArray, mode: IntArray, y: FloatArray) -> None:
-    """
-    Write the initial state into x and mode, and its outputs into y; shapes as in `outputs`.
-
-    Every state is zero; with start steady the circuit has settled at zero current.
-    """
+@inner
+def start(p: Share, x: FloatArray, mode: IntArray) -> None:
+    """Start from zero or, with start steady, from a circuit that has settled at no current."""
     share = p.circuit
-    x[:] = 0.0
-    mode[:] = 0
     if share.start == STEADY:
-        x[SHARE] = share.k_2 * share.fade_out_voltage / share.s_2
-    _switch(0.0, x, mode, _AT_REST, p, True)
-    outputs(x, mode, _AT_REST, 0.0, p, y)
+        x[STATE.share] = share.k_2 * share.fade_out_voltage / share.s_2
+    _switched(x, mode, share, True)
 
 
-@compiled
-def step(
-        x: FloatArray, mode: IntArray, u: FloatArray, p: Share, h: float, steps: int,
-        work: FloatArray, y: FloatArray,
-) -> None:
-    """
-    Advance torque share and Filter 1 over one macro-step.
-
-    Parameters
-    ----------
-    x, mode
-        states and mode, advanced in place, shapes (3,) and (2,)
-    u
-        inputs, value and time derivative at the start of the macro-step, shape (2, 2)
-    p
-        record of TorqueShareUnit
-    h
-        macro-step [s]
-    steps
-        inner steps in it
-    work
-        from `integrator.work_space`
-    y
-        receives the outputs at the end, shape (2, 2)
-
-    """
-    _advance(x, mode, u, p, h, steps, work)
-    outputs(x, mode, u, h, p, y)
+BLOCK = Block(
+    kind=Share, bare='circuit', states=STATE, modes=MODE, inputs=INPUT, outputs=OUTPUTS,
+    start=start, rates=rates, switch=switch, read=read,
+    slopes={'counter_torque': Equation(_counter_torque_rate, ('current_1', 'current_2'))})

@@ -41,7 +41,8 @@ from antenna_drive.recording.sheet import CircuitBias, FixedBias, FixedStepBias,
 import numpy as np
 from scipy.ndimage import median_filter
 
-COMMAND, TORQUE = (f'{wiring.TEST_SIGNAL}/{signal.name}' for signal in wiring.TEST_SIGNAL_OUTPUTS)
+_OUTPUTS = wiring.OUTPUTS[wiring.TEST_SIGNAL]
+COMMAND, TORQUE = (f'{wiring.TEST_SIGNAL}/{signal.name}' for signal in _OUTPUTS)
 # A slope so many times the median of those around it, itself one of them, is a jump.
 _JUMP = 20.0
 _AROUND = 9
@@ -56,7 +57,7 @@ class CommandUnit(Unit):
     It takes the place of the drive's own test signal, in one process or as a node.
     """
 
-    outputs: ClassVar[tuple[Signal, ...]] = wiring.TEST_SIGNAL_OUTPUTS
+    outputs: ClassVar[tuple[Signal, ...]] = _OUTPUTS
 
     def __init__(self, recording: Recording) -> None:
         """

@@ -15,13 +15,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from threading import Event, Thread
 import time
 from types import TracebackType
 from typing import Any
 
-from antenna_drive.emulator.unit import FloatArray
+from antenna_drive.emulator.unit import FloatArray, Signal
+from antenna_drive.emulator.wiring import OUTPUTS
 from antenna_drive.lockstep.observer import Observer
 from antenna_drive.lockstep.ros_link import FRAME_QOS
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -126,7 +127,8 @@ class Watch:
 class Recorder:
     """Every sample and every change of a drive, gathered in a thread."""
 
-    def __init__(self, name: str = 'watcher', namespace: str = '', guest: bool = False) -> None:
+    def __init__(self, name: str = 'watcher', namespace: str = '', guest: bool = False,
+                 outputs: Mapping[str, Sequence[Signal]] = OUTPUTS) -> None:
         self.samples: list[FloatArray] = []
         self.changes: list[tuple[str, Mapping[str, Any]]] = []
         self.runs: list[int] = []
@@ -134,7 +136,8 @@ class Recorder:
         self.first = 0
         self._stop = Event()
         self.observer = Observer(name, self._keep, on_begin=self._begin,
-                                 on_change=self._note, namespace=namespace, guest=guest)
+                                 on_change=self._note, namespace=namespace, guest=guest,
+                                 outputs=outputs)
         self._thread = Thread(target=self.observer.spin, args=(self._stop.is_set,))
         self._thread.start()
 

@@ -22,7 +22,7 @@ import sys
 
 import pytest
 
-NODES = ('rate_loop_plant', 'motor_drive', 'torque_share', 'test_signal')
+NODES = ('rate_loop_plant', 'motor_drive', 'torque_share', 'signal_generator')
 
 
 def run_node(node: str, *args: str) -> subprocess.CompletedProcess[str]:
@@ -61,9 +61,9 @@ def test_help_needs_no_ros(node: str) -> None:
     ('torque_share', ('-p', 'bias_pod:=0.5'), 'did you mean bias_pot?'),
     ('torque_share', ('-p', 'bias_pot:=1e9'), 'bias_pot'),
     ('torque_share', ('-p', "config:=['no_such_circuit']"), 'no_such_circuit'),
-    ('test_signal', ('-p', 'run.pase:=1.0'), 'run.pase'),
-    ('test_signal', ('-p', 'run.step:=0.0'), 'run.step'),
-    ('test_signal', ('-p', 'waveform:=triangel'), 'waveform'),
+    ('signal_generator', ('-p', 'run.pase:=1.0'), 'run.pase'),
+    ('signal_generator', ('-p', 'run.step:=0.0'), 'run.step'),
+    ('signal_generator', ('-p', 'waveform:=triangel'), 'waveform'),
     ('motor_drive', ('-p', 'run.pace:=1.0'), 'run.pace'),
     ('motor_drive', ('-r', '__node:=motor_3'), 'motor_1, motor_2'),
     ('motor_drive', ('--params-file', 'no_such_file.yaml'), 'no_such_file.yaml'),

@@ -11,7 +11,11 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The example's torque share joins our other four processes and changes no bit on the way."""
+"""
+The examples among the nodes, to the bits of one process.
+
+The torque share takes the place of ours, and the position loop is a sixth unit.
+"""
 
 from __future__ import annotations
 
@@ -20,9 +24,11 @@ from pathlib import Path
 import sys
 from typing import Any
 
-from antenna_drive.emulator.run import Emulator
-from antenna_drive.emulator.wiring import UNITS
+from antenna_drive.emulator.run import Emulator, simulate
+from antenna_drive.emulator.wiring import find, UNITS
 from antenna_drive.parameters import load
+from antenna_drive.parameters.sets import changed
+import numpy as np
 import pytest
 
 pytest.importorskip('rclpy', reason='rclpy is not installed: no processes to test')
@@ -30,14 +36,15 @@ pytest.importorskip('rclpy', reason='rclpy is not installed: no processes to tes
 from antenna_drive.lockstep.processes import DriveProcesses  # noqa: E402, I100
 from drive_watch import Recorder, Watch  # noqa: E402
 
-PACKAGE = Path(__file__).parents[2] / 'examples' / 'own_torque_share'
+EXAMPLES = Path(__file__).parents[2] / 'examples'
 
 
 @pytest.mark.usefixtures('fresh_domain')
 def test_own_torque_share_joins_the_other_four(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(PACKAGE))
+    package = str(EXAMPLES / 'own_torque_share')
+    monkeypatch.syspath_prepend(package)
     from own_torque_share.constant_bias import ConstantBias
-    path = os.pathsep.join([str(PACKAGE), *sys.path])
+    path = os.pathsep.join([package, *sys.path])
     parameters: dict[str, dict[str, Any]] = {
         'test_signal': {'run.pace': 0.0, 'run.observers': ['watcher']},
         'torque_share': {'bias': 9.0}}
@@ -59,3 +66,33 @@ def test_own_torque_share_joins_the_other_four(monkeypatch: pytest.MonkeyPatch) 
     run = emulator.run((samples.shape[0] - 1) * 1e-3, schedule)
     assert samples.tobytes() == run.samples.tobytes()
     assert codes == dict.fromkeys(UNITS, 0)
+
+
+@pytest.mark.usefixtures('fresh_domain')
+def test_own_position_loop_is_a_sixth_unit(monkeypatch: pytest.MonkeyPatch) -> None:
+    package = str(EXAMPLES / 'own_position_loop')
+    monkeypatch.syspath_prepend(package)
+    name = 'own_position_loop.wiring:POINTED'
+    wiring = find(name)
+    parameters: dict[str, dict[str, Any]] = {
+        'test_signal': {'run.pace': 0.0, 'run.observers': ['watcher']},
+        'position_loop': {'angle': 2e-4}}
+    with Watch() as watch, Recorder('watcher', outputs=wiring.outputs) as recorder, DriveProcesses(
+            parameters, wiring=name, environment={
+                'PYTHONPATH': os.pathsep.join([package, *sys.path])}) as processes:
+        processes.check()
+        watch.until(lambda: recorder.steps > 200, 'step 200')
+        answer = watch.set_together('position_loop', {'track_rate': 5e-5})
+        assert answer.successful, answer.reason
+        assert not watch.set_together('position_loop', {'track_rate': 1.0}).successful
+        assert watch.get('motor_2', 'wiring') == [[name]]
+        target = recorder.steps + 500
+        watch.until(lambda: recorder.steps > target, 'a while on the track')
+        samples, schedule = recorder.array(), recorder.schedule()
+        codes = processes.stop()
+    assert [change['position_loop'] for change in schedule.values()] == [{'track_rate': 5e-5}]
+    drive = changed(wiring.load(), {'position_loop.angle': 2e-4})
+    run = simulate(drive, (samples.shape[0] - 1) * 1e-3, changes=schedule, wiring=wiring)
+    assert samples.tobytes() == run.samples.tobytes()
+    assert np.ptp(run['plant/axis_angle']) > 0.0
+    assert codes == dict.fromkeys(wiring.units, 0)

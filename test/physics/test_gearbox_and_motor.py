@@ -21,12 +21,13 @@ from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed, MotorDrive
 from antenna_drive.physics import motor_drive
 from antenna_drive.physics.gearbox import gear_torque, presliding_rate, twist, twist_rate
-from antenna_drive.physics.integrator import work_space
 from antenna_drive.physics.motor import ammeter, driving_torque, tachometer
 import numpy as np
 import pytest
+from stepping import Stepped
 
 H = 1e-3
+STATE = motor_drive.STATE
 
 
 def _motor(**values: object) -> MotorDrive:
@@ -37,21 +38,19 @@ def _motor(**values: object) -> MotorDrive:
 def _simulate(parameters: MotorDrive, x0: np.ndarray, mode0: list[int], steps: int,
               h: float = H) -> np.ndarray:
     """Return the states at every step with the axis held at zero, shape (steps + 1, states)."""
-    p = record_of(parameters)
-    x, mode = x0.copy(), np.array(mode0, np.int64)
-    work, y = work_space(x.size), np.zeros((motor_drive.OUTPUTS, 2))
-    u = np.zeros((motor_drive.INPUTS, 2))
-    rows = [x.copy()]
+    motor = Stepped(motor_drive.BLOCK, parameters)
+    motor.x[:], motor.mode[:] = x0, mode0
+    rows = [motor.x.copy()]
     for _ in range(steps):
-        motor_drive.step(x, mode, u, p[0], h, 1, work, y)
-        rows.append(x.copy())
+        motor.step(h)
+        rows.append(motor.x.copy())
     return np.array(rows)
 
 
 def _state(**values: float) -> np.ndarray:
-    x = np.zeros(motor_drive.STATES)
+    x = np.zeros(len(STATE))
     for name, value in values.items():
-        x[getattr(motor_drive, name.upper())] = value
+        x[getattr(STATE, name)] = value
     return x
 
 
@@ -68,8 +67,8 @@ def test_a_free_rotor_slows_down_by_its_coulomb_friction() -> None:
     stop = 1.0 * motor.rotor_inertia / friction
     time = np.arange(states.shape[0]) * H
     expected = np.where(time < stop, 1.0 - friction / motor.rotor_inertia * time, 0.0)
-    np.testing.assert_allclose(states[:, motor_drive.RATE], expected, atol=2e-3)
-    assert states[-1, motor_drive.RATE] == 0.0
+    np.testing.assert_allclose(states[:, STATE.rate], expected, atol=2e-3)
+    assert states[-1, STATE.rate] == 0.0
 
 
 def test_teeth_meet_when_the_gap_is_crossed_and_throw_the_rotor_back() -> None:
@@ -85,14 +84,14 @@ def test_teeth_meet_when_the_gap_is_crossed_and_throw_the_rotor_back() -> None:
     expected = np.where(time < meet, rate * time,
                         np.where(time < leave, pressed,
                                  gearbox.half_gap - rate * (time - leave)))
-    np.testing.assert_allclose(states[:, motor_drive.ANGLE], expected, atol=1e-4)
+    np.testing.assert_allclose(states[:, STATE.angle], expected, atol=1e-4)
 
 
 def test_contact_damping_takes_energy_and_nothing_gives_any() -> None:
     parameters = _motor(motor__coulomb_torque=0.0, **OFF)
     states = _simulate(parameters, _state(rate=5.0), [1, 0, 0], 2000)
-    twist_now = np.abs(states[:, motor_drive.ANGLE]) - parameters.gearbox.half_gap
-    energy = (0.5 * parameters.motor.rotor_inertia * states[:, motor_drive.RATE] ** 2
+    twist_now = np.abs(states[:, STATE.angle]) - parameters.gearbox.half_gap
+    energy = (0.5 * parameters.motor.rotor_inertia * states[:, STATE.rate] ** 2
               + 0.5 * parameters.gearbox.stiffness * np.maximum(twist_now, 0.0) ** 2)
     # what little the amplifiers, which are not quite off, do is far below a thousandth
     assert np.all(np.diff(energy) <= 1e-3 * energy[0])
@@ -105,7 +104,7 @@ def test_halving_the_step_divides_the_error_of_an_impact_by_about_sixteen() -> N
 
     def end(h: float) -> float:
         return float(_simulate(parameters, start, [1, 0, 0], round(0.24 / h), h)
-                     [-1, motor_drive.ANGLE])
+                     [-1, STATE.angle])
 
     exact = end(2.5e-4)
     coarse, fine = abs(end(8e-3) - exact), abs(end(4e-3) - exact)
@@ -114,17 +113,17 @@ def test_halving_the_step_divides_the_error_of_an_impact_by_about_sixteen() -> N
 
 def test_the_impulse_that_an_extrapolation_missed_is_sent_after_it() -> None:
     parameters = _motor(motor__coulomb_torque=0.0, **OFF)
-    p = record_of(parameters)
-    x, mode = _state(rate=5.0), np.array([1, 0, 0], np.int64)
-    work, y = work_space(x.size), np.zeros((motor_drive.OUTPUTS, 2))
-    u = np.zeros((motor_drive.INPUTS, 2))
+    motor = Stepped(motor_drive.BLOCK, parameters)
+    motor.x[STATE.rate], motor.mode[:] = 5.0, [1, 0, 0]
+    output = motor_drive.OUTPUT
     believed = given = 0.0
     for _ in range(400):
-        before = x[motor_drive.RATE]
-        believed += (y[1, 0] + 0.5 * y[1, 1] * H) * H
-        motor_drive.step(x, mode, u, p[0], H, 1, work, y)
-        believed += y[2, 0]
-        given += parameters.motor.rotor_inertia * (before - x[motor_drive.RATE])
+        before = motor.x[STATE.rate]
+        torque, slope = motor.y[output.gear_torque]
+        believed += (torque + 0.5 * slope * H) * H
+        motor.step(H)
+        believed += motor.y[output.missed_impulse, 0]
+        given += parameters.motor.rotor_inertia * (before - motor.x[STATE.rate])
     # what the axis was told adds up to the momentum that the rotor lost to the teeth
     assert believed == pytest.approx(given, rel=2e-3)
 

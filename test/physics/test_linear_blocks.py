@@ -24,10 +24,10 @@ from antenna_drive.parameters import load
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed
 from antenna_drive.physics import motor_drive, torque_share
-from antenna_drive.physics.integrator import work_space
 import numpy as np
 import pytest
 from scipy import signal
+from stepping import Stepped
 
 H = 1e-3
 
@@ -39,16 +39,12 @@ def _share(**settings: object) -> object:
 
 def _run_share(parameters: object, current_1: np.ndarray, current_2: np.ndarray) -> np.ndarray:
     """Return the outputs of the share unit, shape (n, 2), for currents held over each step."""
-    p = record_of(parameters)
-    x, mode = np.zeros(torque_share.STATES), np.zeros(torque_share.MODES, np.int64)
-    work, y = work_space(torque_share.STATES), np.zeros((torque_share.OUTPUTS, 2))
-    torque_share.start(p[0], x, mode, y)
-    rows = [y[:, 0].copy()]
-    u = np.zeros((torque_share.INPUTS, 2))
+    share = Stepped(torque_share.BLOCK, parameters)
+    rows = [share.y[:, 0].copy()]
     for one, two in zip(current_1[:-1], current_2[:-1]):
-        u[:, 0] = one, two
-        torque_share.step(x, mode, u, p[0], H, 1, work, y)
-        rows.append(y[:, 0].copy())
+        share.u[:, 0] = one, two
+        share.step(H)
+        rows.append(share.y[:, 0].copy())
     return np.array(rows)
 
 
@@ -126,17 +122,13 @@ def _held_motor() -> object:
 
 def test_amplifiers_and_armature_with_the_rotor_held() -> None:
     parameters = _held_motor()
-    p = record_of(parameters)
-    x, mode = np.zeros(motor_drive.STATES), np.zeros(motor_drive.MODES, np.int64)
-    work, y = work_space(motor_drive.STATES), np.zeros((motor_drive.OUTPUTS, 2))
-    motor_drive.start(p[0], x, mode, y)
+    motor = Stepped(motor_drive.BLOCK, parameters)
     command = 2e-5  # rad/s: too little to reach any limit within the time watched
-    u = np.zeros((motor_drive.INPUTS, 2))
-    u[motor_drive.RATE_COMMAND, 0] = command
-    rows = [x[:4].copy()]
+    motor.u[motor_drive.INPUT.rate_command, 0] = command
+    rows = [motor.x[:4].copy()]
     for _ in range(150):
-        motor_drive.step(x, mode, u, p[0], H, 10, work, y)
-        rows.append(x[:4].copy())
+        motor.step(H, 10)
+        rows.append(motor.x[:4].copy())
     m: object = parameters
     amp, arm, rc = m.amplifier, m.armature, m.rate_command  # type: ignore[attr-defined]
     resistance, gain = arm.resistance, amp.current_feedback_gain
@@ -151,23 +143,20 @@ def test_amplifiers_and_armature_with_the_rotor_held() -> None:
     _, expected, _ = signal.lsim(system, np.full(time.size, command), time)
     assert abs(rows[-1][3]) < parameters.motor.current_limit  # type: ignore[attr-defined]
     np.testing.assert_allclose(np.array(rows), expected, rtol=1e-7, atol=1e-9)
-    assert np.all(x[motor_drive.ANGLE:motor_drive.RATE + 1] == 0.0)
+    state = motor_drive.STATE
+    assert motor.x[state.angle] == motor.x[state.rate] == 0.0
 
 
 def test_the_current_settles_at_its_limit_whatever_is_asked() -> None:
     parameters = _held_motor()
-    p = record_of(parameters)
-    x, mode = np.zeros(motor_drive.STATES), np.zeros(motor_drive.MODES, np.int64)
-    work, y = work_space(motor_drive.STATES), np.zeros((motor_drive.OUTPUTS, 2))
-    motor_drive.start(p[0], x, mode, y)
-    u = np.zeros((motor_drive.INPUTS, 2))
-    u[motor_drive.RATE_COMMAND, 0] = 0.01
+    motor = Stepped(motor_drive.BLOCK, parameters)
+    motor.u[motor_drive.INPUT.rate_command, 0] = 0.01
     for _ in range(2000):
-        motor_drive.step(x, mode, u, p[0], H, 1, work, y)
+        motor.step(H)
     limit = parameters.motor.current_limit  # type: ignore[attr-defined]
-    assert x[motor_drive.CURRENT] == pytest.approx(limit, rel=1e-9)
+    assert motor.x[motor_drive.STATE.current] == pytest.approx(limit, rel=1e-9)
     # the integral has not wound up: when the command turns, the current turns within the lags
-    u[motor_drive.RATE_COMMAND, 0] = -0.01
+    motor.u[motor_drive.INPUT.rate_command, 0] = -0.01
     for _ in range(150):
-        motor_drive.step(x, mode, u, p[0], H, 1, work, y)
-    assert x[motor_drive.CURRENT] == pytest.approx(-limit, rel=1e-3)
+        motor.step(H)
+    assert motor.x[motor_drive.STATE.current] == pytest.approx(-limit, rel=1e-3)

@@ -21,11 +21,11 @@ from antenna_drive.parameters import load
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import Plant
 from antenna_drive.physics import structure
-from antenna_drive.physics.integrator import work_space
 from hypothesis import given, settings, strategies as st
 import numpy as np
 import pytest
 import scipy.linalg
+from stepping import Stepped
 
 H = 1e-3
 
@@ -38,14 +38,14 @@ def _plant(**axis: object) -> Plant:
 def _simulate(plant: Plant, x0: np.ndarray, slip: int, steps: int, h: float = H,
               inputs: Callable[[float], np.ndarray] | None = None) -> np.ndarray:
     """Return the states at every step, shape (steps + 1, states)."""
-    p = record_of(plant)
-    x, mode = x0.copy(), np.array([slip], np.int64)
-    work, y = work_space(x.size), np.zeros((structure.OUTPUTS, 2))
-    rows = [x.copy()]
+    unit = Stepped(structure.BLOCK, plant)
+    unit.x[:], unit.mode[:] = x0, slip
+    rows = [unit.x.copy()]
     for k in range(steps):
-        u = np.zeros((structure.INPUTS, 2)) if inputs is None else inputs(k * h)
-        structure.step(x, mode, u, p[0], h, 1, work, y)
-        rows.append(x.copy())
+        if inputs is not None:
+            unit.u[:] = inputs(k * h)
+        unit.step(h)
+        rows.append(unit.x.copy())
     return np.array(rows)
 
 
@@ -84,8 +84,8 @@ def test_a_ramped_torque_breaks_the_axis_away_at_stiction() -> None:
     ramp = 1e5  # N m/s
 
     def inputs(t: float) -> np.ndarray:
-        u = np.zeros((structure.INPUTS, 2))
-        u[structure.EXTERNAL_TORQUE] = ramp * t, ramp
+        u = np.zeros((len(structure.INPUT), 2))
+        u[structure.INPUT.external_torque] = ramp * t, ramp
         return u
 
     breakaway = axis.stiction_ratio * coulomb / ramp
@@ -149,16 +149,17 @@ def test_energy_is_conserved_without_friction_and_damping() -> None:
 
 def test_the_outputs_of_fig_4() -> None:
     plant = _plant()
-    p = record_of(plant)
-    x = np.array([0.1, 2e-3, 0.1 + 1e-5, 2e-3, 0.1, 3e-3, 0.1 - 2e-5, 2e-3])
-    y = np.zeros((structure.OUTPUTS, 2))
-    structure.outputs(x, np.array([1], np.int64), np.zeros((structure.INPUTS, 2)), 0.0, p[0], y)
-    assert y[0, 0] == y[2, 0] == 0.1
-    assert y[1, 0] == y[0, 1] == 2e-3
-    assert y[3, 0] == pytest.approx(plant.axis.gear_ratio * 2e-3)
-    assert y[4, 0] == pytest.approx(1.0 * 1e-5 + 0.3 * -2e-5)
-    assert y[5, 0] == pytest.approx(0.1 * 1e-5 + 0.3 * -2e-5)
-    assert y[4, 1] == pytest.approx(0.6 * 1e-3)
+    unit = Stepped(structure.BLOCK, plant)
+    unit.x[:] = 0.1, 2e-3, 0.1 + 1e-5, 2e-3, 0.1, 3e-3, 0.1 - 2e-5, 2e-3
+    structure.read(unit.x, unit.mode, unit.u, 0.0, record_of(plant)[0], unit.y)
+    y = {signal.name: row for signal, row in zip(structure.OUTPUTS, unit.y)}
+    assert y['axis_angle'][0] == y['encoder'][0] == 0.1
+    assert y['axis_rate'][0] == y['axis_angle'][1] == 2e-3
+    assert y['pinion_rate'][0] == pytest.approx(plant.axis.gear_ratio * 2e-3)
+    elevation, cross = y['pointing_error_elevation'], y['pointing_error_cross_elevation']
+    assert elevation[0] == pytest.approx(1.0 * 1e-5 + 0.3 * -2e-5)
+    assert cross[0] == pytest.approx(0.1 * 1e-5 + 0.3 * -2e-5)
+    assert elevation[1] == pytest.approx(0.6 * 1e-3)
 
 
 def test_halving_the_step_divides_the_error_by_sixteen() -> None:

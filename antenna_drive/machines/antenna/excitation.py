@@ -29,7 +29,7 @@ from antenna_drive.diagnosis import FloatArray
 from antenna_drive.emulator import batch
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import Waveform
-from antenna_drive.physics import test_signal
+from antenna_drive.physics import signal_generator
 from antenna_drive.recording import sheet as sheets
 import numpy as np
 
@@ -80,7 +80,7 @@ class SheetCommand:
     def __call__(self, time: FloatArray) -> FloatArray:
         """Return the rate command [rad/s] at these times [s]."""
         command = np.empty(time.size)
-        test_signal.values(time, self._record, _NO_BITS, command)
+        signal_generator.values(time, self._record, _NO_BITS, command)
         return command
 
     def knots(self, end: float) -> FloatArray:

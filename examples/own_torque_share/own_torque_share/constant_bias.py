@@ -20,7 +20,7 @@ import math
 import sys
 
 from antenna_drive.emulator.unit import FloatArray, Unit
-from antenna_drive.emulator.wiring import TORQUE_SHARE_OUTPUTS
+from antenna_drive.emulator.wiring import OUTPUTS
 from antenna_drive.lockstep.entry import run_unit
 from antenna_drive.parameters import Entry
 from antenna_drive.parameters.schema import Value
@@ -34,7 +34,7 @@ class ConstantBias(Unit):
     """Asks for one bias voltage whatever the motors carry."""
 
     inputs = ('motor_1/current', 'motor_2/current')
-    outputs = TORQUE_SHARE_OUTPUTS
+    outputs = OUTPUTS['torque_share']
 
     def __init__(self, name: str = 'torque_share', bias: float = 8.0) -> None:
         """Ask for `bias` [V]."""

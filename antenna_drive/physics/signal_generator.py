@@ -21,13 +21,20 @@ its right, so that nobody ever takes a difference across it.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from antenna_drive.parameters.sets import TestSignal, Waveform
 from antenna_drive.physics.arrays import FloatArray
+from antenna_drive.physics.block import output_rows, put, Signal, Source
 from antenna_drive.physics.compiling import compiled, inner
 import numpy as np
 from numpy.typing import NDArray
 
+OUTPUTS = (
+    Signal('rate_command', 'rad/s', 'axis rate command'),
+    Signal('external_torque', 'N m', 'test torque at the axis, zero unless asked for'),
+)
+OUTPUT = output_rows(OUTPUTS)
 (ZERO, SQUARE, SAW_TOOTH, SAW_TOOTH_JUMP, STEP, SINE, CHIRP, MULTISINE, PRBS,
  EXTERNAL) = range(10)
 # A time this share of a period before a jump counts as after it: k * h is not exact.
@@ -147,11 +154,11 @@ def values(t: FloatArray, p: Waveform, bits: FloatArray, y: FloatArray) -> None:
 
 @compiled
 def sample(
-        first: int, count: int, h: float, origins: FloatArray, p: TestSignal, bits: FloatArray,
+        first: int, count: int, h: float, origins: FloatArray, records: Any, bits: FloatArray,
         y: FloatArray,
 ) -> None:
     """
-    Write both test signals at so many macro-steps.
+    Write both test signals at `count` macro-steps.
 
     Parameters
     ----------
@@ -160,17 +167,23 @@ def sample(
     h
         macro-step [s]
     origins
-        time at which the rate's and the torque's waveform were chosen [s], shape (2,)
-    p
-        record of TestSignal
+        time at which each waveform was chosen [s], shape (2,)
+    records
+        the record of TestSignal, in an array of one: numba looks anew at a single record in
+        every call, which takes longer than the rest
     bits
         from `prbs_bits`
     y
-        receives value and derivative of rate command [rad/s] and external torque [N m],
-        shape (count, 2, 2)
+        receives value and derivative of the outputs, shape (count, 2, 2)
 
     """
+    p = records[0]
     for i in range(count):
         t = (first + i) * h - p.delay
-        y[i, 0, 0], y[i, 0, 1] = waveform(t - origins[0], p.rate, bits)
-        y[i, 1, 0], y[i, 1, 1] = waveform(t - origins[1], p.torque, bits)
+        value, slope = waveform(t - origins[OUTPUT.rate_command], p.rate, bits)
+        put(y[i], OUTPUT.rate_command, value, slope)
+        value, slope = waveform(t - origins[OUTPUT.external_torque], p.torque, bits)
+        put(y[i], OUTPUT.external_torque, value, slope)
+
+
+SOURCE = Source(kind=TestSignal, bare='rate', outputs=OUTPUTS)
