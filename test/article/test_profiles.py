@@ -51,6 +51,15 @@ def test_equation_14_alone_splits_the_load_between_the_motors() -> None:
     assert torques[:, 1] - torques[:, 0] == pytest.approx([0.0, 20.0, 0.0])
 
 
+def test_a_fade_out_is_found_through_swings_of_the_currents() -> None:
+    load_percent = np.linspace(-90.0, 90.0, 18001)
+    # 20 percent up to a load of 30, then a straight line to nothing at 70
+    bias = 20.0 * np.clip((70.0 - np.abs(load_percent)) / 40.0, 0.0, 1.0)
+    bias[::7] += 15.0
+    # nine tenths are left at 34, one tenth at 66; the medians are of one percent of load each
+    assert loaded_axis.fade_out(load_percent, bias) == pytest.approx((34.0, 66.0), abs=1.0)
+
+
 @pytest.mark.trial
 @pytest.mark.parametrize('circuit', ['old_circuit', 'new_circuit'])
 @pytest.mark.parametrize('share', loaded_axis.SHARES)

@@ -15,6 +15,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 import json
 import math
@@ -194,6 +195,16 @@ def test_the_basis_of_a_row_says_what_the_free_parameters_change(seed: int) -> N
         if row.basis in ('published', 'derived'):
             assert row.passed, row.id
     assert sum(not row.passed for row in found if row.basis == 'fitted') >= 5
+
+
+def test_the_document_gives_the_basis_of_every_row() -> None:
+    text = (Path(__file__).resolve().parents[2] / 'docs' / 'article.md').read_text()
+    cells = [[cell.strip() for cell in line.strip('|').split('|')]
+             for line in text.splitlines() if line.startswith('|')]
+    bases = {claim.measure: claim.basis for claim in CLAIMS}
+    assert {row[0]: row[-1] for row in cells if row[0] in bases} == bases
+    for basis, count in Counter(bases.values()).items():
+        assert [basis, str(count)] in [row[:2] for row in cells]
 
 
 def test_no_target_of_the_fit_counts_as_a_prediction() -> None:
