@@ -67,15 +67,15 @@ def test_the_loaded_axis_keeps_the_bias_and_carries_the_load(circuit: str, share
     drive = load(circuit)
     loop = loaded_axis.loaded(drive, circuit, share)
     assert loaded_axis.bias_at_rest(loop) == pytest.approx(100.0 * share, rel=0.03)
-    # the motors carry the load but for what friction takes: at rest at most the axis' stiction
-    # and both motors', as a share of the greatest torque
+    # the motors carry the load except for friction: at rest at most the stiction of the axis and
+    # of both motors, as a share of the greatest torque
     axis, motor = drive.plant.axis, drive.motor_1.motor
     friction = (axis.stiction_ratio * axis.coulomb_torque
                 + 2.0 * motor.stiction_ratio * motor.coulomb_torque) / (2.0 * motor.current_limit)
-    # an axis that breaks away swings for a moment
+    # an axis that breaks away overshoots for a moment
     missing = np.abs(loop.drive - loop.load) / 100.0
     assert np.quantile(missing, 0.98) <= friction
-    # and friction is all the difference: up and down are twice the Coulomb torque apart or so
+    # friction is the only difference: rising and falling differ by about twice the Coulomb torque
     up = np.interp(0.0, loop.load[loop.rising], loop.drive[loop.rising])
     down = np.interp(0.0, -loop.load[~loop.rising], loop.drive[~loop.rising])
     assert down - up > axis.coulomb_torque / motor.current_limit * 50.0
