@@ -47,10 +47,10 @@ class Distance:
 
 @lru_cache(maxsize=8)
 def _reference(name: str) -> Run:
-    return _kept(experiments()[name], FINE_STEP)
+    return _sampled(experiments()[name], FINE_STEP)
 
 
-def _kept(experiment: DriveExperiment, step_s: float) -> Run:
+def _sampled(experiment: DriveExperiment, step_s: float) -> Run:
     return simulate(experiment.drive(), experiment.duration, step_s,
                     every=round(_GRID / step_s))
 
@@ -75,7 +75,7 @@ def distances(step_s: float, names: Iterable[str] | None = None,
         if progress:
             progress(name)
         reference = _reference(name)
-        run = _kept(experiments()[name], step_s)
+        run = _sampled(experiments()[name], step_s)
         for signal in run.names:
             if signal.endswith(_LEFT_OUT):
                 continue

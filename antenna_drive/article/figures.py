@@ -94,7 +94,7 @@ def friction(results: Results) -> Figure:
 
 
 def _loaded(results: Results, circuit: str) -> Figure:
-    """Draw motor torque against axial torque: the dynamic model beside Eq. (14) alone."""
+    """Draw motor torque against axial torque: the dynamic model and Eq. (14) alone."""
     figure, axes = _new(3, 7.2, sharex=True)
     drive = results.drives[circuit]
     load = np.linspace(-100.0, 100.0, 801)

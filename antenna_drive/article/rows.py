@@ -26,7 +26,7 @@ from antenna_drive.article.published import CLAIMS
 @dataclass(frozen=True)
 class Row:
     """
-    One published figure beside what the model gives.
+    One published figure and the model's.
 
     Attributes
     ----------

@@ -135,10 +135,10 @@ class Problem:
         """
         self.guards(x, self.slip, self.p, self._g)
         for body in range(BODIES):
-            if body in bodies or (self._g[body] <= self.close and not self._beginning(x, body)):
+            if body in bodies or (self._g[body] <= self.close and not self._released(x, body)):
                 self.settle(x, self.slip, body, breaks and body in bodies, self.p)
 
-    def _beginning(self, x: FloatArray, body: int) -> bool:
+    def _released(self, x: FloatArray, body: int) -> bool:
         # a body that has just begun to slip has no rate yet, and must not be stopped for that
         rate = x[equations.HUB_RATE] if body == 2 else x[
             1 + equations.MOTOR_STATES * body + equations.RATE]

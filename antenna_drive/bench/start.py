@@ -34,7 +34,7 @@ _STARTS = {
     'import_s': 'import antenna_drive.emulator.run',
     'second_first_step_s': _FIRST_STEP,
 }
-_SAY_WHEN = '; import time; print(time.time())'
+_PRINT_TIME = '; import time; print(time.time())'
 
 
 def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> dict[str, Any]:
@@ -52,7 +52,7 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
     values: dict[str, list[float]] = {name: [] for name in _STARTS}
     for turn in range(repetitions + 1):
         for name, code in _STARTS.items():
-            took = _until_said(code)
+            took = _start_time(code)
             if turn:  # the first turn may compile and fill the cache
                 values[name].append(took)
     result: dict[str, Any] = {}
@@ -62,7 +62,7 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
         progress('starts with nothing compiled')
         with tempfile.TemporaryDirectory() as folder:
             values['first_first_step_s'] = [
-                _until_said(_FIRST_STEP, str(Path(folder, str(turn))))
+                _start_time(_FIRST_STEP, str(Path(folder, str(turn))))
                 for turn in range(repetitions)]
         progress('demo')
         demo = [_demo() for _ in range(repetitions)]
@@ -76,10 +76,10 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
     return result
 
 
-def _until_said(code: str, cache: str | None = None) -> float:
+def _start_time(code: str, cache: str | None = None) -> float:
     began = time.time()
     done = subprocess.run(
-        [sys.executable, '-c', code + _SAY_WHEN], capture_output=True, text=True, check=True,
+        [sys.executable, '-c', code + _PRINT_TIME], capture_output=True, text=True, check=True,
         env={**os.environ, **({'NUMBA_CACHE_DIR': cache} if cache else {})})
     return float(done.stdout) - began
 

@@ -69,7 +69,7 @@ def measure(groups: Iterable[str], repetitions: int, quick: bool,
         module = importlib.import_module(f'antenna_drive.bench.{_MODULES[group]}')
         began = time.monotonic()
         try:
-            result[group] = module.measure(repetitions, quick, partial(_told, progress, group))
+            result[group] = module.measure(repetitions, quick, partial(_report, progress, group))
         except ModuleNotFoundError as error:
             result[group] = {'left_out': {group: f'{error.name} is not installed'}}
         except UserError as error:
@@ -79,7 +79,7 @@ def measure(groups: Iterable[str], repetitions: int, quick: bool,
     return result
 
 
-def _told(progress: Callable[[str], None], group: str, doing: str) -> None:
+def _report(progress: Callable[[str], None], group: str, doing: str) -> None:
     progress(f'{group}: {doing}')
 
 

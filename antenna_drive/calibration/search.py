@@ -169,7 +169,7 @@ def search(problem: CalibrationProblem, count: int, *, seed: int = 1, log: Path 
                     candidate = known.read[number]
                     if not np.allclose(candidate.shares, shares, rtol=0.0, atol=1e-9):
                         raise UserError(f'{log}: does not repeat (another version of a library?), '
-                                        'remove it to start anew')
+                                        'remove it to start again')
                 else:
                     candidate = FitCandidate(tuple(map(float, shares)),
                                              problem.evaluate(shares, limit))

@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help=f'run {", ".join(THROUGH_NODES)} through the five ROS 2 processes')
     parser.add_argument('--config', metavar='SET', nargs='+', default=[CONFIGURATION],
                         help='parameter set: a name in config/ or a file; later ones override '
-                             'earlier ones (default: %(default)s)')
+                             f'earlier ones (default: {CONFIGURATION})')
 
 
 def run(arguments: argparse.Namespace) -> int:

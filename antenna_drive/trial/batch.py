@@ -138,7 +138,7 @@ def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
         called with the number of complete cases and their total
 
     """
-    _sweep(folder)
+    _remove_drafts(folder)
     names = list(manifest['seals'])
     wanted = [name for name in names if not (folder / name).is_dir()]
     truths = [sealing.open_truth(folder, name, manifest) for name in wanted]
@@ -162,7 +162,7 @@ def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
             done(complete, len(names))
 
 
-def _sweep(folder: Path) -> None:
+def _remove_drafts(folder: Path) -> None:
     """Remove incomplete cases of an interrupted run."""
     for draft in folder.glob('.case_*'):
         shutil.rmtree(draft, ignore_errors=True)

@@ -185,29 +185,21 @@ def _build_motors(motors: NDArray[Any]) -> None:
     scale = nominal.AMPERE_SCALE.value
     built_resistance = nominal.RESISTANCE.value + nominal.CURRENT_FEEDBACK_GAIN.value
     motors['side'] = (-1.0, 1.0)
-    motors['rate_gain'] = nominal.RATE_GAIN.value
-    motors['integral_time'] = nominal.INTEGRAL_TIME.value
+    for name in ('rate_gain', 'integral_time', 'current_limit', 'tach_gain', 'voltage_limit',
+                 'resistance', 'inductance', 'torque_constant', 'stiction_ratio', 'half_gap',
+                 'contact_damping'):
+        motors[name] = getattr(nominal, name.upper()).value
     motors['lag'] = nominal.AMPLIFIER_LAG.value
-    motors['current_limit'] = nominal.CURRENT_LIMIT.value
-    motors['tach_gain'] = nominal.TACH_GAIN.value
     motors['loop_gain'] = scale * built_resistance
     motors['feedback_gain'] = scale * nominal.CURRENT_FEEDBACK_GAIN.value
-    motors['voltage_limit'] = nominal.VOLTAGE_LIMIT.value
     motors['clamp_slope'] = nominal.BACK_EMF.value / scale / built_resistance
-    motors['resistance'] = nominal.RESISTANCE.value
-    motors['inductance'] = nominal.INDUCTANCE.value
     motors['back_emf'] = nominal.BACK_EMF.value / scale
     motors['ampere_scale'] = scale
-    motors['torque_constant'] = nominal.TORQUE_CONSTANT.value
     motors['inertia'] = nominal.ROTOR_INERTIA.value
     motors['coulomb'] = nominal.MOTOR_COULOMB.value * nominal.TORQUE_CONSTANT.value
-    motors['stiction_ratio'] = nominal.STICTION_RATIO.value
     motors['stiffness'] = nominal.GEAR_STIFFNESS.value
-    motors['half_gap'] = nominal.HALF_GAP.value
-    motors['contact_damping'] = nominal.CONTACT_DAMPING.value
-    motors['stribeck_rate'] = 1.0
-    motors['warming_time'] = 1.0
-    motors['tooth_ratio'] = 1.0
+    for name in ('stribeck_rate', 'warming_time', 'tooth_ratio'):
+        motors[name] = 1.0
     motors['dropout'] = -1.0
 
 

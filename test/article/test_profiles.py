@@ -51,6 +51,15 @@ def test_equation_14_alone_splits_the_load_between_the_motors() -> None:
     assert torques[:, 1] - torques[:, 0] == pytest.approx([0.0, 20.0, 0.0])
 
 
+def test_a_fade_out_is_found_through_swings_of_the_currents() -> None:
+    load_percent = np.linspace(-90.0, 90.0, 18001)
+    # 20 percent up to a load of 30, then a straight line to nothing at 70
+    bias = 20.0 * np.clip((70.0 - np.abs(load_percent)) / 40.0, 0.0, 1.0)
+    bias[::7] += 15.0
+    # nine tenths are left at 34, one tenth at 66; the medians are of one percent of load each
+    assert loaded_axis.fade_out(load_percent, bias) == pytest.approx((34.0, 66.0), abs=1.0)
+
+
 @pytest.mark.trial
 @pytest.mark.parametrize('circuit', ['old_circuit', 'new_circuit'])
 @pytest.mark.parametrize('share', loaded_axis.SHARES)
@@ -58,15 +67,15 @@ def test_the_loaded_axis_keeps_the_bias_and_carries_the_load(circuit: str, share
     drive = load(circuit)
     loop = loaded_axis.loaded(drive, circuit, share)
     assert loaded_axis.bias_at_rest(loop) == pytest.approx(100.0 * share, rel=0.03)
-    # the motors carry the load but for what friction takes: at rest at most the axis' stiction
-    # and both motors', as a share of the greatest torque
+    # the motors carry the load except for friction: at rest at most the stiction of the axis and
+    # of both motors, as a share of the greatest torque
     axis, motor = drive.plant.axis, drive.motor_1.motor
     friction = (axis.stiction_ratio * axis.coulomb_torque
                 + 2.0 * motor.stiction_ratio * motor.coulomb_torque) / (2.0 * motor.current_limit)
-    # an axis that breaks away swings for a moment
+    # an axis that breaks away overshoots for a moment
     missing = np.abs(loop.drive - loop.load) / 100.0
     assert np.quantile(missing, 0.98) <= friction
-    # and friction is all the difference: up and down are twice the Coulomb torque apart or so
+    # friction is the only difference: rising and falling differ by about twice the Coulomb torque
     up = np.interp(0.0, loop.load[loop.rising], loop.drive[loop.rising])
     down = np.interp(0.0, -loop.load[~loop.rising], loop.drive[~loop.rising])
     assert down - up > axis.coulomb_torque / motor.current_limit * 50.0

@@ -15,6 +15,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 import json
 import math
@@ -32,7 +33,7 @@ from antenna_drive.parameters.sets import changed
 import numpy as np
 import pytest
 
-# The published figure and how far from it still passes: 3 percent of rates and currents, 0.2 V,
+# The published figures and their tolerances: 3 percent of rates and currents, 0.2 V,
 # 5 points of overshoot, 0.15 s of settling, 3 of the stability limit.
 NUMBERS = {
     'T1.tach_rate': (193.0, 0.03 * 193.0),
@@ -50,14 +51,14 @@ NUMBERS = {
     'T4e.overshoot': (0.0, 5.0),
     'T4e.settling': (0.8, 0.15),
 }
-# What is below or above a number, or zero.
+# Upper bounds, figures below zero, and lower bounds.
 AT_MOST = {'T2a.current_1': 0.0, 'T2b.tach': -20.0, 'T2b.encoder': -30.0, 'T3a.low': 0.0,
            'T3b.time_at_zero': 0.0}
 BELOW_ZERO = ('T4b.overshoot_trend', 'T4b.settling_trend', 'T4d.overshoot_trend',
               'T4d.settling_trend')
 ABOVE = {'T2a.current_2': 0.0, 'T3a.time_at_zero': 5.0, 'T3b.low': 0.0}
 EXPERIMENTS = ('T1', 'T2a', 'T2b', 'T3a', 'T3b', 'T4a', 'T4b', 'T4c', 'T4d', 'T4e')
-# The reference set's weak rows, for which another set was sought: docs/article.md.
+# Rows that fail with the reference set: docs/article.md.
 WEAK_IN_THE_REFERENCE = {'T2b.encoder', 'T4b.settling_trend'}
 
 
@@ -173,7 +174,7 @@ def test_a_conclusion_follows_from_the_configuration() -> None:
     said = conclusion(changed_reference(**slow), 'stability_limit_units')
     assert 'No reading fits' in said
     assert "k' = 145.2, above the limit" in said
-    # behind a small gear ratio even 308 kgf m would be a small motor's
+    # with a small gear ratio even 308 kgf m would need a small motor
     said = conclusion(changed_reference(plant__axis__gear_ratio=150.0), 'torque_unit')
     assert 'All readings fit' in said
     # 6 kW at a ratio of 150 against 632 kW at 14868
@@ -194,6 +195,16 @@ def test_the_basis_of_a_row_says_what_the_free_parameters_change(seed: int) -> N
         if row.basis in ('published', 'derived'):
             assert row.passed, row.id
     assert sum(not row.passed for row in found if row.basis == 'fitted') >= 5
+
+
+def test_the_document_gives_the_basis_of_every_row() -> None:
+    text = (Path(__file__).resolve().parents[2] / 'docs' / 'article.md').read_text()
+    cells = [[cell.strip() for cell in line.strip('|').split('|')]
+             for line in text.splitlines() if line.startswith('|')]
+    bases = {claim.measure: claim.basis for claim in CLAIMS}
+    assert {row[0]: row[-1] for row in cells if row[0] in bases} == bases
+    for basis, count in Counter(bases.values()).items():
+        assert [basis, str(count)] in [row[:2] for row in cells]
 
 
 def test_no_target_of_the_fit_counts_as_a_prediction() -> None:

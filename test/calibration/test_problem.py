@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""A fit as data: what a file of targets may say, and what becomes of it."""
+"""The definition of a fit: valid and invalid target files, and the drives they lead to."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ def test_a_fitted_set_is_a_configuration_over_its_start(tmp_path: Path) -> None:
     assert fitted.plant.axis.coulomb_torque == pytest.approx(1.25)
     assert fitted.plant.axis.mode_inertias == (2.82e6, 1.5e6, 0.99e6)
     assert fitted.torque_share == start.torque_share
-    # and over a file of one's own what that file said is kept
+    # a fit that starts from another file keeps the other entries of that file
     own = tmp_path / 'own.yaml'
     own.write_text('amplifier: {lag: 0.02}\ngearbox: {stiffness: 30.0, half_gap: 0.1}\n')
     again = read_problem(written(tmp_path), [str(own)])

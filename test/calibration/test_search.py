@@ -31,7 +31,7 @@ import pytest
 
 pytest.importorskip('cma')
 
-# The figures are these sums of the shares: the first two tell a + b and a - b, nothing tells c.
+# The figures are these sums of the shares: they determine a + b and a - b, but not c.
 SLOPES = np.array([[100.0, 100.0, 0.0], [20.0, -20.0, 0.0]])
 BEST = np.array([0.3, 0.7, 0.5])
 
@@ -98,7 +98,7 @@ def test_an_interrupted_search_goes_on_and_ends_where_it_would_have_ended(tmp_pa
     assert places(found.candidates) == places(whole.candidates)
     assert found.best == whole.best
     assert rest.evaluated < 80 - 20
-    # and once more, nothing is left to do but the start
+    # a further run simulates only the start
     rest = Linear()
     search(rest, 80, log=log)  # type: ignore[arg-type]
     assert rest.evaluated == 1
@@ -139,12 +139,12 @@ def test_the_report_tells_what_is_determined(monkeypatch: pytest.MonkeyPatch) ->
     assert np.ptp([cost for _, cost in c['profile']]) == pytest.approx(0.0, abs=1e-3)
     assert min(cost for _, cost in (a['profile'][0], a['profile'][-1])) > 1.0
     assert all(target['met'] for target in told['targets'])
-    # what the difference costs at best, by the level of the sum, is least near its aim
+    # the least cost of the difference, by the level of the sum, has its minimum near the aim
     curve = told['trade_offs']['sum']
     assert all(point['cost_of_the_others'] >= 0.0 for point in curve)
     cheapest = min(curve, key=lambda point: point['cost_of_the_others'])
     assert cheapest['missed'] == []
-    # a better candidate of another search is seen
+    # a better candidate of another search is used
     other = FitCandidate((0.5, 0.5, 0.5), Evaluation(0.0, {
         'sum': cheapest['level'] + 1e-6, 'difference': float(SLOPES[1] @ BEST)}, True))
     curve = report(problem, found, ['sum'],  # type: ignore[arg-type]

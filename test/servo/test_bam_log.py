@@ -26,7 +26,7 @@ import numpy as np
 import pytest
 
 FIXTURE = Path(__file__).parent / 'data' / '2026-01-15_10h28m57.json'
-# where all sixteen are: beside a checkout, or where the variable says
+# the folder of all sixteen logs: next to a checkout, or from the variable
 FOLDER = Path(os.environ.get('BAM_XL330', Path(__file__).resolve().parents[3]
                              / 'shared' / 'data' / 'bam_xl330'))
 
@@ -44,7 +44,7 @@ def check(path: Path, recording: Recording) -> None:
     assert np.abs(recording['servo/position'].time_s - stamps).max() <= 0.5000001e-9
     for key in ('mass', 'length', 'kp', 'vin', 'motor', 'trajectory'):
         assert recording.notes[key] == log[key]
-    # the encoder has 4096 steps a turn, and the log is of 6 s at about 190 Hz or more
+    # the encoder has 4096 steps per turn; a log has 6 s at about 190 Hz or more
     steps = recording['servo/position'].values / (2 * math.pi / 4096)
     assert np.abs(steps - np.rint(steps)).max() < 1e-6
     assert recording.duration_s == pytest.approx(6.0, abs=0.01)

@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The servo's physics against closed forms, another integrator and the peer's own figures."""
+"""The servo's physics against closed forms, another integrator and BAM's own figures."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def run(values: dict[str, float], goal: float | FloatArray = 0.0, *, on: bool = 
 
 
 def crossings(time: FloatArray, position: FloatArray) -> FloatArray:
-    """Return when the position passes nought."""
+    """Return the times at which the position passes zero."""
     k = np.flatnonzero(np.diff(np.sign(position)) != 0)
     part = position[k] / (position[k] - position[k + 1])
     return np.asarray(time[k] + part * (time[k + 1] - time[k]))
@@ -83,7 +83,7 @@ def test_coulomb_friction_takes_its_work_from_each_swing() -> None:
     torque = 0.02
     _, out = run({'coulomb_torque': torque}, on=False, start=1.0, seconds=1.0, every=1e-3)
     turn = float(out[:, 0].min())
-    # what is lost in height is friction's work
+    # the loss of potential energy is the work of friction
     assert WEIGHT * (math.cos(turn) - math.cos(1.0)) == pytest.approx(
         torque * (1.0 - turn), rel=5e-3)
 
@@ -135,7 +135,7 @@ def test_a_held_load_needs_the_duty_that_its_weight_says() -> None:
 ])
 def test_the_stall_torque_is_that_of_the_circuit(effect: dict[str, float],
                                                  torque: float) -> None:
-    # a load that full duty just holds or just does not, at the same angle
+    # loads just below and just above the stall torque, at the same angle
     def moved(mass: float) -> float:
         _, out = run(effect, goal=1e4, mass=mass, start=math.pi / 2.0, seconds=0.5)
         return float(out[-1, 0]) - math.pi / 2.0
@@ -178,7 +178,7 @@ def test_stiff_teeth_without_a_gap_are_no_teeth() -> None:
     friction = {'coulomb_torque': 0.01, 'viscous_friction': 0.01}
     _, rigid = run(friction, goal=goal)
     _, teeth = run({**friction, 'compliance': 1e-9}, goal=goal, step=2e-4)
-    # they yield by the load times the least compliance, 2 mrad here
+    # the deflection is the load times the least compliance, 2 mrad here
     assert float(np.abs(rigid[:, 0] - teeth[:, 0]).max()) < 6e-3
 
 
@@ -213,10 +213,10 @@ def test_every_effect_acts_on_some_course_and_none_is_there_at_nought(effect: st
 @pytest.mark.skipif(not LOGS.is_dir(), reason='the recordings of the servo are not here')
 def test_the_peers_own_parameters_give_the_peers_own_figure() -> None:
     """
-    The friction model m6 is BAM's: its shipped parameters err here as they do there.
+    The friction model m6 is BAM's: its shipped parameters give the same error here as there.
 
-    They are those of bam/params/xl330/m6.json in Rhoban/bam; 74.1 mrad is what the peer's own
-    simulator gives with them on these recordings.
+    They are in bam/params/xl330/m6.json of Rhoban/bam. BAM's own simulator obtains 74.1 mrad with
+    them on these recordings.
     """
     values = {
         'torque_constant': 0.28638649600668775, 'resistance': 2.000017119760972,
