@@ -20,7 +20,7 @@ This is its public face; machines import nothing else of it.
 from antenna_drive.diagnosis.check import check_machine, idle_effects, MachineError
 from antenna_drive.diagnosis.confusability import Confusability, confusability
 from antenna_drive.diagnosis.diagnosis import diagnose, Diagnosis, Progress
-from antenna_drive.diagnosis.diagram import Block, Diagram
+from antenna_drive.diagnosis.diagram import Diagram, DiagramBlock
 from antenna_drive.diagnosis.evidence import Evidence
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.least_squares import LeastSquares
@@ -33,9 +33,9 @@ from antenna_drive.diagnosis.ranking import rank_hypotheses, Ranking
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
 
 __all__ = [
-    'Block', 'check_machine', 'Confusability', 'confusability', 'Course', 'DEFAULT', 'diagnose',
-    'Diagnosis', 'Diagram', 'DisturbanceInput', 'Effect', 'Evidence', 'Experiment', 'FloatArray',
-    'Form', 'Hypothesis', 'idle_effects', 'LeastSquares', 'Machine', 'MachineError', 'Motion',
-    'Parameter', 'Point', 'Progress', 'rank_hypotheses', 'Ranking', 'Regimes', 'Settings',
-    'TimeScales',
+    'check_machine', 'Confusability', 'confusability', 'Course', 'DEFAULT', 'diagnose',
+    'Diagnosis', 'Diagram', 'DiagramBlock', 'DisturbanceInput', 'Effect', 'Evidence', 'Experiment',
+    'FloatArray', 'Form', 'Hypothesis', 'idle_effects', 'LeastSquares', 'Machine', 'MachineError',
+    'Motion', 'Parameter', 'Point', 'Progress', 'rank_hypotheses', 'Ranking', 'Regimes',
+    'Settings', 'TimeScales',
 ]

@@ -24,7 +24,7 @@ _IN_A_ROW, _WIDTH, _GAP = 4, 170, 20
 
 
 @dataclass(frozen=True)
-class Block:
+class DiagramBlock:
     """
     A part of the machine.
 
@@ -59,7 +59,7 @@ class Diagram:
     """
 
     height: ClassVar[int] = 26
-    blocks: tuple[Block, ...]
+    blocks: tuple[DiagramBlock, ...]
     lines: tuple[tuple[float, float, float, float], ...] = ()
     several: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
@@ -67,9 +67,9 @@ class Diagram:
     def of(cls, components: Iterable[str]) -> Diagram:
         """Return the diagram of a machine that gives none: a block for each component, in rows."""
         return cls(tuple(
-            Block(component, component.replace('_', ' '),
-                  _GAP + i % _IN_A_ROW * (_WIDTH + _GAP),
-                  _GAP + i // _IN_A_ROW * (cls.height + _GAP), _WIDTH)
+            DiagramBlock(component, component.replace('_', ' '),
+                         _GAP + i % _IN_A_ROW * (_WIDTH + _GAP),
+                         _GAP + i // _IN_A_ROW * (cls.height + _GAP), _WIDTH)
             for i, component in enumerate(dict.fromkeys(components))))
 
     @property

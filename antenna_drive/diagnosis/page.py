@@ -21,7 +21,7 @@ import math
 from typing import Any
 
 from antenna_drive.diagnosis.diagnosis import Diagnosis, share_text, value_lines
-from antenna_drive.diagnosis.diagram import Block, Diagram
+from antenna_drive.diagnosis.diagram import Diagram, DiagramBlock
 from antenna_drive.diagnosis.machine import Experiment, FloatArray
 import numpy as np
 
@@ -85,7 +85,7 @@ class Contents:
     explained: str
     result: Mapping[str, Any]
     diagram: Diagram
-    blocks: Sequence[tuple[Block, float]]
+    blocks: Sequence[tuple[DiagramBlock, float]]
     likely: Sequence[Likely]
     panels: Sequence[Panel]
     advice: Sequence[str]

@@ -27,7 +27,7 @@ from typing import Any
 from antenna_drive.trial.effect import Defect
 from antenna_drive.trial.effects import CATALOGUE
 from antenna_drive.trial.machine import (
-    apply_tolerances, draw_tolerances, Machine, reference_machine,
+    apply_tolerances, draw_tolerances, Records, reference_machine,
 )
 from antenna_drive.trial.outside import OUTSIDE
 from antenna_drive.trial.programme import draw_sheets
@@ -128,7 +128,7 @@ def _compatible(first: Defect, second: Defect) -> bool:
     return first.key != second.key
 
 
-def build_machine(truth: Truth, recording: int) -> Machine:
+def build_machine(truth: Truth, recording: int) -> Records:
     """
     Build the antenna of a case for one recording.
 

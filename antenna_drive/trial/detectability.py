@@ -29,7 +29,7 @@ import math
 
 from antenna_drive.trial.cases import build_machine, draw_truths, sheet_of, Truth
 from antenna_drive.trial.effects import CATALOGUE
-from antenna_drive.trial.machine import apply_tolerances, draw_tolerances, Machine, Tolerances
+from antenna_drive.trial.machine import apply_tolerances, draw_tolerances, Records, Tolerances
 from antenna_drive.trial.outside import OUTSIDE
 from antenna_drive.trial.real_antenna import FloatArray, simulate
 from antenna_drive.trial.sensors import record
@@ -123,7 +123,7 @@ class Study:
             parts.append(self._recording(machine, recording, place))
         return np.concatenate(parts)
 
-    def _recording(self, machine: Machine, recording: int,
+    def _recording(self, machine: Records, recording: int,
                    place: tuple[float, float]) -> FloatArray:
         sheet = sheet_of(self._truth, recording)
         history = simulate(machine, sheet, self._times, place)

@@ -19,7 +19,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 import math
 
-from antenna_drive.trial.machine import Machine
+from antenna_drive.trial.machine import Records
 import numpy as np
 
 Parameters = Mapping[str, float]
@@ -93,7 +93,7 @@ class Defect:
     key: str
     form: str
     quantities: tuple[Quantity, ...]
-    change: Callable[[Machine, Parameters], None]
+    change: Callable[[Records, Parameters], None]
 
     def draw(self, size: float, random: np.random.Generator) -> dict[str, float]:
         """

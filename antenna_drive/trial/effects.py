@@ -26,11 +26,11 @@ from collections.abc import Callable
 import math
 
 from antenna_drive.trial.effect import Defect, Parameters, PHASE, Quantity
-from antenna_drive.trial.machine import GUST_WAVES, Machine
+from antenna_drive.trial.machine import GUST_WAVES, Records
 import numpy as np
 
 MOTORS = {'motor_1': slice(0, 1), 'motor_2': slice(1, 2), 'motors': slice(0, 2)}
-Change = Callable[[Machine, Parameters], None]
+Change = Callable[[Records, Parameters], None]
 
 
 def _factor(low: float, high: float, *, up_only: bool = False) -> Quantity:
@@ -43,14 +43,14 @@ def _cycles(low: int, high: int) -> Quantity:
 
 def setting(part: str, which: slice = slice(None), **fields: str) -> Change:
     """Return a change that sets fields of `part` of a machine to the numbers of these names."""
-    def change(machine: Machine, values: Parameters) -> None:
+    def change(machine: Records, values: Parameters) -> None:
         for field, quantity in fields.items():
             getattr(machine, part)[field][which] = values[quantity]
     return change
 
 
 def _scaling(part: str, *fields: str, which: slice = slice(None)) -> Change:
-    def change(machine: Machine, values: Parameters) -> None:
+    def change(machine: Records, values: Parameters) -> None:
         for field in fields:
             getattr(machine, part)[field][which] *= values['factor']
     return change
@@ -121,7 +121,7 @@ def _gearbox_effects(name: str, which: slice) -> tuple[Defect, ...]:
                        mesh_phase='phase')))
 
 
-def _fade_out(machine: Machine, values: Parameters) -> None:
+def _fade_out(machine: Records, values: Parameters) -> None:
     machine.circuit['fade_out'] += values['shift']
 
 
@@ -140,7 +140,7 @@ _TORQUE_SHARE = (
 )
 
 
-def _gust(machine: Machine, values: Parameters) -> None:
+def _gust(machine: Records, values: Parameters) -> None:
     # Davenport's spectrum of wind speed, S ~ x^2 / (f (1 + x^2)^(4/3)), as a sum of sines.
     frequency = np.geomspace(0.02, 3.0, GUST_WAVES)
     x = frequency / values['corner']
@@ -154,11 +154,11 @@ def _gust(machine: Machine, values: Parameters) -> None:
     structure['gust_phase'] = random.uniform(0.0, 2.0 * math.pi, GUST_WAVES)
 
 
-def _one_mode(machine: Machine, values: Parameters) -> None:
+def _one_mode(machine: Records, values: Parameters) -> None:
     machine.structure['mode_frequency'][0, int(values['mode']) - 1] *= values['factor']
 
 
-def _extra_mode(machine: Machine, values: Parameters) -> None:
+def _extra_mode(machine: Records, values: Parameters) -> None:
     machine.structure['extra_inertia'] = values['inertia']
     machine.structure['extra_frequency'] = 2.0 * math.pi * values['frequency']
     machine.structure['extra_damping'] = values['damping_ratio']

@@ -25,7 +25,7 @@ import math
 from typing import Any
 
 from antenna_drive.trial.compiled import compiled, inner
-from antenna_drive.trial.machine import DROPOUTS, GUST_WAVES, Machine
+from antenna_drive.trial.machine import DROPOUTS, GUST_WAVES, Records
 from antenna_drive.trial.waveform import command
 import numpy as np
 from numpy.typing import NDArray
@@ -310,7 +310,7 @@ def rotor_derivative(motor: Any, y: FloatArray, dy: FloatArray, at: int, which: 
 
 
 @compiled
-def motor_derivative(motor: Any, machine: Machine, y: FloatArray, dy: FloatArray, at: int,
+def motor_derivative(motor: Any, machine: Records, y: FloatArray, dy: FloatArray, at: int,
                      which: int, t: float, middle: float, mode: ModeArray,
                      margin: FloatArray) -> float:
     """Fill the derivatives and margins of one motor with its gear; return its gear torque."""
@@ -369,7 +369,7 @@ def structure_derivative(structure: Any, y: FloatArray, dy: FloatArray, t: float
 
 
 @compiled
-def derivative(t: float, middle: float, y: FloatArray, mode: ModeArray, machine: Machine,
+def derivative(t: float, middle: float, y: FloatArray, mode: ModeArray, machine: Records,
                test: Any, dy: FloatArray, margin: FloatArray) -> None:
     """
     Fill the time derivative of the state and the margins of all switches.
@@ -424,7 +424,7 @@ def derivative(t: float, middle: float, y: FloatArray, mode: ModeArray, machine:
 
 
 @compiled
-def readings(times: FloatArray, middles: FloatArray, states: FloatArray, machine: Machine,
+def readings(times: FloatArray, middles: FloatArray, states: FloatArray, machine: Records,
              test: Any, commands: FloatArray, biases: FloatArray, tachs: FloatArray) -> None:
     """
     Fill the signals that follow from the states.

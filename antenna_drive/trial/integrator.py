@@ -26,9 +26,10 @@ from typing import Any
 
 from antenna_drive.trial.compiled import compiled, inner
 from antenna_drive.trial.equations import (
-    AXIS_FRICTION, derivative, FloatArray, FRICTION, LOAD_SIGN, ModeArray, MOTOR_AT,
-    MOTOR_SIZE, STATES, SWITCHES, W, W_A)
-from antenna_drive.trial.machine import Machine
+    AXIS_FRICTION, derivative, FloatArray, FRICTION, LOAD_SIGN, ModeArray, MOTOR_AT, MOTOR_SIZE,
+    STATES, SWITCHES, W, W_A,
+)
+from antenna_drive.trial.machine import Records
 import numpy as np
 
 # Reasons for which an integration ends.
@@ -91,7 +92,7 @@ def rate_state(which: int) -> int:
 
 @compiled
 def throw(which: int, t: float, middle: float, y: FloatArray, mode: ModeArray,
-          machine: Machine, test: Any, scratch: FloatArray, margin: FloatArray) -> None:
+          machine: Records, test: Any, scratch: FloatArray, margin: FloatArray) -> None:
     """Move one switch whose margin is negative to its next position."""
     rate = rate_state(which)
     if which == LOAD_SIGN:
@@ -109,7 +110,7 @@ def throw(which: int, t: float, middle: float, y: FloatArray, mode: ModeArray,
 
 
 @compiled
-def settle(t: float, middle: float, y: FloatArray, mode: ModeArray, machine: Machine,
+def settle(t: float, middle: float, y: FloatArray, mode: ModeArray, machine: Records,
            test: Any, dy: FloatArray, margin: FloatArray) -> int:
     """
     Throw switches until all margins hold; fill derivatives and margins; return the count.
@@ -129,7 +130,7 @@ def settle(t: float, middle: float, y: FloatArray, mode: ModeArray, machine: Mac
 
 
 @inner
-def attempt(t: float, middle: float, h: float, y: FloatArray, mode: ModeArray, machine: Machine,
+def attempt(t: float, middle: float, h: float, y: FloatArray, mode: ModeArray, machine: Records,
             test: Any, scale: FloatArray, k: FloatArray, end: FloatArray,
             margin: FloatArray) -> float:
     """Fill slopes, state and margins at the end of a step; return its error over `scale`."""
@@ -153,7 +154,7 @@ def attempt(t: float, middle: float, h: float, y: FloatArray, mode: ModeArray, m
 
 @inner
 def first_switching(t: float, middle: float, h: float, y: FloatArray, mode: ModeArray,
-                    machine: Machine, test: Any, k: FloatArray, end: FloatArray,
+                    machine: Records, test: Any, k: FloatArray, end: FloatArray,
                     probe: FloatArray, scratch: FloatArray,
                     margin: FloatArray) -> tuple[bool, float]:
     """Return whether a switch must be thrown in a step, and at which share of it, 0 to 1."""
@@ -181,7 +182,7 @@ def first_switching(t: float, middle: float, h: float, y: FloatArray, mode: Mode
 
 
 @compiled
-def integrate(machine: Machine, test: Any, start: FloatArray, mode: ModeArray,
+def integrate(machine: Records, test: Any, start: FloatArray, mode: ModeArray,
               corners: FloatArray, samples: FloatArray, tolerance: float, scale: FloatArray,
               out: FloatArray, statistics: ModeArray) -> int:
     """

@@ -139,7 +139,7 @@ SENSORS = np.dtype([(name, np.float64) for name in (
 )])
 
 
-class Machine(NamedTuple):
+class Records(NamedTuple):
     """The records of one antenna: arrays of records, changed in place while it is built."""
 
     motors: NDArray[Any]        # shape (2,), MOTOR
@@ -159,7 +159,7 @@ TOLERANCED_CIRCUIT = CIRCUIT.names or ()
 
 
 def reference_machine(circuit: str = 'old', filter_1: str = 'old',
-                      bias_pot: float = nominal.BIAS_POT.value) -> Machine:
+                      bias_pot: float = nominal.BIAS_POT.value) -> Records:
     """
     Build the reference drive without any imperfection.
 
@@ -173,7 +173,7 @@ def reference_machine(circuit: str = 'old', filter_1: str = 'old',
         k_p, unit 1
 
     """
-    machine = Machine(np.zeros(2, MOTOR), np.zeros(1, STRUCTURE), np.zeros(1, CIRCUIT),
+    machine = Records(np.zeros(2, MOTOR), np.zeros(1, STRUCTURE), np.zeros(1, CIRCUIT),
                       np.zeros(1, SENSORS))
     _build_motors(machine.motors)
     _build_structure(machine.structure[0])
@@ -262,7 +262,7 @@ def draw_tolerances(tolerance: float, random: np.random.Generator) -> Tolerances
                       factors(len(TOLERANCED_CIRCUIT)))
 
 
-def apply_tolerances(machine: Machine, tolerances: Tolerances) -> None:
+def apply_tolerances(machine: Records, tolerances: Tolerances) -> None:
     """Multiply every toleranced constant of the machine by its factor."""
     for column, name in enumerate(TOLERANCED_MOTOR):
         machine.motors[name] *= tolerances.motors[:, column]

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from antenna_drive.trial.effect import Defect, Parameters, PHASE, Quantity
 from antenna_drive.trial.effects import Change, setting
-from antenna_drive.trial.machine import DROPOUTS, Machine
+from antenna_drive.trial.machine import DROPOUTS, Records
 import numpy as np
 
 MOTOR = Quantity('motor', '1', 1, 2, 'whole')
@@ -33,13 +33,13 @@ def _which(values: Parameters) -> int:
 
 
 def _motor_values(**fields: str) -> Change:
-    def change(machine: Machine, values: Parameters) -> None:
+    def change(machine: Records, values: Parameters) -> None:
         for field, quantity in fields.items():
             machine.motors[field][_which(values)] = values[quantity]
     return change
 
 
-def _dropouts(machine: Machine, values: Parameters) -> None:
+def _dropouts(machine: Records, values: Parameters) -> None:
     random = np.random.default_rng(int(values['seed']))
     which = _which(values)
     machine.motors['dropout_length'][which] = values['length']
@@ -47,14 +47,14 @@ def _dropouts(machine: Machine, values: Parameters) -> None:
     machine.motors['dropout'][which] = slots
 
 
-def _brake(machine: Machine, values: Parameters) -> None:
+def _brake(machine: Records, values: Parameters) -> None:
     which = _which(values)
     machine.motors['brake'][which] = values['torque']
     machine.motors['brake_start'][which] = values['start']
     machine.motors['brake_end'][which] = values['start'] + values['length']
 
 
-def _warm_motor(machine: Machine, values: Parameters) -> None:
+def _warm_motor(machine: Records, values: Parameters) -> None:
     which = _which(values)
     machine.motors['warm_torque'][which] = values['torque_loss']
     machine.motors['warm_resistance'][which] = 2.0 * values['torque_loss']

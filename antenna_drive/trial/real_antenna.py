@@ -26,7 +26,7 @@ import math
 
 from antenna_drive.trial import equations, integrator, waveform
 from antenna_drive.trial.equations import MOTOR_AT, MOTOR_SIZE
-from antenna_drive.trial.machine import Machine
+from antenna_drive.trial.machine import Records
 from antenna_drive.trial.sheet import CaseSheet
 import numpy as np
 from numpy.typing import NDArray
@@ -75,7 +75,7 @@ class History:
     switchings: int
 
 
-def start_state(machine: Machine, sheet: CaseSheet, place: tuple[float, float]) -> FloatArray:
+def start_state(machine: Records, sheet: CaseSheet, place: tuple[float, float]) -> FloatArray:
     """
     Return the state at rest, shape (equations.STATES,).
 
@@ -105,7 +105,7 @@ def start_state(machine: Machine, sheet: CaseSheet, place: tuple[float, float]) 
     return y
 
 
-def _sizes(machine: Machine) -> FloatArray:
+def _sizes(machine: Records) -> FloatArray:
     """Return the typical size of each state, which scales its error."""
     size = np.ones(equations.STATES)
     per_axis = 1.0 / float(machine.structure[0]['gear_ratio'])
@@ -118,7 +118,7 @@ def _sizes(machine: Machine) -> FloatArray:
     return size
 
 
-def simulate(machine: Machine, sheet: CaseSheet, times: FloatArray,
+def simulate(machine: Records, sheet: CaseSheet, times: FloatArray,
              place: tuple[float, float] = (0.0, 0.0),
              tolerance: float = TOLERANCE) -> History:
     """
@@ -162,7 +162,7 @@ def simulate(machine: Machine, sheet: CaseSheet, times: FloatArray,
     return _history(machine, test, times, states, edges, statistics)
 
 
-def _edges(machine: Machine, test: np.void, end: float) -> FloatArray:
+def _edges(machine: Records, test: np.void, end: float) -> FloatArray:
     """Return the times at which an input or its slope jumps [s]."""
     edges = list(waveform.corners(test, end))
     structure = machine.structure[0]
@@ -175,7 +175,7 @@ def _edges(machine: Machine, test: np.void, end: float) -> FloatArray:
     return np.array(sorted({float(t) for t in edges if 0.0 < t < end}), dtype=np.float64)
 
 
-def _history(machine: Machine, test: NDArray[np.void], times: FloatArray, states: FloatArray,
+def _history(machine: Records, test: NDArray[np.void], times: FloatArray, states: FloatArray,
              edges: FloatArray, statistics: NDArray[np.int64]) -> History:
     bounds = np.concatenate(([0.0], edges, [np.inf]))
     stretch = np.searchsorted(bounds, times, side='right') - 1

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 
-from antenna_drive.trial.machine import Machine
+from antenna_drive.trial.machine import Records
 from antenna_drive.trial.real_antenna import FloatArray, History
 from antenna_drive.trial.sheet import SensorGrade
 import numpy as np
@@ -66,7 +66,7 @@ def _digits(values: FloatArray, step: float) -> FloatArray:
     return np.round(values / step) * step + 0.0 if step > 0.0 else values
 
 
-def _encoder(angle: FloatArray, machine: Machine, grade: SensorGrade,
+def _encoder(angle: FloatArray, machine: Records, grade: SensorGrade,
              random: np.random.Generator) -> FloatArray:
     sensors = machine.sensors[0]
     phase = sensors['encoder_lines'] * angle + sensors['encoder_phase']
@@ -78,7 +78,7 @@ def _encoder(angle: FloatArray, machine: Machine, grade: SensorGrade,
     return np.floor(reading / step) * step
 
 
-def record(history: History, machine: Machine, grade: SensorGrade, stamps: FloatArray,
+def record(history: History, machine: Records, grade: SensorGrade, stamps: FloatArray,
            random: np.random.Generator) -> dict[str, FloatArray]:
     """
     Return the recording of true signals.

@@ -18,7 +18,9 @@ from __future__ import annotations
 import math
 
 from antenna_drive.machines.antenna.field_test import CHANNELS, FieldTest, prepared
-from antenna_drive.machines.antenna.modifiers import Change, ReadingModifier, Readings, RunSetup
+from antenna_drive.machines.antenna.modifiers import (
+    FieldChange, ReadingModifier, RunSetup, SensorReadings,
+)
 from antenna_drive.machines.antenna.planned_tests import BUILT_IN, planned
 from antenna_drive.machines.antenna.tolerances import nuisances
 from antenna_drive.parameters import load
@@ -61,7 +63,7 @@ def test_a_tolerance_changes_its_number_and_no_other(name: str, path: str,
         value *= number
     setup = RunSetup(record_of(drive).view(np.float64).copy(), record_of(drive).dtype, 2.0,
                      TESTS[0].bias)
-    assert isinstance(item.modifier, Change)
+    assert isinstance(item.modifier, FieldChange)
     item.modifier.apply(setup, item.high)
     written = record_of(changed(drive, {path: value})).view(np.float64)
     np.testing.assert_allclose(setup.numbers, written, rtol=1e-14)
@@ -81,7 +83,7 @@ def test_a_zero_shifts_one_reading_of_one_test(channel: str) -> None:
     for k, test in enumerate(TESTS):
         item = NUISANCES[f'zero:{channel}:{test.name}']
         assert item.experiment == k and item.on_readings
-        readings = Readings(np.zeros((3, 6)), np.zeros((3, 6)))
+        readings = SensorReadings(np.zeros((3, 6)), np.zeros((3, 6)))
         assert isinstance(item.modifier, ReadingModifier)
         item.modifier.apply_to_readings(readings, item.high)
         shifted = np.flatnonzero(readings.zero)
@@ -90,7 +92,7 @@ def test_a_zero_shifts_one_reading_of_one_test(channel: str) -> None:
 
 def test_a_clock_that_is_late_reads_what_was_before() -> None:
     slopes = np.arange(18.0).reshape(3, 6)
-    readings = Readings(np.zeros((3, 6)), slopes)
+    readings = SensorReadings(np.zeros((3, 6)), slopes)
     modifier = NUISANCES['clock:square'].modifier
     assert isinstance(modifier, ReadingModifier)
     modifier.apply_to_readings(readings, 0.01)

@@ -21,7 +21,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from antenna_drive.diagnosis.diagnosis import Diagnosis
-from antenna_drive.diagnosis.diagram import Block, Diagram
+from antenna_drive.diagnosis.diagram import Diagram, DiagramBlock
 from antenna_drive.diagnosis.machine import Effect, Experiment
 from antenna_drive.diagnosis.page import contents
 from antenna_drive.machines.antenna.advice import ADVICE
@@ -150,7 +150,7 @@ def test_no_gap_is_a_short_page(browser: Page, tmp_path: Path) -> None:
 
 
 def test_a_component_may_stand_for_several_blocks() -> None:
-    diagram = Diagram((Block('left', '', 0, 0, 9), Block('right', '', 10, 5, 9)),
+    diagram = Diagram((DiagramBlock('left', '', 0, 0, 9), DiagramBlock('right', '', 10, 5, 9)),
                       several={'both': ('left', 'right')})
     assert diagram.shares({'both': 0.5, 'left': 0.25, 'else': 0.1}) == {
         'left': 0.75, 'right': 0.5, 'else': 0.1}

@@ -19,7 +19,7 @@ import math
 
 from antenna_drive.trial import equations
 from antenna_drive.trial.equations import MODES_AT, MOTOR_AT, MOTOR_SIZE
-from antenna_drive.trial.machine import Machine, reference_machine
+from antenna_drive.trial.machine import Records, reference_machine
 from antenna_drive.trial.real_antenna import History, simulate
 from antenna_drive.trial.sheet import CaseSheet
 import numpy as np
@@ -30,7 +30,7 @@ from scipy.optimize import brentq
 REST = CaseSheet('old', 'old', {'type': 'fixed', 'voltage_V': 0.0}, {}, elevation_deg=0.0)
 
 
-def bare_axis() -> Machine:
+def bare_axis() -> Records:
     """Return a hub alone: no gears, no appendages."""
     machine = reference_machine()
     machine.motors['stiffness'] = 0.0
@@ -39,7 +39,7 @@ def bare_axis() -> Machine:
     return machine
 
 
-def ideal_mechanics() -> Machine:
+def ideal_mechanics() -> Records:
     """Return rotors, gears, hub and appendages without friction, damping or motor torque."""
     machine = reference_machine()
     machine.motors['torque_constant'] = 0.0
@@ -50,7 +50,7 @@ def ideal_mechanics() -> Machine:
     return machine
 
 
-def energy(machine: Machine, history: History) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def energy(machine: Records, history: History) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Return the mechanical energy at every sample [J]."""
     y, structure = history.state, machine.structure[0]
     theta_a, w_a = y[:, equations.THETA_A], y[:, equations.W_A]

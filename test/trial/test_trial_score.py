@@ -22,8 +22,7 @@ from typing import Any
 
 from antenna_drive.cli import main
 from antenna_drive.trial import sealing
-from antenna_drive.trial.scorecard import (
-    auroc, calibration_error, Case, rate, reliability, score)
+from antenna_drive.trial.scorecard import auroc, calibration_error, Case, rate, reliability, score
 from antenna_drive.trial.verdict import parse_verdict, Verdict, VerdictError
 import pytest
 

@@ -15,23 +15,23 @@
 
 from __future__ import annotations
 
-from antenna_drive.diagnosis import Block, Diagram
+from antenna_drive.diagnosis import Diagram, DiagramBlock
 
 DIAGRAM = Diagram(
     blocks=(
-        Block('loop', 'rate command', 10, 95, 120),
-        Block('current_1', 'ammeter 1', 170, 2, 175),
-        Block('motor_1', 'motor 1, amplifiers', 170, 30, 175),
-        Block('torque_share', 'torque share, Filter 1', 170, 95, 175),
-        Block('motor_2', 'motor 2, amplifiers', 170, 160, 175),
-        Block('current_2', 'ammeter 2', 170, 188, 175),
-        Block('tach_1', 'tach 1', 380, 2, 100),
-        Block('gearbox_1', 'gearbox 1', 380, 30, 100),
-        Block('bias_voltage', 'voltmeter', 380, 95, 100),
-        Block('gearbox_2', 'gearbox 2', 380, 160, 100),
-        Block('tach_2', 'tach 2', 380, 188, 100),
-        Block('axis', 'axis and dish', 530, 95, 130),
-        Block('encoder', 'encoder', 700, 95, 100),
+        DiagramBlock('loop', 'rate command', 10, 95, 120),
+        DiagramBlock('current_1', 'ammeter 1', 170, 2, 175),
+        DiagramBlock('motor_1', 'motor 1, amplifiers', 170, 30, 175),
+        DiagramBlock('torque_share', 'torque share, Filter 1', 170, 95, 175),
+        DiagramBlock('motor_2', 'motor 2, amplifiers', 170, 160, 175),
+        DiagramBlock('current_2', 'ammeter 2', 170, 188, 175),
+        DiagramBlock('tach_1', 'tach 1', 380, 2, 100),
+        DiagramBlock('gearbox_1', 'gearbox 1', 380, 30, 100),
+        DiagramBlock('bias_voltage', 'voltmeter', 380, 95, 100),
+        DiagramBlock('gearbox_2', 'gearbox 2', 380, 160, 100),
+        DiagramBlock('tach_2', 'tach 2', 380, 188, 100),
+        DiagramBlock('axis', 'axis and dish', 530, 95, 130),
+        DiagramBlock('encoder', 'encoder', 700, 95, 100),
     ),
     lines=(
         (130, 104, 170, 44), (130, 112, 170, 172), (345, 43, 380, 43), (345, 173, 380, 173),

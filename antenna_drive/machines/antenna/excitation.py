@@ -40,7 +40,7 @@ _NO_BITS = np.ones(1)   # no test sheet has a pseudo-random sequence
 _PARABOLA = np.linalg.inv(np.vander(_PLACES, 3, increasing=True))
 
 
-class Command(Protocol):
+class CommandedRate(Protocol):
     """An axis rate command over time."""
 
     def __call__(self, time: FloatArray) -> FloatArray:
@@ -164,7 +164,7 @@ class Longest:
         return np.asarray(np.minimum(self.usual, np.maximum(self.shortest, asked)))
 
 
-def schedule(command: Command, bias: Bias, samples: FloatArray, longest: Longest,
+def schedule(command: CommandedRate, bias: Bias, samples: FloatArray, longest: Longest,
              delay: float = 0.0) -> batch.Schedule:
     """
     Plan the integration of a test: no step reaches across a sample, a jump, or `longest`.

@@ -22,8 +22,10 @@ from typing import Any
 
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.errors import UserError
-from antenna_drive.machines.antenna.excitation import Bias, Command, RecordedCommand, SheetCommand
-from antenna_drive.machines.antenna.sensors import jitter_of, Sensors
+from antenna_drive.machines.antenna.excitation import (
+    Bias, CommandedRate, RecordedCommand, SheetCommand,
+)
+from antenna_drive.machines.antenna.sensors import jitter_of, SensorModel
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed, Drive
@@ -76,12 +78,12 @@ class FieldTest:
 
     name: str
     record: np.ndarray[Any, np.dtype[Any]]
-    command: Command
+    command: CommandedRate
     bias: Bias
     time: FloatArray
     measured: FloatArray
     slope: FloatArray
-    sensors: Sensors
+    sensors: SensorModel
     jitter: float
 
     def until(self, end: float) -> FieldTest:
@@ -129,7 +131,8 @@ def prepared(name: str, recording: Recording, drive: Drive, note: Note) -> Field
     command = _command(name, recording.sheet.waveform, given, note)
     time = _times(name, recording)
     return FieldTest(name, record_of(drive), command, bias, time,
-                     *_measured(name, recording, time, note), Sensors.of(recording.sheet.sensors),
+                     *_measured(name, recording, time, note),
+                     SensorModel.of(recording.sheet.sensors),
                      jitter_of(command, given.time_s, given.values))
 
 
@@ -177,7 +180,8 @@ def _as_the_sheet_says(name: str, sheet: sheets.TestSheet, drive: Drive,
     return drive, Bias(voltage, voltage)
 
 
-def _command(name: str, waveform: sheets.Waveform | None, given: Channel, note: Note) -> Command:
+def _command(name: str, waveform: sheets.Waveform | None, given: Channel,
+             note: Note) -> CommandedRate:
     if waveform is None:
         note(f'{name}: no waveform in the sheet, the recorded command was interpolated')
         return RecordedCommand.of(given.time_s, given.values)
@@ -188,7 +192,7 @@ def _command(name: str, waveform: sheets.Waveform | None, given: Channel, note: 
     return RecordedCommand.of(given.time_s, given.values)
 
 
-def _is(command: Command, given: Channel) -> bool:
+def _is(command: CommandedRate, given: Channel) -> bool:
     """Tell whether a command is the one that was recorded."""
     wrong = np.abs(command(given.time_s) - given.values) > 0.05 * np.ptp(given.values)
     return bool(np.mean(wrong) < 0.02)

@@ -40,7 +40,8 @@ from antenna_drive.machines.antenna.field_test import (
     CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, prepared, TACH_1, TACH_2, UNITS,
 )
 from antenna_drive.machines.antenna.modifiers import (
-    ADD, AntennaParameter, change, Modifier, ReadingModifier, Readings, RunModifier, RunSetup,
+    ADD, AntennaParameter, change, Modifier, ReadingModifier, RunModifier, RunSetup,
+    SensorReadings,
 )
 from antenna_drive.machines.antenna.sensors import digit_of
 from antenna_drive.machines.antenna.tolerances import nuisances, starting_places
@@ -384,7 +385,7 @@ class AntennaMachine(Machine):
 
     def _read(self, k: int, out: FloatArray, point: Point) -> FloatArray:
         """Return the readings of a run, with the errors of sensors that nothing feeds back."""
-        readings = Readings(out[:, :, 0].copy(), out[:, :, 1])
+        readings = SensorReadings(out[:, :, 0].copy(), out[:, :, 1])
         for name, value in point.items():
             item = self._modifiers[name]
             if item.on_readings and item.experiment in (None, k) and value:

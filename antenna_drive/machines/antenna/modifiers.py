@@ -67,9 +67,9 @@ class RunSetup:
 
 
 @dataclass
-class Readings:
+class SensorReadings:
     """
-    Readings as parameters modify them.
+    SensorReadings as parameters modify them.
 
     Attributes
     ----------
@@ -117,12 +117,12 @@ class ReadingModifier(Modifier):
     """Modifies readings after a run."""
 
     @abstractmethod
-    def apply_to_readings(self, readings: Readings, value: float) -> None:
+    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
         """Modify the readings."""
 
 
 @dataclass(frozen=True)
-class Change(RunModifier):
+class FieldChange(RunModifier):
     """Changes numbers of the drive's record."""
 
     how: str
@@ -172,7 +172,7 @@ class ReadingGain(ReadingModifier):
     channel: int
     fields: tuple[str, ...] = ()
 
-    def apply_to_readings(self, readings: Readings, value: float) -> None:
+    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
         readings.gain[self.channel] += value
 
 
@@ -183,7 +183,7 @@ class ReadingZero(ReadingModifier):
     channel: int
     fields: tuple[str, ...] = ()
 
-    def apply_to_readings(self, readings: Readings, value: float) -> None:
+    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
         readings.zero[self.channel] += value
 
 
@@ -191,7 +191,7 @@ class ReadingZero(ReadingModifier):
 class ClockShift(ReadingModifier):
     """Reads every channel later."""
 
-    def apply_to_readings(self, readings: Readings, value: float) -> None:
+    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
         readings.values += value * readings.slopes
 
 
@@ -202,7 +202,7 @@ class Digit(ReadingModifier):
     fields = ('plant.encoder.step',)
     how = SET
 
-    def apply_to_readings(self, readings: Readings, value: float) -> None:
+    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
         readings.digit = value
 
 
@@ -210,7 +210,7 @@ class Digit(ReadingModifier):
 class DigitTurn(ReadingModifier):
     """Shifts where the encoder rounds, by a share of its digit."""
 
-    def apply_to_readings(self, readings: Readings, value: float) -> None:
+    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
         readings.turn = value
 
 
@@ -221,16 +221,16 @@ class AntennaParameter(Parameter):
     modifier: Modifier = Modifier()
 
 
-def add(*fields: str) -> Change:
+def add(*fields: str) -> FieldChange:
     """Return the modifier that adds to numbers of the record."""
-    return Change(ADD, fields)
+    return FieldChange(ADD, fields)
 
 
-def scale(*fields: str) -> Change:
+def scale(*fields: str) -> FieldChange:
     """Return the modifier that scales numbers of the record by 1 + value."""
-    return Change(SCALE, fields)
+    return FieldChange(SCALE, fields)
 
 
-def set_to(*fields: str) -> Change:
+def set_to(*fields: str) -> FieldChange:
     """Return the modifier that sets numbers of the record."""
-    return Change(SET, fields)
+    return FieldChange(SET, fields)

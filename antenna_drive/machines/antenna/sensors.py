@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import math
 
 from antenna_drive.diagnosis import FloatArray
-from antenna_drive.machines.antenna.excitation import Command, RecordedCommand
+from antenna_drive.machines.antenna.excitation import CommandedRate, RecordedCommand
 from antenna_drive.recording import sheet as sheets
 import numpy as np
 
@@ -30,7 +30,7 @@ _WHOLE = 0.05
 
 
 @dataclass(frozen=True)
-class Sensors:
+class SensorModel:
     """What the sensors add: standard deviations and steps; usual ones if the sheet is silent."""
 
     current_noise: float = 0.01
@@ -43,7 +43,7 @@ class Sensors:
     bias_step: float = 0.01
 
     @classmethod
-    def of(cls, given: sheets.Sensors | None) -> Sensors:
+    def of(cls, given: sheets.Sensors | None) -> SensorModel:
         """Take what the sheet says."""
         if given is None:
             return cls()
@@ -66,7 +66,7 @@ class Sensors:
         return np.asarray(np.sqrt(noise ** 2 + (slope * jitter) ** 2))
 
 
-def jitter_of(command: Command, time: FloatArray, values: FloatArray) -> float:
+def jitter_of(command: CommandedRate, time: FloatArray, values: FloatArray) -> float:
     """
     Return by how much time stamps are off [s]: by what an exactly known command differs.
 

@@ -21,7 +21,7 @@ import math
 
 from antenna_drive.diagnosis import FloatArray, Form
 from antenna_drive.machines.antenna.modifiers import (
-    AntennaParameter, ReadingModifier, Readings, RunModifier, RunSetup, SET,
+    AntennaParameter, ReadingModifier, RunModifier, RunSetup, SensorReadings, SET,
 )
 import numpy as np
 
@@ -105,7 +105,7 @@ class _ReadingWavePart(ReadingModifier):
     shape: WaveShape
     index: int
 
-    def apply_to_readings(self, readings: Readings, value: float) -> None:
+    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
         readings.waves.setdefault(self.shape, [0.0] * len(_PARTS))[self.index] = value
 
 
