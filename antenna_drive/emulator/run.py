@@ -208,8 +208,9 @@ class Emulator:
 
         """
         blocks = [unit for unit in self.units.values() if isinstance(unit, BlockUnit)]
-        sources = [unit for unit in self.units.values() if isinstance(unit, SourceUnit)]
-        if len(sources) == 1 and len(blocks) + 1 == len(self.units):
+        sources = [unit for unit in self.units.values() if not unit.inputs]
+        if (len(sources) == 1 and len(blocks) + 1 == len(self.units)
+                and self.names == self._wiring.signals):
             return self._advance_compiled(sources[0], blocks, count, every)
         steps, samples = [], []
         for _ in range(count):
@@ -220,13 +221,18 @@ class Emulator:
         return (np.array(steps, np.int64),
                 np.array(samples).reshape(-1, len(self.names), 2))
 
-    def _advance_compiled(self, source: SourceUnit, blocks: Sequence[BlockUnit], count: int,
+    def _advance_compiled(self, source: Unit, blocks: Sequence[BlockUnit], count: int,
                           every: int) -> tuple[Any, FloatArray]:
+        if isinstance(source, SourceUnit):
+            commands = source.ahead(self.k, count)
+        else:
+            commands = np.array([source.step(self.k + i, np.zeros((0, 2))) for i in range(count)]
+                                ).reshape(count, len(source.outputs), 2)
         numbers = np.arange(self.k + 1, self.k + count + 1)
         numbers = numbers[numbers % every == 0]
         kept = np.empty((numbers.size, *self.now.shape))
         of_drive(self._wiring).advance(
-            self.k, self.step_s, inner_steps(self.step_s), every, source.ahead(self.k, count),
+            self.k, self.step_s, inner_steps(self.step_s), every, commands,
             self.now, np.empty_like(self.now), kept, tuple(unit.memory() for unit in blocks))
         self.k += count
         return numbers, kept

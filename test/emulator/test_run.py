@@ -141,6 +141,30 @@ def test_a_unit_of_ones_own_takes_the_place_of_ours() -> None:
     assert np.array_equal(simulate(muted, 0.5)['motor_1/current'], run['motor_1/current'])
 
 
+class Ramp(Unit):
+    """Test signals in plain Python: a command that grows, and no torque."""
+
+    outputs: ClassVar[tuple[Signal, ...]] = wiring.OUTPUTS['test_signal']
+
+    def start(self, step_s: float) -> FloatArray:
+        """Begin at zero."""
+        self._step_s = step_s
+        return np.array([[0.0, 1e-3], [0.0, 0.0]])
+
+    def step(self, k: int, inputs: FloatArray) -> FloatArray:
+        """Give the command at t_k+1."""
+        return np.array([[1e-3 * (k + 1) * self._step_s, 1e-3], [0.0, 0.0]])
+
+
+def test_test_signals_of_ones_own_drive_the_compiled_loop_to_the_same_bits() -> None:
+    drive = load('new_circuit')
+    fast = Emulator(drive, replaced={'test_signal': Ramp('test_signal')}).run(0.3)
+    slow = Emulator(drive, replaced={'test_signal': Ramp('test_signal')})
+    rows = [slow.now, *(slow.step() for _ in range(300))]
+    assert np.array_equal(fast.samples, np.array(rows))
+    np.testing.assert_allclose(fast['test_signal/rate_command'], 1e-3 * fast.time, rtol=1e-12)
+
+
 class Stray(ConstantShare):
     """A torque share that wants what nobody puts out."""
 
