@@ -216,6 +216,7 @@ def _bare_node(default_name: str) -> Node:
 
 
 def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], ending: _Ending) -> int:
+    from antenna_drive.lockstep.getting_ready import told_while_compiling
     from antenna_drive.lockstep.node import DriveNode, OWN_PARAMETERS
     from antenna_drive.lockstep.ros_parameters import Overrides
 
@@ -223,7 +224,8 @@ def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], ending: _Endi
     config = [name for name in overrides.names('config', ()) if name != 'reference']
     given = {name: value for name, value in overrides.rest().items()
              if name not in OWN_PARAMETERS}
-    unit = make(node.get_name(), config, given)
+    with told_while_compiling(node):
+        unit = make(node.get_name(), config, given)
     drive_node = DriveNode(node, unit, overrides, config, fed_by_topic)
     ending.by(drive_node.stop)
     if not ending.asked:
