@@ -222,6 +222,7 @@ def _bare_node(default_name: str) -> Node:
 def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], wiring: str,
           ending: _Ending) -> int:
     from antenna_drive.emulator.wiring import find
+    from antenna_drive.lockstep.getting_ready import told_while_compiling
     from antenna_drive.lockstep.node import DriveNode, OWN_PARAMETERS
     from antenna_drive.lockstep.ros_parameters import Overrides
 
@@ -231,7 +232,8 @@ def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], wiring: str,
              if name not in OWN_PARAMETERS}
     wiring = ''.join(overrides.names('wiring', [wiring]))
     wired = find(wiring)
-    unit = make(node.get_name(), wired, config, given)
+    with told_while_compiling(node):
+        unit = make(node.get_name(), wired, config, given)
     drive_node = DriveNode(node, unit, overrides, config, fed_by_topic, wiring, wired.outputs)
     ending.by(drive_node.stop)
     if not ending.asked:
