@@ -24,9 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, Field, field, fields, is_dataclass, replace
-from typing import Any, TypeVar
-
-Group = TypeVar('Group')
+from typing import Any
 
 DESIGN = 'design'
 PRACTICE = 'practice cases'

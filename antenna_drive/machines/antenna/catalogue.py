@@ -30,7 +30,8 @@ from antenna_drive.machines.antenna.modifiers import (
     add, AntennaParameter, CommandDelay, Digit, DigitTurn, Modifier, ReadingGain, ReadingModifier,
     ReadingZero, scale, set_to,
 )
-from antenna_drive.machines.antenna.waves import wave, WaveShape
+from antenna_drive.machines.antenna.wave_shape import WaveShape
+from antenna_drive.machines.antenna.waves import wave
 
 # The motors of an effect, for one motor or both.
 MOTORS: Mapping[str, tuple[str, ...]] = {

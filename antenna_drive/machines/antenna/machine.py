@@ -119,7 +119,6 @@ class AntennaMachine(Machine):
         self._lock = Lock()
         self._longest_step = LONGEST_STEP
         self._low_fidelity: AntennaMachine | None = None
-        self.run_count = 0
         notes: list[str] = []
         self._tests = [prepared(name, recording, drive, notes.append)
                        for name, recording in recordings.items()]
@@ -299,7 +298,6 @@ class AntennaMachine(Machine):
                 else:
                     known[job] = out
                 jobs.append((i, job, point))
-        self.run_count += len(wanted)
         fresh = dict(zip(wanted, self._executor.map(self._run, wanted), strict=True))
         results: list[list[FloatArray | None]] = [[None] * len(self._tests) for _ in points]
         for i, job, point in jobs:
@@ -337,9 +335,9 @@ class AntennaMachine(Machine):
             assert isinstance(modifier, RunModifier)
             modifier.apply(run, value)
         record = run.numbers.view(kind)
+        run.write_waves()
         turns = 0.0
         for shape, parts in run.waves.items():
-            shape.set_fields(run, parts)
             if shape.angle != 'axis' and any(parts):
                 turns = max(turns, shape.order * float(record[shape.angle]['gear_ratio'][0]))
         axis = record['plant']['axis']

@@ -22,16 +22,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from antenna_drive.diagnosis import FloatArray, Parameter
 from antenna_drive.machines.antenna.excitation import Bias
 from antenna_drive.machines.antenna.field_test import CHANNELS
+from antenna_drive.machines.antenna.wave_shape import WaveShape
 from antenna_drive.parameters.records import place_of
 import numpy as np
-
-if TYPE_CHECKING:
-    from antenna_drive.machines.antenna.waves import WaveShape
 
 SCALE, ADD, SET = 'scale', 'add', 'set'
 
@@ -64,6 +62,13 @@ class RunSetup:
     def change(self, path: str, how: str, value: float) -> None:
         """Scale a number of the record by 1 + value, add the value to it, or set it."""
         change(self.numbers, place_of(self.kind, path), how, value)
+
+    def write_waves(self) -> None:
+        """Write the waves into the record."""
+        for shape, parts in self.waves.items():
+            for path in shape.paths:
+                for end, value in shape.fields(parts).items():
+                    self.change(f'{path}.{shape.stem}{end}', SET, value)
 
 
 @dataclass

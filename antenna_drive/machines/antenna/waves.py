@@ -15,73 +15,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-import math
 
-from antenna_drive.diagnosis import FloatArray, Form
+from antenna_drive.diagnosis import Form
 from antenna_drive.machines.antenna.modifiers import (
-    AntennaParameter, ReadingModifier, RunModifier, RunSetup, SensorReadings, SET,
+    AntennaParameter, ReadingModifier, RunModifier, RunSetup, SensorReadings,
 )
-import numpy as np
-
-
-@dataclass(frozen=True)
-class WaveShape:
-    """
-    Where a wave is and which angle it follows.
-
-    Attributes
-    ----------
-    stem : what the names of the amplitude, cycles and phases in the record begin with
-    paths : where these fields are
-    angle : 'motor_1', 'motor_2' or 'axis'
-    order : cycles per revolution; 0 if not chosen yet
-
-    """
-
-    stem: str
-    paths: tuple[str, ...]
-    angle: str
-    order: float = 0.0
-
-    def set_fields(self, run: RunSetup, parts: Sequence[float]) -> None:
-        """
-        Write the wave into the record.
-
-        Parameters
-        ----------
-        run
-            whose record is changed
-        parts
-            sine and cosine, relative change of the order, sine and cosine of the second and of
-            the third harmonic
-
-        """
-        for path in self.paths:
-            for end, value in self.fields(parts).items():
-                run.change(f'{path}.{self.stem}{end}', SET, value)
-
-    def fields(self, parts: Sequence[float]) -> dict[str, float]:
-        """Return the wave as the record has it: amplitudes and phases, by the names' ends."""
-        sine, cosine, change, second_sine, second_cosine, third_sine, third_cosine = parts
-        return {'': math.hypot(sine, cosine), '_phase': math.atan2(cosine, sine),
-                '_cycles': self.order * (1.0 + change),
-                '_second': math.hypot(second_sine, second_cosine),
-                '_second_phase': math.atan2(second_cosine, second_sine),
-                '_third': math.hypot(third_sine, third_cosine),
-                '_third_phase': math.atan2(third_cosine, third_sine)}
-
-    def along(self, angle: FloatArray, parts: Sequence[float]) -> FloatArray:
-        """Return the wave at angles of shape (n,); `parts` as in `set_fields`."""
-        sine, cosine, change, *higher = parts
-        total = np.zeros_like(angle)
-        amplitudes = (sine, cosine, *higher)
-        for k, (a, b) in enumerate(zip(amplitudes[::2], amplitudes[1::2], strict=True), start=1):
-            turned = k * self.order * (1.0 + change) * angle
-            total += a * np.sin(turned) + b * np.cos(turned)
-        return total
-
+from antenna_drive.machines.antenna.wave_shape import WaveShape
 
 _PARTS = ('sine', 'cosine', 'cycles_change', 'second_sine', 'second_cosine', 'third_sine',
           'third_cosine')

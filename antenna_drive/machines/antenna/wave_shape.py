@@ -1,0 +1,72 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Where a wave is, which angle it follows, and its value."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+
+from antenna_drive.diagnosis import FloatArray
+import numpy as np
+
+
+@dataclass(frozen=True)
+class WaveShape:
+    """
+    Where a wave is and which angle it follows.
+
+    Attributes
+    ----------
+    stem : what the names of the amplitude, cycles and phases in the record begin with
+    paths : where these fields are
+    angle : 'motor_1', 'motor_2' or 'axis'
+    order : cycles per revolution; 0 if not chosen yet
+
+    """
+
+    stem: str
+    paths: tuple[str, ...]
+    angle: str
+    order: float = 0.0
+
+    def fields(self, parts: Sequence[float]) -> dict[str, float]:
+        """
+        Return the wave as the record has it: amplitudes and phases, by the ends of their names.
+
+        Parameters
+        ----------
+        parts
+            sine and cosine, relative change of the order, sine and cosine of the second and of
+            the third harmonic
+
+        """
+        sine, cosine, change, second_sine, second_cosine, third_sine, third_cosine = parts
+        return {'': math.hypot(sine, cosine), '_phase': math.atan2(cosine, sine),
+                '_cycles': self.order * (1.0 + change),
+                '_second': math.hypot(second_sine, second_cosine),
+                '_second_phase': math.atan2(second_cosine, second_sine),
+                '_third': math.hypot(third_sine, third_cosine),
+                '_third_phase': math.atan2(third_cosine, third_sine)}
+
+    def along(self, angle: FloatArray, parts: Sequence[float]) -> FloatArray:
+        """Return the wave at angles of shape (n,); `parts` as in `fields`."""
+        sine, cosine, change, *higher = parts
+        total = np.zeros_like(angle)
+        amplitudes = (sine, cosine, *higher)
+        for k, (a, b) in enumerate(zip(amplitudes[::2], amplitudes[1::2], strict=True), start=1):
+            turned = k * self.order * (1.0 + change) * angle
+            total += a * np.sin(turned) + b * np.cos(turned)
+        return total
