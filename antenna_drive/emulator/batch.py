@@ -22,8 +22,6 @@ diagnosis, which runs a test thousands of times with other parameters.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -176,11 +174,3 @@ def run(record: np.ndarray[Any, np.dtype[Any]], schedule: Schedule, wiring: Wiri
            tuple(np.zeros((count, 2)) for count in inputs), work_space(states),
            np.zeros((max(len(block.outputs) for block in units.values()), 2)), out)
     return out
-
-
-def run_all(jobs: Sequence[tuple[np.ndarray[Any, np.dtype[Any]], Schedule]],
-            executor: Executor | None = None) -> list[FloatArray]:
-    """Run many variants, in the threads of `executor` if there is one; see `run`."""
-    if executor is None:
-        return [run(*job) for job in jobs]
-    return list(executor.map(lambda job: run(*job), jobs))

@@ -20,7 +20,7 @@ from dataclasses import replace
 import math
 
 from antenna_drive.diagnosis import FloatArray
-from antenna_drive.machines.antenna.catalogue import QUANTISATION
+
 from antenna_drive.machines.antenna.excitation import Bias, Longest, schedule, SheetCommand
 from antenna_drive.machines.antenna.field_test import CHANNELS, ENCODER
 from antenna_drive.machines.antenna.machine import AntennaMachine
@@ -90,7 +90,7 @@ def test_angle_within_the_digit_that_was_read_is_no_residual(
     """An encoder of coarse digits is no gap once they are known, wherever it rounds."""
     drive, digit = load(), 2e-4
     model = AntennaMachine({'a': recorded(drive, digit, rounding)}, drive, 1)
-    step, edge = model.effects[QUANTISATION].forms[0].parameters
+    step, edge = model.effects['encoder.quantisation'].forms[0].parameters
     assert step.high == pytest.approx(digit, rel=1e-6)
     measured = model.experiments[0].measured[:, ENCODER]
     plain = readings_of(model, {})[:, ENCODER]
@@ -103,9 +103,9 @@ def test_fine_encoder_has_the_digits_of_its_sheet() -> None:
     """Digits that the sheet gives are no effect."""
     drive = load()
     model = AntennaMachine({'a': recorded(drive, 2.0 * math.pi / 2 ** 21, np.floor)}, drive, 1)
-    assert [p.name for p in model.effects[QUANTISATION].forms[0].parameters] == [
-        f'{QUANTISATION}.step']
-    assert model.effects[QUANTISATION].forms[0].parameters[0].high > 1e-3
+    assert [p.name for p in model.effects['encoder.quantisation'].forms[0].parameters] == [
+        'encoder.quantisation.step']
+    assert model.effects['encoder.quantisation'].forms[0].parameters[0].high > 1e-3
 
 
 def test_steps_are_short_where_a_wave_turns_fast() -> None:

@@ -47,8 +47,6 @@ EXTRA_MODES = tuple(0.6 * 1.14 ** k for k in range(23))
 # The mode of that effect: the record has room for it, the configuration does not have it.
 EXTRA_MODE = 3
 
-QUANTISATION = 'encoder.quantisation'
-
 
 class _Catalogue(dict[str, Effect]):
     """The entries as they are written down; names of parameters are relative to their effect."""
