@@ -144,6 +144,25 @@ class Sensors:
 
 
 @dataclass(frozen=True)
+class Tolerances:
+    """
+    How far a healthy machine and its recorder may be from what is written down.
+
+    What is not given is not fitted, but for the zeros of the readings, which are fitted within
+    two standard deviations of their noise.
+    """
+
+    tach_zero_rad_s: float | None = _entry('rad/s', 'zero of each tachometer, in the loop', 0.0)
+    amplifier_zero_V: float | None = _entry('V', 'zero of each amplifier, in the loop', 0.0)
+    recorder_gain: float | None = _entry('1', 'gain of each recorded channel', 0.0, 0.5)
+    current_zero_A: float | None = _entry('A', 'zero of each recorded current', 0.0)
+    bias_zero_V: float | None = _entry('V', 'zero of the recorded bias voltage', 0.0)
+    channel_delay_samples: float | None = _entry(
+        '1', 'constant delay of each recorded channel, in samples', 0.0, 10.0)
+    clock_ppm: float | None = _entry('1', "rate of the recorder's clock, in millionths", 0.0, 1e4)
+
+
+@dataclass(frozen=True)
 class TestSheet:
     """
     What the tester knows. Every entry may be None: not known.
@@ -157,6 +176,7 @@ class TestSheet:
     elevation_deg : elevation at the start [deg]
     sensors : how good the sensors are
     parameter_tolerance : how far the machine's parameters may lie from the configuration [1]
+    tolerances : the same for zeros, recorders and clocks
 
     """
 
@@ -170,6 +190,7 @@ class TestSheet:
     elevation_deg: float | None = _entry('deg', 'elevation at the start', -90.0, 180.0)
     sensors: Sensors | None = None
     parameter_tolerance: float | None = _entry('1', 'relative tolerance', 0.0, 1.0)
+    tolerances: Tolerances | None = None
 
     def __bool__(self) -> bool:
         """Tell whether anything is known."""

@@ -73,6 +73,8 @@ class FieldTest:
     slope : their slopes over time as recorded, shape (n, 6), NaN where there is none
     sensors : what they add
     jitter : of the time stamps [s]
+    period : between two recorded samples [s]
+    tolerances : of zeros, recorders and clocks
 
     """
 
@@ -85,6 +87,8 @@ class FieldTest:
     slope: FloatArray
     sensors: SensorModel
     jitter: float
+    period: float
+    tolerances: sheets.Tolerances
 
     def until(self, end: float) -> FieldTest:
         """Return as much of the test [s] from its first sample on."""
@@ -133,7 +137,9 @@ def prepared(name: str, recording: Recording, drive: Drive, note: Note) -> Field
     return FieldTest(name, record_of(drive), command, bias, time,
                      *_measured(name, recording, time, note),
                      SensorModel.of(recording.sheet.sensors),
-                     jitter_of(command, given.time_s, given.values))
+                     jitter_of(command, given.time_s, given.values),
+                     float(np.median(np.diff(given.time_s))),
+                     recording.sheet.tolerances or sheets.Tolerances())
 
 
 def _from_its_start(name: str, recording: Recording, note: Note) -> Recording:

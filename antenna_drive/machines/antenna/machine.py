@@ -383,7 +383,8 @@ class AntennaMachine(Machine):
 
     def _read(self, k: int, out: FloatArray, point: Point) -> FloatArray:
         """Return the readings of a run, with the errors of sensors that nothing feeds back."""
-        readings = SensorReadings(out[:, :, 0].copy(), out[:, :, 1])
+        time = self._tests[k].time
+        readings = SensorReadings(time - time[0], out[:, :, 0].copy(), out[:, :, 1])
         for name, value in point.items():
             item = self._modifiers[name]
             if item.on_readings and item.experiment in (None, k) and value:

@@ -78,6 +78,7 @@ class SensorReadings:
 
     Attributes
     ----------
+    time : since the first sample, shape (n,) [s]
     values, slopes : of every channel and their time derivatives, shape (n, 6)
     gain, zero : of every channel, shape (6,)
     digit : of the encoder [rad]; 0 for none
@@ -86,6 +87,7 @@ class SensorReadings:
 
     """
 
+    time: FloatArray
     values: FloatArray
     slopes: FloatArray
     gain: FloatArray = field(default_factory=lambda: np.ones(len(CHANNELS)))
@@ -198,6 +200,24 @@ class ClockShift(ReadingModifier):
 
     def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
         readings.values += value * readings.slopes
+
+
+@dataclass(frozen=True)
+class ChannelDelay(ReadingModifier):
+    """Reads one channel earlier than its time stamps say, to first order."""
+
+    channel: int
+
+    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
+        readings.values[:, self.channel] -= value * readings.slopes[:, self.channel]
+
+
+@dataclass(frozen=True)
+class ClockRate(ReadingModifier):
+    """Lets the recorder's clock run slow by a share of the time, to first order."""
+
+    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
+        readings.values += value * readings.time[:, np.newaxis] * readings.slopes
 
 
 @dataclass(frozen=True)

@@ -16,14 +16,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import fields, replace
 import math
 
 from antenna_drive.machines.antenna.field_test import (
     BIAS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, TACH_1, TACH_2,
 )
 from antenna_drive.machines.antenna.modifiers import (
-    add, AntennaParameter, ClockShift, Modifier, ReadingZero, scale, SupplyGain,
+    add, AntennaParameter, ChannelDelay, ClockRate, ClockShift, Modifier, ReadingGain,
+    ReadingModifier, ReadingZero, scale, SupplyGain,
 )
+from antenna_drive.recording.sheet import Tolerances
 
 # The numbers that the configuration knows only within the tolerance of the test sheet.
 TOLERANT_MOTOR = (
@@ -47,6 +50,12 @@ TOLERANT_DRIVE = (
 )
 
 
+# The recorded channels with the number of the configuration that is their recorder's gain.
+_RECORDED = (('current_1', 'motor_1.ammeter.gain'), ('current_2', 'motor_2.ammeter.gain'),
+             ('tach_1', ''), ('tach_2', ''), ('encoder', ''),
+             ('bias_voltage', 'torque_share.circuit.voltmeter_gain'))
+
+
 def nuisances(tests: Sequence[FieldTest], tolerance: float) -> tuple[AntennaParameter, ...]:
     """
     Return the nuisances of a machine in its tests.
@@ -59,7 +68,7 @@ def nuisances(tests: Sequence[FieldTest], tolerance: float) -> tuple[AntennaPara
         by what share the machine's numbers may differ from the configuration
 
     """
-    return (*_of_the_machine(tests[0], tolerance),
+    return (*_of_the_machine(tests[0], tolerance), *_of_zeros_and_recorders(tests),
             *(item for k, test in enumerate(tests) for item in _of_a_test(k, test, tolerance)))
 
 
@@ -68,7 +77,7 @@ def _within(name: str, unit: str, half_width: float, modifier: Modifier,
     """Return a number that is spread evenly within a tolerance."""
     return AntennaParameter(name, unit, -half_width, half_width, 0.3 * half_width,
                             half_width / math.sqrt(3.0), experiment=experiment,
-                            modifier=modifier)
+                            on_readings=isinstance(modifier, ReadingModifier), modifier=modifier)
 
 
 def _of_the_machine(test: FieldTest, tolerance: float) -> Iterator[AntennaParameter]:
@@ -89,6 +98,28 @@ def _of_the_machine(test: FieldTest, tolerance: float) -> Iterator[AntennaParame
         yield relative(name)
 
 
+def _of_zeros_and_recorders(tests: Sequence[FieldTest]) -> Iterator[AntennaParameter]:
+    """Yield what the sheets allow beyond the parameters: zeros in the loop, gains, delays."""
+    given = Tolerances(**{item.name: max(
+        (getattr(test.tolerances, item.name) or 0.0 for test in tests)) for item in
+        fields(Tolerances)})
+    period = max(test.period for test in tests)
+    for m in (1, 2):
+        motor = f'motor_{m}'
+        for allowed, unit, path in (
+                (given.tach_zero_rad_s, 'rad/s', f'{motor}.tachometer.offset'),
+                (given.amplifier_zero_V, 'V', f'{motor}.amplifier.offset')):
+            if allowed:
+                yield _within(f'offset:{path}', unit, allowed, add(path))
+    for channel, (name, field) in enumerate(_RECORDED):
+        if given.recorder_gain and channel != ENCODER:
+            yield _within(f'gain:{name}', '1', given.recorder_gain,
+                          ReadingGain(channel, (field,) if field else ()))
+        if given.channel_delay_samples:
+            seconds = given.channel_delay_samples * period
+            yield replace(_within(f'delay:{name}', 's', seconds, ChannelDelay(channel)), low=0.0)
+
+
 def starting_places(k: int, test: FieldTest) -> tuple[AntennaParameter, ...]:
     """Return where in its gap each motor starts in test k, as a share of half the gap."""
     return tuple(AntennaParameter(
@@ -103,6 +134,10 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
     yield AntennaParameter(f'clock:{test.name}', 's', -0.01, 0.01, 1e-4, 1e-3, experiment=k,
                            on_readings=True, modifier=ClockShift())
 
+    given = test.tolerances
+    if given.clock_ppm:
+        yield _within(f'clock_rate:{test.name}', '1', 1e-6 * given.clock_ppm, ClockRate(), k)
+
     def zero(channel: int, name: str, unit: str, half_width: float, step: float,
              sigma: float) -> AntennaParameter:
         return AntennaParameter(f'zero:{name}:{test.name}', unit, -half_width, half_width, step,
@@ -111,10 +146,13 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
 
     yield zero(ENCODER, 'encoder', 'rad', 4e-5, 2e-6, 1e-5)
     sensors = test.sensors
-    for channel, name, unit, noise in (
-            (CURRENT_1, 'current_1', 'A', sensors.current_noise),
-            (CURRENT_2, 'current_2', 'A', sensors.current_noise),
-            (TACH_1, 'tach_1', 'rad/s', sensors.tach_noise),
-            (TACH_2, 'tach_2', 'rad/s', sensors.tach_noise),
-            (BIAS, 'bias_voltage', 'V', sensors.bias_noise)):
-        yield zero(channel, name, unit, 2.0 * noise, noise, 0.7 * noise)
+    for channel, name, unit, noise, allowed in (
+            (CURRENT_1, 'current_1', 'A', sensors.current_noise, given.current_zero_A),
+            (CURRENT_2, 'current_2', 'A', sensors.current_noise, given.current_zero_A),
+            (TACH_1, 'tach_1', 'rad/s', sensors.tach_noise, None),
+            (TACH_2, 'tach_2', 'rad/s', sensors.tach_noise, None),
+            (BIAS, 'bias_voltage', 'V', sensors.bias_noise, given.bias_zero_V)):
+        if allowed is None:
+            yield zero(channel, name, unit, 2.0 * noise, noise, 0.7 * noise)
+        elif allowed:
+            yield zero(channel, name, unit, allowed, 0.3 * allowed, allowed / math.sqrt(3.0))
