@@ -34,7 +34,7 @@ from antenna_drive.recording import sheet as sheets
 import numpy as np
 
 DEGREE = np.pi / 180.0
-# The three places in a step at which its command is read: off its ends, where jumps may be.
+# Places within a step at which the command is read; jumps may be at its ends.
 _PLACES = np.array([0.1, 0.5, 0.9])
 _NO_BITS = np.ones(1)   # no test sheet has a pseudo-random sequence
 _PARABOLA = np.linalg.inv(np.vander(_PLACES, 3, increasing=True))
@@ -100,7 +100,7 @@ class SheetCommand:
 
 @dataclass(frozen=True)
 class RecordedCommand:
-    """A command that is known from its samples: straight lines, and jumps between."""
+    """A command that is known from its samples: straight lines with jumps between them."""
 
     time: FloatArray
     value: FloatArray
@@ -108,7 +108,7 @@ class RecordedCommand:
 
     @classmethod
     def of(cls, time: FloatArray, value: FloatArray) -> RecordedCommand:
-        """Take the samples of a command, shapes (n,), and find its jumps."""
+        """Take the samples of a command, shape (n,), and find its jumps."""
         change = np.abs(np.diff(value))
         usual = np.median(change) + 1e-12
         around = np.maximum(np.r_[change[1:], 0.0], np.r_[0.0, change[:-1]])
@@ -189,7 +189,7 @@ def schedule(command: CommandedRate, bias: Bias, samples: FloatArray, longest: L
         jumps = np.r_[jumps, bias.at]
     jumps = jumps[(jumps > 0.0) & (jumps < end)]
     knots = np.unique(np.r_[0.0, samples, jumps])
-    # a step much shorter than its neighbours buys nothing: jumps that fall on a sample merge
+    # a jump on a sample needs no step of its own
     keep = np.r_[True, np.diff(knots) > 1e-9]
     knots = knots[keep]
     rate = command(0.5 * (knots[:-1] + knots[1:]) - delay)
@@ -213,7 +213,7 @@ def schedule(command: CommandedRate, bias: Bias, samples: FloatArray, longest: L
 
 
 def with_bias(plan: batch.Schedule, bias: Bias) -> batch.Schedule:
-    """Return a plan with the voltages of a source of bias, which steps as the plan's own does."""
+    """Return a plan with other voltages of the bias source, which steps at the same time."""
     steps = plan.steps.copy()
     length = steps[:, batch.LENGTH]
     middle = np.cumsum(length) - 0.5 * length

@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""A recorded test made ready for comparison: what was done to the drive, and what was read."""
+"""A recorded test, prepared for comparison: the command, the bias and the readings."""
 
 from __future__ import annotations
 
@@ -40,17 +40,17 @@ CHANNELS = {
 }
 UNITS = ('A', 'A', 'rad/s', 'rad/s', 'rad', 'V')
 CURRENT_1, CURRENT_2, TACH_1, TACH_2, ENCODER, BIAS = range(6)
-# Where a recording may keep the same reading under another name.
+# Other names under which a recording may hold a reading.
 _ALIASES = {'motor_1/ammeter': ('motor_1/current',), 'motor_2/ammeter': ('motor_2/current',)}
 _RATE_COMMAND = 'test_signal/rate_command'
-# Samples are thinned to about this rate; they are never averaged, which would hide a ripple.
+# Samples are thinned to about this rate [Hz]. They are not averaged, which would hide a ripple.
 SAMPLE_RATE = 70.0
-# A recording that begins later is counted from its first sample [s], unless it joined the sheet's
-# waveform so long after that had begun.
+# The time of a recording that starts later than the first number [s] counts from its first
+# sample, unless it joined the sheet's waveform within the second.
 _PROMPT_S, _JOINED_S = 1.0, 60.0
-# Fewer samples tell nothing.
+# Least number of samples.
 _FEWEST = 10
-# What a sheet's word for a circuit sets.
+# The parameters that a sheet's name of a circuit sets.
 _CIRCUITS = {'circuit': ('torque_share.circuit', ('k_2', 's_2', 'k_3', 'g_4')),
              'filter_1': ('torque_share.filter_1', ('gain', 'pole'))}
 
@@ -91,14 +91,14 @@ class FieldTest:
     tolerances: sheets.Tolerances
 
     def until(self, end: float) -> FieldTest:
-        """Return as much of the test [s] from its first sample on."""
+        """Return the first part of the test, of this length [s]."""
         n = int(np.searchsorted(self.time, self.time[0] + end))
         return replace(self, time=self.time[:n], measured=self.measured[:n],
                        slope=self.slope[:n])
 
     @property
     def repeats(self) -> bool:
-        """Tell whether a part of the test shows what the whole does: a chirp's does not."""
+        """Return whether a part of the test shows what the whole does; not so with a chirp."""
         return not (isinstance(self.command, SheetCommand)
                     and isinstance(self.command.waveform, sheets.Chirp))
 
@@ -143,7 +143,7 @@ def prepared(name: str, recording: Recording, drive: Drive, note: Note) -> Field
 
 
 def _from_its_start(name: str, recording: Recording, note: Note) -> Recording:
-    """Return a recording whose time begins with the test, not with a clock's year."""
+    """Return a recording whose time starts with the test."""
     begins_s = recording.start_ns / NANOSECONDS
     waveform = recording.sheet.waveform
     if abs(begins_s) <= _PROMPT_S or (0.0 < begins_s < _JOINED_S and waveform is not None
@@ -199,7 +199,7 @@ def _command(name: str, waveform: sheets.Waveform | None, given: Channel,
 
 
 def _is(command: CommandedRate, given: Channel) -> bool:
-    """Tell whether a command is the one that was recorded."""
+    """Return whether a command is the recorded one."""
     wrong = np.abs(command(given.time_s) - given.values) > 0.05 * np.ptp(given.values)
     return bool(np.mean(wrong) < 0.02)
 
@@ -212,7 +212,7 @@ def _channel(recording: Recording, name: str) -> Channel | None:
 
 
 def _times(name: str, recording: Recording) -> FloatArray:
-    """Return the times of the samples that are used: those of the most sampled reading."""
+    """Return the times that are compared: those of the reading with the most samples."""
     channels = [_channel(recording, name) for name in CHANNELS]
     time = max((c.time_s for c in channels if c is not None), key=len)
     time = time[time >= 0.0]
@@ -225,7 +225,7 @@ def _times(name: str, recording: Recording) -> FloatArray:
 
 def _measured(name: str, recording: Recording, time: FloatArray,
               note: Note) -> tuple[FloatArray, FloatArray]:
-    """Return readings and their slopes at these times, NaN where there is none."""
+    """Return the readings and their slopes at these times; NaN where there is none."""
     measured, slope = np.full((2, time.size, len(CHANNELS)), np.nan)
     for c, channel_name in enumerate(CHANNELS):
         channel = _channel(recording, channel_name)
@@ -236,7 +236,7 @@ def _measured(name: str, recording: Recording, time: FloatArray,
         at = np.clip(np.searchsorted(times, time - 1e-9), 0, times.size - 1)
         there = np.abs(times[at] - time) < 1e-6
         measured[there, c] = channel.values[at[there]]
-        # before they are thinned, samples tell the slope of what is too fast to be told after
+        # the slope is taken before thinning, which would hide fast motion
         if times.size > 1:
             slope[there, c] = np.gradient(channel.values, times)[at[there]]
     return measured, slope

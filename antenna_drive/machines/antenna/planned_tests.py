@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Tests that have not been made: the built-in ones, and what a set of tests can tell apart."""
+"""Planned tests: the built-in ones, and which effects a set of tests can tell apart."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ BUILT_IN: Mapping[str, TestSheet] = {
 
 
 def planned(sheet: TestSheet, duration: float, rate: float) -> Recording:
-    """Return a test that has not been made: its command, and readings of zero."""
+    """Return a planned test as a recording: its command, and readings of zero."""
     time = np.arange(int(duration * rate) + 1) / rate
     command = SheetCommand(sheet.waveform or Square(0.05, 6.3, 0.25))
     signals = {'test_signal/rate_command': command(time)}

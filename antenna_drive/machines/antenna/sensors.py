@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""What the sensors add to the truth: noise, steps, and time stamps that are a little off."""
+"""Errors of the sensors: noise, resolution and jitter of the time stamps."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from antenna_drive.machines.antenna.excitation import CommandedRate, RecordedCom
 from antenna_drive.recording import sheet as sheets
 import numpy as np
 
-# From so few changes of a reading its digit is not told, and a multiple of it may be off by so
-# much.
+# A digit is found from at least this many changes of a reading, and each change may differ from a
+# multiple of it by this share.
 _CHANGES = 12
 _WHOLE = 0.05
 
 
 @dataclass(frozen=True)
 class SensorModel:
-    """What the sensors add: standard deviations and steps; usual ones if the sheet is silent."""
+    """Standard deviations and resolutions; typical ones where the sheet gives none."""
 
     current_noise: float = 0.01
     current_step: float = 0.01
@@ -44,7 +44,7 @@ class SensorModel:
 
     @classmethod
     def of(cls, given: sheets.Sensors | None) -> SensorModel:
-        """Take what the sheet says."""
+        """Take the values of the sheet."""
         if given is None:
             return cls()
         known = {'current_noise': given.current_noise_A, 'current_step': given.current_step_A,
@@ -61,7 +61,7 @@ class SensorModel:
         noise[:, :2] = math.hypot(self.current_noise, self.current_step / math.sqrt(12.0))
         noise[:, 2:4] = np.sqrt(self.tach_noise ** 2 + self.tach_step ** 2 / 12.0
                                 + (self.tach_relative * clean[:, 2:4]) ** 2)
-        noise[:, 4] = 0.5 * self.encoder_step  # what is left within a step is no white noise
+        noise[:, 4] = 0.5 * self.encoder_step  # within a digit the residual is not white
         noise[:, 5] = math.hypot(self.bias_noise, self.bias_step / math.sqrt(12.0))
         return np.asarray(np.sqrt(noise ** 2 + (slope * jitter) ** 2))
 
@@ -77,7 +77,7 @@ def jitter_of(command: CommandedRate, time: FloatArray, values: FloatArray) -> f
         return usual
     error = command(time) - values
     slope = (command(time + 1e-4) - command(time - 1e-4)) / 2e-4
-    # where the command jumps or bends nothing can be said
+    # jumps and corners of the command say nothing about time
     good = (np.abs(error) < 0.02 * np.ptp(values)) & (np.abs(slope) > 0.3 * np.abs(slope).max())
     if np.count_nonzero(good) < 50 or not np.any(slope[good]):
         return usual
@@ -101,7 +101,7 @@ def digit_of(values: FloatArray) -> float:
         return 0.0
     digit = float(change.min())
     for _ in range(3):
-        # the smallest change is rounded as any other: all of them together say it better
+        # all changes together say it better than the smallest, which is rounded, too
         count = np.round(change / digit)
         digit = float(change @ count / (count @ count))
     off = np.abs(change / digit - np.round(change / digit))

@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Which cycles per revolution a residual repeats with: where a fit of a wave has to begin."""
+"""The orders (cycles per revolution) of a residual, from which a fit of a wave starts."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ from antenna_drive.machines.antenna.waves import Wave
 import numpy as np
 from scipy.ndimage import median_filter
 
-# Within so much time the angle, summed up from the tachometer, does not drift [s].
+# Time within which the integral of a tachometer does not drift [s].
 _WINDOW_S = 1.5
-# So many orders about one say what is usual there.
+# Number of orders about one that say what is usual there.
 _NEIGHBOURS = 9
 
 
 def likely_orders(form: Wave, experiments: Sequence[Experiment],
                   residuals: Sequence[FloatArray], count: int) -> list[float]:
     """
-    Return the cycles per revolution that the residuals repeat with most.
+    Return the orders that stand out most in the residuals.
 
-    The first stands out from its neighbours, which a lack of another kind does not; the next
-    holds most of the energy; and so on in turn.
+    The first stands out most from its neighbours, which a misfit without a period does not do.
+    The second holds most of the energy. The others follow in turn.
 
     Parameters
     ----------
     form
-        of the wave: which angle it follows, and where it shows
+        of the wave: the angle it follows, and the channels it shows in
     experiments
         the tests
     residuals
@@ -56,7 +56,7 @@ def likely_orders(form: Wave, experiments: Sequence[Experiment],
         scores = _scores(form, experiment, residual, orders)
         usual = median_filter(scores, _NEIGHBOURS, mode='nearest') + 1e-9
         energy += scores
-        # a score is a sum of squares: by chance it differs from its neighbours' by its root
+        # a score is a sum of squares, whose scatter is its square root
         peak += np.maximum(scores - usual, 0.0) / np.sqrt(usual * max(1.0, float(usual.mean())))
     found: list[float] = []
     ranks = [list(np.argsort(by)[::-1]) for by in (peak, energy)]
@@ -71,7 +71,7 @@ def likely_orders(form: Wave, experiments: Sequence[Experiment],
 
 def _scores(form: Wave, experiment: Experiment, residual: FloatArray,
             orders: FloatArray) -> FloatArray:
-    """Return how much of a residual varies with each number of cycles per revolution."""
+    """Return the power of a residual at each order, shape (m,)."""
     clean = np.nan_to_num(residual / experiment.noise)
     time = experiment.time
     score = np.zeros(orders.size)

@@ -58,8 +58,8 @@ class ServoMachine(Machine):
     def __init__(self, logs: Sequence[ServoLog], values: Mapping[str, float],
                  free: Sequence[str], without: Iterable[str] = (),
                  noise: Sequence[float] | None = None, threads: int = 1) -> None:
-        """Prepare the experiments and the catalogue of what is absent."""
-        # within one thread a pool would only make runs wait for each other
+        """Prepare the experiments and the catalogue of absent effects."""
+        # a pool of one thread would only add waiting
         self._executor = ThreadPoolExecutor(threads) if threads > 1 else None
         self.logs = list(logs)
         self.values = dict(values)
@@ -74,7 +74,7 @@ class ServoMachine(Machine):
              if (forms := tuple(_absent(effect.forms, self.values)))])
 
     def _offset(self, name: str) -> Parameter:
-        """Return a number of the model as an offset from its value, of its logarithm if so."""
+        """Return a number of the model as an offset from its value or from its logarithm."""
         item, value = catalogue.number(name), self.values[name]
         if item.logarithmic:
             return Parameter(name, '1', math.log(item.low / value), math.log(item.high / value),

@@ -36,12 +36,12 @@ from antenna_drive.machines.servo.refit import Fit
 import numpy as np
 
 Progress = Callable[[float, str], None]
-# The effects of a model with the names of their forms, in the order in which they came.
+# The effects of a model with the names of their forms, in the order in which they were added.
 Structure = tuple[tuple[str, str], ...]
-# Each new number must lower the withheld error by such a share.
+# Share by which each new number must lower the withheld error.
 WORTH = 0.01
 ROUNDS = 7
-# What is tried out of the verdict's ranking, pairs among it, and of all single effects.
+# How many hypotheses of the ranking (pairs among them) and how many single effects are tried.
 TRIED_RANKED, TRIED_SINGLES = 2, 7
 ITERATIONS = 5
 
@@ -64,7 +64,7 @@ class Effort:
 
 @dataclass(frozen=True)
 class Fold:
-    """A part of the tests that is fitted, and the rest, on which the fit is judged."""
+    """The logs that are fitted, and the others, on which the fit is judged."""
 
     fitted: tuple[ServoLog, ...]
     withheld: tuple[ServoLog, ...]
@@ -213,14 +213,14 @@ def numbers(structure: Structure) -> tuple[str, ...]:
 
 def _judged(parts: Sequence[Fold], structure: Structure, start: Mapping[str, float],
             scale: Sequence[float]) -> float:
-    """Return the mean error of the folds on what they withheld [rad]."""
+    """Return the mean error of the folds on their withheld logs [rad]."""
     names = numbers(structure)
     return float(np.mean([servo_refit.error(
         part.withheld, settled(part.fitted, names, start, scale).values) for part in parts]))
 
 
 def _scale(tests: Sequence[ServoLog], fit: Fit) -> list[float]:
-    """Return the scale of what a fit leaves, in each channel a sensor's step at least."""
+    """Return the scale of the residual in each channel, at least a step of the sensor."""
     row = vector(fit.values)
     left = np.concatenate([test.measured - test.readings(row) for test in tests])
     steps = np.max([test.steps for test in tests], axis=0)
@@ -229,14 +229,14 @@ def _scale(tests: Sequence[ServoLog], fit: Fit) -> list[float]:
 
 
 def _singles(problem: LeastSquares) -> list[Hypothesis]:
-    """Return every single effect in its best form, after a few turns, the best first."""
+    """Return every single effect in its best form, after a few iterations, the best first."""
     state = problem.fit(problem.start(problem.machine.nuisances, {}), ITERATIONS)
     found = []
     for effect in problem.machine.effects.values():
         forms = []
         for form in effect.forms:
             values = [p.start for p in form.parameters]
-            # what its shape does shows once the effect is there: a little of it
+            # the derivatives are taken where every size is zero, and shapes are at their start
             point = {**state.point(), **{p.name: p.start if p.is_shape else 0.0
                                          for p in form.parameters}}
             columns = problem.jacobian(point, form.parameters, state.residual, central=False)
@@ -247,7 +247,7 @@ def _singles(problem: LeastSquares) -> list[Hypothesis]:
 
 
 def _likeliest(ranked: Sequence[Hypothesis], singles: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Return what is tried out: the likeliest of the verdict, and the best single effects."""
+    """Return the hypotheses to try: the likeliest ones, and the best single effects."""
     chosen = [c for c in ranked if c.effects][:TRIED_RANKED]
     known = {c.effects for c in chosen}
     return chosen + [c for c in singles if c.effects not in known][:TRIED_SINGLES]
