@@ -95,14 +95,16 @@ def run(arguments: argparse.Namespace) -> int:
 
 def variants(groups: tuple[str, ...]) -> Iterator[tuple[str, Settings]]:
     """Yield the settings with each threshold of these groups halved and doubled."""
-    for name, _, value in DEFAULT.entries():
+    for name, item, value in DEFAULT.entries():
         if name.partition('.')[0] in groups:
-            yield from _halved_and_doubled(name, value)
+            yield from _halved_and_doubled(name, value, item.metadata['unit'])
 
 
-def _halved_and_doubled(name: str, value: Any) -> Iterator[tuple[str, Settings]]:
+def _halved_and_doubled(name: str, value: Any, unit: str) -> Iterator[tuple[str, Settings]]:
     for word, factor in FACTORS.items():
         changed = max(1, round(factor * value)) if isinstance(value, int) else factor * value
+        if unit == 'probability':
+            changed = min(changed, 1.0)
         if changed != value:
             yield f'{name} {word}, {changed:g}', DEFAULT.changed(name, changed)
 
@@ -143,13 +145,13 @@ def _run_again(arguments: argparse.Namespace) -> dict[str, Mapping[str, float]]:
     folder: Path = arguments.trial
     manifest = sealing.read_manifest(folder)
     names = list(manifest['seals'])[:arguments.cases]
-    values = {name: value for name, _, value in DEFAULT.entries()}
+    known = {name: (value, item.metadata['unit']) for name, item, value in DEFAULT.entries()}
     wanted: dict[str, list[str]] = {'as they are': []}
     for name in arguments.again:
-        if name not in values:
+        if name not in known:
             raise UserError(f'--again: {name}: no such threshold; antenna-drive thresholds lists '
                             'them')
-        for label, _ in _halved_and_doubled(name, values[name]):
+        for label, _ in _halved_and_doubled(name, *known[name]):
             wanted[label] = ['--threshold', f'{name}={label.rpartition(" ")[2]}']
     jobs = [(_linked(folder, label, case), options)
             for label, options in wanted.items() for case in names]

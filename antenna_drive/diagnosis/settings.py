@@ -176,12 +176,13 @@ class VerdictSettings:
     noise_only: float = _setting(
         0.3, '1', 'slow excess below which an effect cannot have failed', PRACTICE)
     noise_only_slope: float = _setting(4.0, '1', 'how sharply', PRACTICE)
-    least_unknown: float = _setting(0.05, '1', 'least probability of unknown', TRIAL_0)
-    most_unknown: float = _setting(0.88, '1', 'greatest probability of unknown', TRIAL_0)
+    least_unknown: float = _setting(0.05, 'probability', 'least probability of unknown', TRIAL_0)
+    most_unknown: float = _setting(0.88, 'probability', 'greatest probability of unknown', TRIAL_0)
     partly: float = _setting(
-        0.3, '1', "probability of unknown from which the verdict is 'partly explained'")
+        0.3, 'probability', "probability of unknown from which the verdict is 'partly explained'")
     entries: int = _setting(12, '1', "greatest number of answers beside 'none' and 'unknown'")
-    least_probability: float = _setting(1e-4, '1', 'probability below which an answer is left out')
+    least_probability: float = _setting(
+        1e-4, 'probability', 'probability below which an answer is left out')
 
 
 @dataclass(frozen=True)
