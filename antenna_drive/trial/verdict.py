@@ -203,4 +203,7 @@ def _interval(content: Any) -> Interval | None:
 def _number_or_nan(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return math.nan
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError:       # a whole number of JSON has no limit
+        return math.nan

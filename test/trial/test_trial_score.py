@@ -34,9 +34,16 @@ from antenna_drive.trial.scorecard import (
 from antenna_drive.trial.sheet import CaseSheet
 from antenna_drive.trial.sizes import size_of
 from antenna_drive.trial.verdict import parse_verdict, Verdict, VerdictError
+from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 
+PLAIN = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.sampled_from(
+        ['before.csv', '../x.csv', '1', '', 10**400]),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(
+        st.sampled_from(['before', 'after', 'gearbox_1.gap.change', 'value', 'ci95', 'unit']),
+        inner, max_size=4), max_leaves=10)
 KEYS = ('cases, failures, top1, top3, within_set, pairs_both, no_gap_on_none, auroc_unknown, '
         'overconfident_outside, ece, explained_fraction_median, seconds_median').split(', ')
 
@@ -194,6 +201,21 @@ def test_verdict_without_an_interval_still_counts(parameters: Any) -> None:
     again = Case(made.truth, parse_verdict(content))
     assert again.right
     assert again.sizes == []
+
+
+@given(PLAIN, PLAIN)
+def test_whatever_a_verdict_adds_is_taken_or_refused_by_name(parameters: Any, names: Any) -> None:
+    content = verdict(('gearbox_1.gap', 1.0))
+    content['which'][0]['parameters'] = parameters
+    content['held_back'] = names
+    made = sized('gearbox_1.gap', {'factor': 1.5}, 'change', '1', (0.5, 0.4, 0.6))
+    try:
+        found = parse_verdict(content)
+    except VerdictError as error:
+        assert str(error).startswith('held_back')
+    else:
+        assert all(math.isfinite(size.relative_error) for size in Case(made.truth, found).sizes)
+        assert all('/' not in name for name in found.held_back.values())
 
 
 def test_every_comparable_size_is_a_parameter_of_the_catalogue() -> None:
