@@ -41,7 +41,10 @@ TARGETS = {
     'cases': '', 'failures': '0', 'pending': '0', 'top1': '>= 0.90', 'top3': '>= 0.97',
     'within_set': '', 'pairs_both': '>= 0.75', 'no_gap_on_none': '>= 0.97',
     'auroc_unknown': '>= 0.95', 'overconfident_outside': '<= 0.05', 'ece': '<= 0.05',
-    'explained_fraction_median': '>= 0.95', 'seconds_median': '<= 30'}
+    'explained_fraction_median': '>= 0.95', 'seconds_median': '<= 30',
+    'detection_rate': '', 'false_alarm_rate': '', 'true_probability_mean': '',
+    'sizes_compared': '', 'size_error_median': '', 'size_coverage': '>= 0.90',
+    'closed_held_back_median': '>= 0.90'}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -78,6 +81,10 @@ def _lines(figures: dict[str, Any]) -> list[str]:
         if low_high and math.isfinite(low_high[0]):
             text += f'  [{_decimal(low_high[0])}, {_decimal(low_high[1])}]'
         lines.append(f'{name:<26} {text:<28} {"target " + target if target else ""}'.rstrip())
+    healthy = figures['site']['healthy']
+    lines += ['', f'at a site where {healthy:.0%} of the machines are healthy']
+    lines += [f'{name:<26} {_decimal(value)}' for name, value in figures['site'].items()
+              if name != 'healthy']
     for title, groups in (('kind', figures['by_kind']), ('size', figures['by_size']),
                           ('effect', figures['by_effect'])):
         lines += ['', f'{"by " + title:<36} cases  failures  top1   top3']

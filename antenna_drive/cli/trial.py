@@ -29,8 +29,14 @@ that no truth was changed. With --diagnose each case is diagnosed too, and the v
 to DIR/case_0001/verdict.json; `antenna-drive score DIR` scores the verdicts. The same command
 resumes an interrupted trial.
 
+With --wild, each case also has the imperfections of a real machine and recorder, which no sheet
+lists, and other programmes, lengths, rates and sheets. A fourth recording is kept from the
+diagnosis, in DIR/kept/case_0001/rec_d.csv. docs/trial.md has the sizes. --family b draws other
+forms, outsiders and programmes, to report on only.
+
 For example:
   antenna-drive trial --cases 200 --seed 7 --out trial7 --diagnose && antenna-drive score trial7
+  antenna-drive trial --wild --cases 20 --seed 7 --out wild7 --diagnose
 """
 
 from __future__ import annotations
@@ -43,8 +49,10 @@ import shlex
 from antenna_drive.cli.output import Progress
 from antenna_drive.errors import UserError
 from antenna_drive.trial import batch, sealing
+from antenna_drive.trial.family import FAMILIES
 
 RATES_HZ = (50.0, 500.0)
+USUAL_RATE_HZ = 200.0
 LARGEST_TOLERANCE = 0.05
 
 
@@ -60,9 +68,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--tolerance', type=float, default=0.02, metavar='T',
                         help='largest relative deviation of each parameter from the reference, '
                              f'0 to {LARGEST_TOLERANCE} (default %(default)s)')
-    parser.add_argument('--sample-rate', type=float, default=200.0, metavar='HZ',
+    parser.add_argument('--sample-rate', type=float, metavar='HZ',
                         help='mean sample rate of the recordings, 50 to 500 '
-                             '(default %(default)s)')
+                             f'(default {USUAL_RATE_HZ:g}; a wild case draws its own)')
+    parser.add_argument('--wild', action='store_true',
+                        help='draw imperfections that no sheet lists, and other programmes')
+    parser.add_argument('--family', choices=sorted(FAMILIES), default='a',
+                        help='forms of effects, outsiders and programmes; nothing may be tuned '
+                             'on b, which needs --wild (default %(default)s)')
     parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
                         help='parallel processes (default: one per core, %(default)s here)')
     parser.add_argument('--diagnose', action='store_true',
@@ -80,7 +93,8 @@ def run(arguments: argparse.Namespace) -> int:
     _check(arguments)
     folder = arguments.out
     manifest = batch.prepare(folder, arguments.cases, arguments.seed, arguments.tolerance,
-                             arguments.sample_rate, batch.DURATION_S)
+                             arguments.sample_rate or USUAL_RATE_HZ, batch.DURATION_S,
+                             wild=arguments.wild, family=arguments.family)
     print(f'{folder}: {arguments.cases} truths sealed, manifest '
           f'{sealing.manifest_seal(manifest)}', flush=True)
     with Progress('recordings', arguments.cases, quiet=arguments.quiet) as progress:
@@ -110,8 +124,12 @@ def _check(arguments: argparse.Namespace) -> None:
     if not 0.0 <= arguments.tolerance <= LARGEST_TOLERANCE:
         raise UserError(f'--tolerance: {arguments.tolerance} given, allowed is 0 to '
                         f'{LARGEST_TOLERANCE}')
+    if arguments.family != 'a' and not arguments.wild:
+        raise UserError(f'--family {arguments.family}: its cases are wild; give --wild as well')
+    if arguments.wild and arguments.sample_rate is not None:
+        raise UserError('--sample-rate: a wild case draws its own; leave it out, or --wild')
     low, high = RATES_HZ
-    if not low <= arguments.sample_rate <= high:
+    if arguments.sample_rate is not None and not low <= arguments.sample_rate <= high:
         raise UserError(f'--sample-rate: {arguments.sample_rate} given, allowed is {low:g} to '
                         f'{high:g} Hz')
     if not arguments.time_limit > 0.0:

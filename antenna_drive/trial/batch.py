@@ -20,7 +20,7 @@ it, and a verdict only once the diagnosis has succeeded.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed, Future, ProcessPoolExecutor, ThreadPoolExecutor
 import importlib.util
 import json
@@ -39,10 +39,12 @@ from antenna_drive.trial.cases import draw_truths, make_recording, Truth
 from antenna_drive.trial.programme import RECORDINGS
 from antenna_drive.trial.real_antenna import FloatArray
 from antenna_drive.trial.sensors import COLUMNS
+from antenna_drive.trial.wild_programme import KEPT_BACK
 import yaml
 
 VERDICT = 'verdict.json'
 FAILURE = 'failure.txt'
+KEPT = 'kept'               # folder of the recordings that no diagnosis gets
 DURATION_S = 30.0
 # Formats that keep every digit of the sensors.
 FORMATS = {'time_s': '%.6f', 'rate_command_rad_s': '%.12g', 'encoder_rad': '%.12g'}
@@ -51,7 +53,7 @@ Done = Callable[[int, int], None]
 
 
 def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: float,
-            duration: float) -> dict[str, Any]:
+            duration: float, *, wild: bool = False, family: str = 'a') -> dict[str, Any]:
     """
     Draw and seal the truths of a trial, unless they are sealed already.
 
@@ -59,7 +61,7 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
     ----------
     folder
         of the trial
-    count, seed, tolerance, sample_rate, duration
+    count, seed, tolerance, sample_rate, duration, wild, family
         as in `cases.draw_truths`
 
     Returns
@@ -71,18 +73,23 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
     UserError : the folder holds a trial with other settings
 
     """
-    settings = {'cases': count, 'seed': seed, 'tolerance': tolerance,
-                'sample_rate_hz': sample_rate, 'duration_s': duration}
+    settings: dict[str, Any] = {'cases': count, 'seed': seed, 'tolerance': tolerance}
+    if wild:
+        settings |= {'wild': True, 'family': family}
+    else:
+        settings |= {'sample_rate_hz': sample_rate, 'duration_s': duration}
     if (folder / sealing.MANIFEST).exists():
         manifest = sealing.read_manifest(folder)
         if manifest['settings'] != settings:
-            old = manifest['settings']
+            old: dict[str, Any] = manifest['settings']
             differing = [f'{key} {old.get(key)}, not {value}'
-                         for key, value in settings.items() if old.get(key) != value]
+                         for key, value in {**dict.fromkeys(old), **settings}.items()
+                         if old.get(key) != value]
             raise UserError(f'{folder}: holds a trial with {"; ".join(differing)}; '
                             'give the same settings to resume it, or another --out')
         return manifest
-    truths = draw_truths(count, seed, tolerance, sample_rate=sample_rate, duration=duration)
+    truths = draw_truths(count, seed, tolerance, sample_rate=sample_rate, duration=duration,
+                         wild=wild, family=family)
     return sealing.seal(folder, settings, truths)
 
 
@@ -96,7 +103,7 @@ def write_csv(path: Path, columns: dict[str, FloatArray]) -> None:
 
 def make_case(folder: Path, truth: Truth) -> None:
     """
-    Write the recordings of one case and their test sheets.
+    Write the recordings of one case and their test sheets; of a wild case, keep one back.
 
     Parameters
     ----------
@@ -106,16 +113,25 @@ def make_case(folder: Path, truth: Truth) -> None:
         of the case
 
     """
-    final = folder / truth['case']
-    draft = folder / f'.{truth["case"]}.{os.getpid()}'
+    if len(truth['sheets']) > len(RECORDINGS):
+        (folder / KEPT).mkdir(exist_ok=True)
+        _make_folder(folder / KEPT / truth['case'], truth, {len(RECORDINGS): KEPT_BACK})
+    _make_folder(folder / truth['case'], truth, dict(enumerate(RECORDINGS)))
+
+
+def _make_folder(final: Path, truth: Truth, names: Mapping[int, str]) -> None:
+    """Write recordings of a case, by number and name, and their sheets; all or none."""
+    draft = final.with_name(f'.{final.name}.{os.getpid()}')
     shutil.rmtree(draft, ignore_errors=True)
     draft.mkdir()
     try:
-        for number, name in enumerate(RECORDINGS):
+        for number, name in names.items():
             write_csv(draft / f'{name}.csv', make_recording(truth, number))
-            sheet = yaml.safe_dump(truth['sheets'][number], sort_keys=False,
-                                   default_flow_style=None)
-            (draft / f'{name}.yaml').write_text(sheet, encoding='utf-8')
+            given = (truth.get('given_sheets') or truth['sheets'])[number]
+            if given is not None:
+                sheet = yaml.safe_dump(given, sort_keys=False, default_flow_style=None)
+                (draft / f'{name}.yaml').write_text(sheet, encoding='utf-8')
+        shutil.rmtree(final, ignore_errors=True)
         os.replace(draft, final)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
@@ -164,7 +180,7 @@ def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
 
 def _remove_drafts(folder: Path) -> None:
     """Remove incomplete cases of an interrupted run."""
-    for draft in folder.glob('.case_*'):
+    for draft in (*folder.glob('.case_*'), *(folder / KEPT).glob('.case_*')):
         shutil.rmtree(draft, ignore_errors=True)
 
 

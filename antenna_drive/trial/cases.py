@@ -25,15 +25,18 @@ import dataclasses
 from typing import Any
 
 from antenna_drive.trial.effect import Defect
-from antenna_drive.trial.effects import CATALOGUE
+from antenna_drive.trial.family import FAMILIES
+from antenna_drive.trial.imperfections import (
+    apply_imperfections, draw_imperfections, imperfect_recording, spread_events,
+)
 from antenna_drive.trial.machine import (
     apply_tolerances, draw_tolerances, Records, reference_machine,
 )
-from antenna_drive.trial.outside import OUTSIDE
 from antenna_drive.trial.programme import draw_sheets
 from antenna_drive.trial.real_antenna import FloatArray, simulate
 from antenna_drive.trial.sensors import record, sample_instants
 from antenna_drive.trial.sheet import CaseSheet, SensorGrade
+from antenna_drive.trial.wild_programme import draw_programme
 import numpy as np
 
 MIX = {'single': 0.55, 'pair': 0.15, 'none': 0.15, 'outside': 0.15}
@@ -47,7 +50,7 @@ def case_name(number: int) -> str:
 
 
 def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float = 200.0,
-                duration: float = 30.0) -> list[Truth]:
+                duration: float = 30.0, wild: bool = False, family: str = 'a') -> list[Truth]:
     """
     Draw all cases of a trial.
 
@@ -66,14 +69,19 @@ def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float =
         of the recordings [Hz]
     duration
         of each recording [s]
+    wild
+        draw imperfections and programmes too, instead of `sample_rate` and `duration`
+    family
+        of forms, one of FAMILIES; 'b' is for wild cases alone
 
     """
+    forms = FAMILIES[family]
     random = np.random.default_rng([seed, 0])
     kinds = random.permutation(_kinds(count))
-    singles = _turns(list(CATALOGUE.values()), random)
-    firsts, seconds = _turns(list(CATALOGUE.values()), random), _turns(
-        list(CATALOGUE.values()), random)
-    outsiders = _turns(list(OUTSIDE.values()), random)
+    catalogue = list(forms.catalogue.values())
+    singles = _turns(catalogue, random)
+    firsts, seconds = _turns(catalogue, random), _turns(catalogue, random)
+    outsiders = _turns(list(forms.outside.values()), random)
     sizes = {kind: iter(_even_sizes(int(np.sum(kinds == kind)), random)) for kind in MIX}
     truths = []
     for number, kind in enumerate(kinds, start=1):
@@ -94,9 +102,22 @@ def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float =
             'effects': [{'id': effect.key, 'size': size, 'parameters': effect.draw(size, own)}
                         for effect, size in effects],
             'tolerance': tolerance, 'seed': [seed, number],
-            'sample_rate_hz': sample_rate, 'duration_s': duration,
-            'sheets': [sheet.plain() for sheet in draw_sheets(tolerance, duration, own)]})
+            **(_wild_tests(family, tolerance, own) if wild
+               else _tests(sample_rate, duration, tolerance, own))})
     return truths
+
+
+def _tests(sample_rate: float, duration: float, tolerance: float,
+           random: np.random.Generator) -> dict[str, Any]:
+    return {'sample_rate_hz': sample_rate, 'duration_s': duration,
+            'sheets': [sheet.plain() for sheet in draw_sheets(tolerance, duration, random)]}
+
+
+def _wild_tests(family: str, tolerance: float, random: np.random.Generator) -> dict[str, Any]:
+    tests = draw_programme(FAMILIES[family].shapes, tolerance, random)
+    return {'family': family, 'sample_rate_hz': tests.sample_rate_hz,
+            'durations_s': tests.durations_s, 'sheets': [s.plain() for s in tests.sheets],
+            'given_sheets': tests.given, 'imperfections': draw_imperfections(random)}
 
 
 def _kinds(count: int) -> list[str]:
@@ -145,12 +166,16 @@ def build_machine(truth: Truth, recording: int) -> Records:
                                 sheet['bias'].get('bias_pot', 0.7))
     random = np.random.default_rng([*truth['seed'], 1])
     apply_tolerances(machine, draw_tolerances(truth['tolerance'], random))
+    if 'imperfections' in truth:
+        apply_imperfections(machine, truth['imperfections'])
     for entry in truth['effects']:
-        effect = CATALOGUE.get(entry['id']) or OUTSIDE[entry['id']]
+        effect = FAMILIES[truth.get('family', 'a')].defect(entry['id'])
         values = dict(entry['parameters'])
         if 'seed' in values:
             values['seed'] += 1000000 * recording
         effect.change(machine, values)
+    if 'durations_s' in truth:
+        spread_events(machine, truth['durations_s'][recording])
     return machine
 
 
@@ -185,6 +210,10 @@ def make_recording(truth: Truth, recording: int) -> dict[str, FloatArray]:
     """
     random = np.random.default_rng([*truth['seed'], 2 + recording])
     machine, sheet = build_machine(truth, recording), sheet_of(truth, recording)
+    if 'imperfections' in truth:
+        return imperfect_recording(machine, sheet, truth['imperfections'],
+                                   truth['sample_rate_hz'], truth['durations_s'][recording],
+                                   random)
     instants, stamps = sample_instants(truth['sample_rate_hz'], truth['duration_s'], random)
     place = (float(random.uniform(-1.0, 1.0)), float(random.uniform(-1.0, 1.0)))
     history = simulate(machine, sheet, instants, place)

@@ -28,9 +28,8 @@ import copy
 import math
 
 from antenna_drive.trial.cases import build_machine, draw_truths, sheet_of, Truth
-from antenna_drive.trial.effects import CATALOGUE
+from antenna_drive.trial.family import FAMILIES
 from antenna_drive.trial.machine import apply_tolerances, draw_tolerances, Records, Tolerances
-from antenna_drive.trial.outside import OUTSIDE
 from antenna_drive.trial.real_antenna import FloatArray, simulate
 from antenna_drive.trial.sensors import record
 from antenna_drive.trial.sheet import SensorGrade
@@ -53,7 +52,8 @@ class Study:
     """The standard programme on the reference antenna, and its derivatives by tolerances."""
 
     def __init__(self, tolerance: float = 0.02, seed: int = 1,
-                 report: Callable[[float], None] = lambda part: None) -> None:
+                 report: Callable[[float], None] = lambda part: None,
+                 family: str = 'a') -> None:
         """
         Simulate the derivatives by every tolerance, initial position and offset.
 
@@ -65,10 +65,12 @@ class Study:
             of the programme
         report
             called with the share that is done, 0 to 1
+        family
+            of forms, one of FAMILIES
 
         """
         truth = next(t for t in draw_truths(40, seed, tolerance) if t['kind'] == 'none')
-        self._truth: Truth = {**truth, 'tolerance': 0.0}
+        self._truth: Truth = {**truth, 'tolerance': 0.0, 'family': family}
         self._times = np.arange(int(RATE_HZ * DURATION_S) + 1) / RATE_HZ
         neutral = draw_tolerances(0.0, np.random.default_rng(0))
         self._base = self._signals(neutral, (0.3, -0.2), None)
@@ -168,11 +170,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--tolerance', type=float, default=0.02)
     parser.add_argument('--only', default='', help='part of the ids to print')
+    parser.add_argument('--family', choices=sorted(FAMILIES), default='a')
     arguments = parser.parse_args()
-    study = Study(arguments.tolerance)
+    study = Study(arguments.tolerance, family=arguments.family)
+    forms = FAMILIES[arguments.family]
     print('| effect | range of the size | beyond tolerances: smallest, middle, largest |')
     print('|---|---|---|')
-    for effect in (*CATALOGUE.values(), *OUTSIDE.values()):
+    for effect in (*forms.catalogue.values(), *forms.outside.values()):
         if arguments.only not in effect.key:
             continue
         size = effect.quantities[0]

@@ -28,7 +28,9 @@ import math
 from antenna_drive.trial.effect import Defect, Parameters, PHASE, Quantity
 from antenna_drive.trial.machine import GUST_WAVES, Records
 import numpy as np
+from numpy.typing import NDArray
 
+FloatArray = NDArray[np.float64]
 MOTORS = {'motor_1': slice(0, 1), 'motor_2': slice(1, 2), 'motors': slice(0, 2)}
 Change = Callable[[Records, Parameters], None]
 
@@ -140,18 +142,34 @@ _TORQUE_SHARE = (
 )
 
 
-def _gust(machine: Records, values: Parameters) -> None:
-    # Davenport's spectrum of wind speed, S ~ x^2 / (f (1 + x^2)^(4/3)), as a sum of sines.
-    frequency = np.geomspace(0.02, 3.0, GUST_WAVES)
-    x = frequency / values['corner']
-    power = x**2 / (1.0 + x**2)**(4.0 / 3.0)    # per unit of ln f: the waves are even in ln f
-    amplitude = np.sqrt(power)
+def gust_of(machine: Records, values: Parameters,
+            spectrum: Callable[[FloatArray], FloatArray]) -> None:
+    """
+    Set a gust as a sum of sines.
+
+    Parameters
+    ----------
+    machine
+        whose gust is set
+    values
+        rms [N m], corner [Hz] and seed
+    spectrum
+        power per unit of ln f, from frequency over corner
+
+    """
+    frequency = np.geomspace(0.02, 3.0, GUST_WAVES)     # even in ln f
+    amplitude = np.sqrt(spectrum(frequency / values['corner']))
     amplitude *= values['rms'] / math.sqrt(0.5 * float(np.sum(amplitude**2)))
     random = np.random.default_rng(int(values['seed']))
     structure = machine.structure[0]
     structure['gust'] = amplitude
     structure['gust_frequency'] = 2.0 * math.pi * frequency
     structure['gust_phase'] = random.uniform(0.0, 2.0 * math.pi, GUST_WAVES)
+
+
+def _gust(machine: Records, values: Parameters) -> None:
+    # Davenport's spectrum of wind speed, S ~ x^2 / (f (1 + x^2)^(4/3)).
+    gust_of(machine, values, lambda x: x**2 / (1.0 + x**2)**(4.0 / 3.0))
 
 
 def _one_mode(machine: Records, values: Parameters) -> None:

@@ -25,7 +25,7 @@ import math
 from typing import Any
 
 from antenna_drive.trial.compiled import compiled, inner
-from antenna_drive.trial.machine import DROPOUTS, GUST_WAVES, Records
+from antenna_drive.trial.machine import DROPOUTS, GUST_WAVES, LAW_B, Records
 from antenna_drive.trial.waveform import command
 import numpy as np
 from numpy.typing import NDArray
@@ -65,12 +65,19 @@ def gear_deflection(motor: Any, structure: Any, theta: float, w: float, theta_a:
     x = theta - ratio * theta_a
     x_rate = w - ratio * w_a
     if motor.mesh_error != 0.0:
-        # A rounded saw-tooth: sum of q^(n-1) sin(n a) / n with q = 1/2.
         angle = motor.mesh_cycles * theta + motor.mesh_phase
-        sine, cosine = 0.5 * math.sin(angle), 1.0 - 0.5 * math.cos(angle)
-        x -= motor.mesh_error * 2.0 * math.atan2(sine, cosine)
-        slope = (0.5 * math.cos(angle) * cosine - sine * sine) / (sine**2 + cosine**2)
-        x_rate -= motor.mesh_error * 2.0 * slope * motor.mesh_cycles * w
+        if motor.law == LAW_B:
+            # Eccentricity and ovality: two harmonics.
+            shape = math.sin(angle) + 0.3 * math.sin(2.0 * angle + 1.0)
+            slope = math.cos(angle) + 0.6 * math.cos(2.0 * angle + 1.0)
+        else:
+            # A rounded saw-tooth: sum of q^(n-1) sin(n a) / n with q = 1/2.
+            sine, cosine = 0.5 * math.sin(angle), 1.0 - 0.5 * math.cos(angle)
+            shape = 2.0 * math.atan2(sine, cosine)
+            slope = 2.0 * ((0.5 * math.cos(angle) * cosine - sine * sine)
+                           / (sine**2 + cosine**2))
+        x -= motor.mesh_error * shape
+        x_rate -= motor.mesh_error * slope * motor.mesh_cycles * w
     if motor.tooth_height != 0.0:
         # One raised tooth in each revolution of a slower shaft: a narrow von Mises bump.
         angle = theta / motor.tooth_ratio + motor.tooth_phase
@@ -79,8 +86,11 @@ def gear_deflection(motor: Any, structure: Any, theta: float, w: float, theta_a:
         x_rate += bump * 40.0 * math.sin(angle) * w / motor.tooth_ratio
     half_gap = motor.half_gap
     if structure.bull_gap != 0.0:
-        # Wear varies along the bull gear by a fifth, in twenty cycles per turn.
-        half_gap += structure.bull_gap * (1.0 + 0.2 * math.cos(20.0 * theta_a))
+        # Wear varies along the bull gear: by a fifth in twenty cycles, or by two fifths in one.
+        if structure.law == LAW_B:
+            half_gap += structure.bull_gap * (1.0 + 0.4 * math.sin(theta_a))
+        else:
+            half_gap += structure.bull_gap * (1.0 + 0.2 * math.cos(20.0 * theta_a))
     return x, x_rate, half_gap
 
 
@@ -93,27 +103,57 @@ def contact_torque(motor: Any, depth: float, depth_rate: float, lag: float) -> f
 
 
 @compiled
-def viscous_torque(coefficient: float, rate: float, knee: float) -> float:
-    """Return the drag of a lubricant that thins under shear [N m]."""
+def viscous_torque(coefficient: float, rate: float, knee: float, law: float) -> float:
+    """Return the drag of a lubricant that thins under shear, for B as Eyring's fluid [N m]."""
+    if law == LAW_B:
+        return coefficient * 5.0 * knee * math.asinh(rate / (5.0 * knee))
     return coefficient * rate * (1.0 + (rate / knee)**2)**-0.075
 
 
 @compiled
-def stribeck_torque(rise: float, rate: float, half_rate: float) -> float:
-    """Return the friction above Coulomb's at low rate, a hyperbola of the rate [N m]."""
+def stribeck_torque(rise: float, rate: float, half_rate: float, law: float) -> float:
+    """
+    Return the friction above Coulomb's at low rate [N m].
+
+    A hyperbola of the rate; for B the curve of Hess and Soom, J. Tribology 112 (1990) 147.
+    """
+    if law == LAW_B:
+        return rise / (1.0 + (rate / half_rate)**2)
     return rise / (1.0 + abs(rate) / half_rate)
+
+
+@compiled
+def ripple_shape(angle: float, law: float) -> float:
+    """Return the shape of a torque ripple over its angle, about -1 to 1."""
+    if law == LAW_B:
+        return math.tanh(2.0 * math.sin(angle)) / math.tanh(2.0)
+    return (math.sin(angle) + 0.3 * math.sin(2.0 * angle + 1.0)) / 1.044
+
+
+@compiled
+def crossover(demand: float, half_width: float, law: float) -> float:
+    """Return a demand behind a smooth dead zone [A]."""
+    if law == LAW_B:
+        return demand - half_width * demand / math.sqrt(demand**2 + half_width**2)
+    return demand - half_width * math.tanh(demand / half_width)
 
 
 @compiled
 def motor_friction(motor: Any, rate: float, direction: float, gear: float,
                    middle: float) -> tuple[float, float]:
     """Return the size of kinetic friction and the stiction of a motor in one direction [N m]."""
-    level = motor.coulomb * (1.0 + motor.asymmetry * direction)
+    if motor.law == LAW_B:
+        level = motor.coulomb * math.exp(motor.asymmetry * direction)
+    else:
+        level = motor.coulomb * (1.0 + motor.asymmetry * direction)
     if motor.load_friction != 0.0:
-        level += motor.load_friction * (math.sqrt(gear * gear + 0.25) - 0.5)
+        if motor.law == LAW_B:
+            level += motor.load_friction * gear * gear / (abs(gear) + 1.0)
+        else:
+            level += motor.load_friction * (math.sqrt(gear * gear + 0.25) - 0.5)
     if motor.brake_start < middle < motor.brake_end:
         level += motor.brake
-    kinetic = level + stribeck_torque(motor.stribeck, rate, motor.stribeck_rate)
+    kinetic = level + stribeck_torque(motor.stribeck, rate, motor.stribeck_rate, motor.law)
     return kinetic, motor.stiction_ratio * level + motor.stribeck
 
 
@@ -123,10 +163,19 @@ def axis_friction(structure: Any, angle: float, rate: float, t: float) -> tuple[
     level = structure.coulomb * (1.0 - structure.dahl)
     if structure.bump != 0.0:
         phase = 2.0 * math.pi * angle / structure.bump_pitch + structure.bump_phase
-        level *= 1.0 + structure.bump * (2.0 * math.exp(2.0 * (math.cos(phase) - 1.0)) - 0.617)
+        if structure.law == LAW_B:
+            # Plates of the rail that rub more and less in turn.
+            level *= 1.0 + structure.bump * math.tanh(3.0 * math.sin(phase)) / math.tanh(3.0)
+        else:
+            level *= 1.0 + structure.bump * (
+                2.0 * math.exp(2.0 * (math.cos(phase) - 1.0)) - 0.617)
+    if structure.hard_spot != 0.0:
+        off = (angle - structure.hard_spot_at) / structure.hard_spot_width
+        level *= 1.0 + structure.hard_spot / (1.0 + off**4)
     if structure.warming != 0.0:
         level *= 1.0 - structure.warming * (1.0 - math.exp(-t / structure.warming_time))
-    kinetic = level + stribeck_torque(structure.stribeck, rate, structure.stribeck_rate)
+    kinetic = level + stribeck_torque(structure.stribeck, rate, structure.stribeck_rate,
+                                      structure.law)
     return kinetic, structure.stiction_ratio * level + structure.stribeck
 
 
@@ -137,6 +186,8 @@ def load_torque(structure: Any, angle: float, t: float, middle: float,
     torque = structure.wind
     if structure.gravity != 0.0:
         torque -= structure.gravity * math.cos(elevation + angle)
+    if structure.cable != 0.0:
+        torque -= structure.cable * angle
     if 0.0 <= structure.ballast_at < middle:
         torque += structure.ballast
     if structure.gust_frequency[0] > 0.0:
@@ -153,11 +204,20 @@ def tach_reading(motor: Any, y: FloatArray, at: int, t: float, middle: float) ->
     reading = (1.0 + motor.tach_error) * rate + motor.tach_offset
     if motor.tach_ripple != 0.0:
         angle = motor.tach_cycles * y[at + THETA] + motor.tach_phase
-        # Commutation: the rounded tops of a rectified wave, without its mean.
-        reading += motor.tach_ripple * rate * 2.0 * (
-            math.sqrt(math.sin(0.5 * angle)**2 + 0.01) - 0.6499)
+        if motor.law == LAW_B:
+            # An eccentric coupling: two harmonics.
+            reading += motor.tach_ripple * rate * (
+                math.sin(angle) + 0.5 * math.sin(2.0 * angle + 0.8))
+        else:
+            # Commutation: the rounded tops of a rectified wave, without its mean.
+            reading += motor.tach_ripple * rate * 2.0 * (
+                math.sqrt(math.sin(0.5 * angle)**2 + 0.01) - 0.6499)
     if motor.hum != 0.0:
         reading += motor.hum * math.sin(MAINS * t)
+    if motor.tach_dead_band > 0.0:
+        reading -= motor.tach_dead_band * math.tanh(reading / motor.tach_dead_band)
+    if motor.tach_saturation > 0.0:
+        reading = motor.tach_saturation * math.tanh(reading / motor.tach_saturation)
     if motor.dropout_length > 0.0:
         for k in range(DROPOUTS):
             if motor.dropout[k] >= 0.0 and (
@@ -179,6 +239,16 @@ def delayed(y: FloatArray, dy: FloatArray, at: int, value: float, delay: float) 
 
 
 @compiled
+def lagged(y: FloatArray, dy: FloatArray, at: int, value: float, delay: float) -> float:
+    """Return a value after four equal lags that add up to a delay; their states start at `at`."""
+    s = 4.0 / delay
+    dy[at] = s * (value - y[at])
+    for k in range(1, 4):
+        dy[at + k] = s * (y[at + k - 1] - y[at + k])
+    return y[at + 3]
+
+
+@compiled
 def bias_voltage(circuit: Any, test: Any, x_2: float, middle: float, switch: int) -> float:
     """Return v_b of Eq. (9), or the voltage of the source that replaces the circuit [V]."""
     if test.bias_source > 0.0:
@@ -195,10 +265,16 @@ def gear_derivative(motor: Any, structure: Any, y: FloatArray, dy: FloatArray, a
     x, x_rate, gap = gear_deflection(motor, structure, y[at + THETA], y[at + W], y[THETA_A],
                                      y[W_A])
     lag = y[at + LAG_Z]
+    if motor.mesh_stiffness != 0.0:
+        wave = math.sin(motor.mesh_stiffness_cycles * y[at + THETA])
+        # Stiffness and damping of the teeth vary together.
+        share = 1.0 + motor.mesh_stiffness * wave
+    else:
+        share = 1.0
     up = contact_torque(motor, x - gap, x_rate, lag)
     down = contact_torque(motor, -x - gap, -x_rate, -lag)
     touch = mode[CONTACT + which]
-    gear = up if touch > 0 else (-down if touch < 0 else 0.0)
+    gear = share * (up if touch > 0 else (-down if touch < 0 else 0.0))
     upper, lower = min(x - gap, up), min(-x - gap, down)
     if touch == 0:
         margin[CONTACT + which] = -max(upper, lower)
@@ -206,7 +282,11 @@ def gear_derivative(motor: Any, structure: Any, y: FloatArray, dy: FloatArray, a
         margin[CONTACT + which] = upper if touch > 0 else lower
     dy[at + LAG_Z] = 0.0
     if motor.hysteresis != 0.0:
-        dy[at + LAG_Z] = (x_rate - abs(x_rate) * lag) / 0.03
+        if motor.law == LAW_B:
+            # Bouc and Wen's with exponent 2.
+            dy[at + LAG_Z] = (x_rate - abs(x_rate) * lag * abs(lag)) / 0.07
+        else:
+            dy[at + LAG_Z] = (x_rate - abs(x_rate) * lag) / 0.03
     return gear
 
 
@@ -216,11 +296,16 @@ def amplifier_derivative(motor: Any, circuit: Any, y: FloatArray, dy: FloatArray
                          margin: FloatArray) -> None:
     """Fill the derivatives of amplifier 1: PI on the rate error, clamped about the back-EMF."""
     reading = tach_reading(motor, y, at, t, middle)
+    if motor.loop_crosstalk != 0.0:
+        reading += motor.loop_crosstalk * y[2 * MOTOR_AT + MOTOR_SIZE - at + W]
     error = motor.rate_gain * (
         y[V_C] - motor.tach_gain * reading
         + motor.side * circuit.counter_torque_gain * y[X_F] + motor.input_offset)
     if motor.delay > 0.0:
-        error = delayed(y, dy, at + DELAY_AT, error, motor.delay)
+        if motor.law == LAW_B:
+            error = lagged(y, dy, at + DELAY_AT, error, motor.delay)
+        else:
+            error = delayed(y, dy, at + DELAY_AT, error, motor.delay)
     else:
         for k in range(4):
             dy[at + DELAY_AT + k] = 0.0
@@ -257,7 +342,7 @@ def armature_derivative(motor: Any, y: FloatArray, dy: FloatArray, at: int, whic
     """Fill the derivatives of amplifier 2, armature and warmth; return the magnet's strength."""
     v, i, w = y[at + V], y[at + I], y[at + W]
     if motor.dead_zone > 0.0:
-        v -= motor.dead_zone * math.tanh(v / motor.dead_zone)
+        v = crossover(v, motor.dead_zone, motor.law)
     if motor.bridge_error != 0.0:
         v *= 1.0 + motor.bridge_error * math.tanh(v / 0.3)
     voltage = motor.loop_gain * v - motor.feedback_gain * i
@@ -270,7 +355,7 @@ def armature_derivative(motor: Any, y: FloatArray, dy: FloatArray, at: int, whic
         voltage = rail * limit
     warmth = y[at + WARMTH]
     resistance = motor.resistance * (1.0 + motor.warm_resistance * warmth)
-    strength = 1.0 / (1.0 + motor.warm_torque * warmth)
+    strength = 1.0 / (1.0 + motor.warm_torque * warmth + motor.magnet_saturation * i * i)
     dy[at + WARMTH] = (i * i - warmth) / motor.warming_time
     dy[at + I] = (voltage / motor.ampere_scale - resistance * i
                   - strength * motor.back_emf * w) / motor.inductance
@@ -286,7 +371,7 @@ def rotor_derivative(motor: Any, y: FloatArray, dy: FloatArray, at: int, which: 
     torque = motor.torque_constant * strength * y[at + I]
     if motor.ripple != 0.0 or motor.current_ripple != 0.0:
         angle = motor.ripple_cycles * y[at + THETA] + motor.ripple_phase
-        shape = (math.sin(angle) + 0.3 * math.sin(2.0 * angle + 1.0)) / 1.044
+        shape = ripple_shape(angle, motor.law)
         torque += motor.ripple * shape + motor.current_ripple * torque * shape
     applied = torque - gear
     slip = mode[FRICTION + which]
@@ -297,7 +382,11 @@ def rotor_derivative(motor: Any, y: FloatArray, dy: FloatArray, at: int, which: 
         dy[at + W] = 0.0
     else:
         kinetic = motor_friction(motor, w, slip * 1.0, gear, middle)[0]
-        drag = slip * kinetic + viscous_torque(motor.viscous, w, 20.0)
+        drag = slip * kinetic + viscous_torque(motor.viscous, w, 20.0, motor.law)
+        if motor.eddy_brake != 0.0:
+            # Rises with the rate, and falls beyond that of the greatest drag.
+            part = w / motor.eddy_rate
+            drag += motor.eddy_brake * 2.0 * part / (1.0 + part * part)
         margin[FRICTION + which] = slip * w
         dy[at + W] = (applied - drag) / motor.inertia
     dy[at + THETA] = w
@@ -337,7 +426,10 @@ def structure_derivative(structure: Any, y: FloatArray, dy: FloatArray, t: float
         else:
             inertia, omega = structure.extra_inertia, structure.extra_frequency
             zeta = structure.extra_damping
-        pull = -omega * omega * (angle - theta_a) - 2.0 * zeta * omega * (rate - w_a)
+        twist = angle - theta_a
+        if k == 0 and structure.mode_play > 0.0:
+            twist -= structure.mode_play * math.tanh(twist / structure.mode_play)
+        pull = -omega * omega * twist - 2.0 * zeta * omega * (rate - w_a)
         if k == 0 and structure.mode_friction != 0.0:
             pull -= (structure.mode_friction / inertia
                      * math.tanh((rate - w_a) / structure.mode_friction_rate))
@@ -355,7 +447,7 @@ def structure_derivative(structure: Any, y: FloatArray, dy: FloatArray, t: float
         dy[W_A] = 0.0
     else:
         margin[AXIS_FRICTION] = slip * w_a
-        drag = slip * kinetic + viscous_torque(structure.viscous, w_a, 1.3e-3)
+        drag = slip * kinetic + viscous_torque(structure.viscous, w_a, 1.3e-3, structure.law)
         dy[W_A] = (applied - drag) / structure.inertia
     dy[THETA_A] = w_a
     dy[ENCODER] = 0.0
@@ -403,6 +495,8 @@ def derivative(t: float, middle: float, y: FloatArray, mode: ModeArray, machine:
     dy[X_3] = -circuit.k_3 * (x_3 + circuit.current_to_voltage * (first + second))
     load = mode[LOAD_SIGN] * x_3
     dy[X_2] = -circuit.s_2 * x_2 + circuit.k_2 * (circuit.fade_out + circuit.g_4 * load)
+    if circuit.command_leak != 0.0:
+        dy[X_2] += circuit.command_leak * y[V_C]
     margin[LOAD_SIGN] = load
     saturation = mode[SATURATION]
     if saturation > 0:

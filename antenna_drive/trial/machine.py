@@ -30,7 +30,11 @@ from numpy.typing import NDArray
 GUST_WAVES = 24
 DROPOUTS = 8
 
+# The laws by which effects act: those of effects.py, or those of family_b.py.
+LAW_A, LAW_B = 0.0, 1.0
+
 MOTOR = np.dtype([(name, np.float64) for name in (
+    'law',                      # LAW_A or LAW_B
     # as built
     'side',                     # -1 for motor 1, +1 for motor 2
     'rate_gain',                # k_r [A/V]
@@ -83,9 +87,17 @@ MOTOR = np.dtype([(name, np.float64) for name in (
     'brake', 'brake_start', 'brake_end',              # dragging brake [N m], [s], [s]
     'dropout_length',           # [s]
     'hum',                      # mains hum at the tachometer [rad/s]
+    # imperfections of family B outside the catalogue
+    'tach_saturation',          # reading at which the tachometer saturates [rad/s], 0: none
+    'tach_dead_band',           # half width of the dead band of its brushes [rad/s]
+    'loop_crosstalk',           # share of the other tachometer in this rate loop
+    'eddy_brake', 'eddy_rate',  # greatest drag of an eddy-current brake [N m], at [rad/s]
+    'magnet_saturation',        # torque constant is 1 / (1 + this * current^2) [1/A^2]
+    'mesh_stiffness', 'mesh_stiffness_cycles',        # relative wave of the stiffness, per rev
 )] + [('dropout', np.float64, (DROPOUTS,))])
 
 STRUCTURE = np.dtype([(name, np.float64) for name in (
+    'law',                      # LAW_A or LAW_B
     # as built
     'gear_ratio',               # N
     'inertia',                  # hub J_0 [kg m^2]
@@ -107,6 +119,10 @@ STRUCTURE = np.dtype([(name, np.float64) for name in (
     'mode_friction',            # dry friction in the structure [N m]
     'mode_friction_rate',       # [rad/s]
     'ballast', 'ballast_at',    # load that shifts [N m], [s]
+    # imperfections of family B outside the catalogue
+    'mode_play',                # half of the play in the joint of the first mode [rad]
+    'cable',                    # stiffness of a cable wrap [N m/rad]
+    'hard_spot', 'hard_spot_at', 'hard_spot_width',   # share of Coulomb, [rad], [rad]
 )] + [
     ('mode_inertia', np.float64, (3,)),
     ('mode_frequency', np.float64, (3,)),             # [rad/s]
@@ -127,15 +143,26 @@ CIRCUIT = np.dtype([(name, np.float64) for name in (
     'filter_gain', 'filter_pole',                     # [1/s]
     'difference_gain',          # k_f [V/A]
     'counter_torque_gain',      # s_F
-)])
+)] + [
+    # imperfection of family B outside the catalogue
+    ('command_leak', np.float64),                     # of the command into the share [1/s]
+])
 
 SENSORS = np.dtype([(name, np.float64) for name in (
+    'law',                      # LAW_A or LAW_B
     'current_error_1', 'current_error_2',             # relative gain errors
     'current_offset_1', 'current_offset_2',           # [A]
     'encoder_step',             # [rad], 0: as the test sheet says
     'encoder_cyclic', 'encoder_lines', 'encoder_phase',    # [rad], per revolution, [rad]
     'encoder_offset',           # [rad]
     'bias_error',               # relative gain error
+    # of the recorder alone, in every real machine
+    'tach_error_1', 'tach_error_2',                   # relative gain errors
+    'bias_zero',                # [V]
+    # imperfections of family B outside the catalogue
+    'ammeter_lag',              # of both ammeters, first order [s]
+    'ammeter_crosstalk',        # share of the other current in each ammeter
+    'encoder_play',             # half of the play of the encoder's coupling [rad]
 )])
 
 
@@ -155,7 +182,7 @@ TOLERANCED_MOTOR = (
     'stiction_ratio', 'stiffness', 'half_gap', 'contact_damping')
 TOLERANCED_STRUCTURE = (
     'inertia', 'coulomb', 'stiction_ratio', 'mode_inertia', 'mode_frequency', 'mode_damping')
-TOLERANCED_CIRCUIT = CIRCUIT.names or ()
+TOLERANCED_CIRCUIT = (CIRCUIT.names or ())[:-1]
 
 
 def reference_machine(circuit: str = 'old', filter_1: str = 'old',
@@ -198,7 +225,7 @@ def _build_motors(motors: NDArray[Any]) -> None:
     motors['inertia'] = nominal.ROTOR_INERTIA.value
     motors['coulomb'] = nominal.MOTOR_COULOMB.value * nominal.TORQUE_CONSTANT.value
     motors['stiffness'] = nominal.GEAR_STIFFNESS.value
-    for name in ('stribeck_rate', 'warming_time', 'tooth_ratio'):
+    for name in ('stribeck_rate', 'warming_time', 'tooth_ratio', 'eddy_rate'):
         motors[name] = 1.0
     motors['dropout'] = -1.0
 
@@ -214,7 +241,7 @@ def _build_structure(structure: Any) -> None:
         2.0 * math.pi * fact.value for fact in nominal.MODE_FREQUENCY]
     structure['mode_damping'] = nominal.MODE_DAMPING.value
     for length in ('stribeck_rate', 'bump_pitch', 'dahl_travel', 'warming_time',
-                   'mode_friction_rate'):
+                   'mode_friction_rate', 'hard_spot_width'):
         structure[length] = 1.0
     structure['ballast_at'] = -1.0
 

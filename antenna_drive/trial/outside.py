@@ -32,7 +32,8 @@ def _which(values: Parameters) -> int:
     return int(values['motor']) - 1
 
 
-def _motor_values(**fields: str) -> Change:
+def motor_values(**fields: str) -> Change:
+    """Return a change that sets fields of the motor that the numbers name."""
     def change(machine: Records, values: Parameters) -> None:
         for field, quantity in fields.items():
             machine.motors[field][_which(values)] = values[quantity]
@@ -65,7 +66,7 @@ OUTSIDE: dict[str, Defect] = {effect.key: effect for effect in (
     Defect('outside.damaged_tooth', 'one raised tooth on a slower shaft of a gearbox',
            (Quantity('height', 'rad', 0.04, 0.3), MOTOR,
             Quantity('ratio', 'rev/rev', 2.2, 6.3), PHASE),
-           _motor_values(tooth_height='height', tooth_ratio='ratio', tooth_phase='phase')),
+           motor_values(tooth_height='height', tooth_ratio='ratio', tooth_phase='phase')),
     Defect('outside.warming_motor', 'torque constant falls and resistance rises with the '
            'heat of the current, first order',
            (Quantity('torque_loss', '1/A^2', 0.006, 0.06), MOTOR,
@@ -74,7 +75,7 @@ OUTSIDE: dict[str, Defect] = {effect.key: effect for effect in (
            '30 s, inside the loop',
            (Quantity('length', 's', 0.015, 0.15), MOTOR, SEED), _dropouts),
     Defect('outside.slew_limit', "slope of an amplifier's current demand limited, smoothly",
-           (Quantity('limit', 'A/s', 120.0, 8.0), MOTOR), _motor_values(slew_limit='limit')),
+           (Quantity('limit', 'A/s', 120.0, 8.0), MOTOR), motor_values(slew_limit='limit')),
     Defect('outside.windup', 'the clamp does not stop the integrator, which also leaks',
            (Quantity('leak', '1/s', 0.1, 3.0), Quantity('share', '1', 0.7, 1.0, 'even')),
            setting('motors', integrator_leak='leak', windup='share')),
@@ -90,15 +91,15 @@ OUTSIDE: dict[str, Defect] = {effect.key: effect for effect in (
     Defect('outside.unequal_bridges', 'gain of a power stage differs with the direction of '
            'the current, v (1 + error tanh(v / 0.3 A))',
            (Quantity('error', '1', 0.05, 0.3, turned='sign'), MOTOR),
-           _motor_values(bridge_error='error')),
+           motor_values(bridge_error='error')),
     Defect('outside.structural_friction', 'dry friction in the joints of the first mode',
            (Quantity('torque', 'N m', 4e3, 8e4), Quantity('rate', 'rad/s', 2e-5, 1e-4)),
            setting('structure', mode_friction='torque', mode_friction_rate='rate')),
     Defect('outside.current_ripple', 'torque constant ripples with the angle: '
            'the ripple grows with the current',
            (Quantity('share', '1', 0.05, 0.4), MOTOR, Quantity('cycles', '1/rev', 2, 24, 'whole'),
-            PHASE), _motor_values(current_ripple='share', ripple_cycles='cycles',
-                                  ripple_phase='phase')),
+            PHASE), motor_values(current_ripple='share', ripple_cycles='cycles',
+                                 ripple_phase='phase')),
     Defect('outside.warming_lubricant', 'axis friction falls exponentially with time',
            (Quantity('loss', '1', 0.1, 0.6), Quantity('time', 's', 5.0, 20.0)),
            setting('structure', warming='loss', warming_time='time')),
@@ -107,9 +108,9 @@ OUTSIDE: dict[str, Defect] = {effect.key: effect for effect in (
             Quantity('length', 's', 3.0, 9.0)), _brake),
     Defect('outside.tach_coupling', 'a tachometer hangs on an elastic coupling, inside the loop',
            (Quantity('frequency', 'rad/s', 220.0, 110.0), MOTOR),
-           _motor_values(coupling_frequency='frequency')),
+           motor_values(coupling_frequency='frequency')),
     Defect('outside.mains_hum', '50 Hz on a tachometer, inside the loop',
-           (Quantity('amplitude', 'rad/s', 0.02, 0.6), MOTOR), _motor_values(hum='amplitude')),
+           (Quantity('amplitude', 'rad/s', 0.02, 0.6), MOTOR), motor_values(hum='amplitude')),
     Defect('outside.shifting_ballast', 'a load shifts once: gravity jumps',
            (Quantity('torque', 'N m', 2e4, 2e5, turned='sign'), Quantity('at', 's', 5.0, 15.0)),
            setting('structure', ballast='torque', ballast_at='at')),

@@ -55,8 +55,8 @@ def draw_sheets(tolerance: float, duration: float,
     circuit = {'type': 'circuit', 'bias_pot': pot, 'start': 'steady'}
     cold = {'type': 'circuit', 'bias_pot': pot, 'start': 'zero'}
     tests = (
-        (_slow_square(random), _slow_bias(circuit, random)),
-        (_fast_triangle(random), cold if random.uniform() < 0.5 else circuit),
+        (slow_square(random), _slow_bias(circuit, random)),
+        (fast_triangle(random), cold if random.uniform() < 0.5 else circuit),
         (_broad_band(duration, random), circuit))
     return tuple(
         CaseSheet(circuit=fitted, filter_1=fitted, bias=bias, waveform=shape,
@@ -69,12 +69,14 @@ def _rounded(value: float, digits: int) -> float:
     return float(round(float(value), digits))
 
 
-def _log_uniform(low: float, high: float, digits: int, random: np.random.Generator) -> float:
+def log_uniform(low: float, high: float, digits: int, random: np.random.Generator) -> float:
+    """Return a number whose logarithm is uniform from low to high, rounded."""
     return _rounded(math.exp(random.uniform(math.log(low), math.log(high))), digits)
 
 
-def _slow_square(random: np.random.Generator) -> dict[str, Any]:
-    return {'type': 'square', 'amplitude_deg_s': _log_uniform(0.02, 0.12, 4, random),
+def slow_square(random: np.random.Generator) -> dict[str, Any]:
+    """Draw a slow square wave."""
+    return {'type': 'square', 'amplitude_deg_s': log_uniform(0.02, 0.12, 4, random),
             'period_s': _rounded(random.uniform(5.0, 7.5), 2),
             'phase': float(random.choice([0.0, 0.25]))}
 
@@ -90,16 +92,25 @@ def _slow_bias(circuit: dict[str, Any], random: np.random.Generator) -> dict[str
     return circuit
 
 
-def _fast_triangle(random: np.random.Generator) -> dict[str, Any]:
+def fast_triangle(random: np.random.Generator) -> dict[str, Any]:
+    """Draw a fast triangle."""
     return {'type': 'triangle', 'amplitude_deg_s': _rounded(random.uniform(0.4, 0.685), 3),
             'period_s': _rounded(random.uniform(4.5, 7.0), 2), 'phase': 0.0}
 
 
 def _broad_band(duration: float, random: np.random.Generator) -> dict[str, Any]:
-    if random.uniform() < 0.3:
-        return {'type': 'chirp', 'amplitude_deg_s': _log_uniform(0.05, 0.1, 4, random),
-                'f0_hz': 0.1, 'f1_hz': _rounded(random.uniform(6.0, 9.0), 1),
-                'duration_s': duration - 2.0, 'start_s': 1.0}
+    return chirp(duration, random) if random.uniform() < 0.3 else multisine(random)
+
+
+def chirp(duration: float, random: np.random.Generator) -> dict[str, Any]:
+    """Draw a chirp, which ends a second before the recording does."""
+    return {'type': 'chirp', 'amplitude_deg_s': log_uniform(0.05, 0.1, 4, random),
+            'f0_hz': 0.1, 'f1_hz': _rounded(random.uniform(6.0, 9.0), 1),
+            'duration_s': duration - 2.0, 'start_s': 1.0}
+
+
+def multisine(random: np.random.Generator) -> dict[str, Any]:
+    """Draw a multisine with a period of 14 s."""
     count = 12
     # Whole cycles in half the recording: the second half repeats the first.
     low, high = 0.1, 8.0
@@ -108,7 +119,7 @@ def _broad_band(duration: float, random: np.random.Generator) -> dict[str, Any]:
     frequencies = lines / 14.0
     weights = frequencies**-0.5
     weights /= math.sqrt(float(np.sum(weights**2)))
-    return {'type': 'multisine', 'amplitude_deg_s': _log_uniform(0.08, 0.2, 4, random),
+    return {'type': 'multisine', 'amplitude_deg_s': log_uniform(0.08, 0.2, 4, random),
             'frequencies_hz': [_rounded(f, 6) for f in frequencies],
             'weights': [_rounded(w, 4) for w in weights],
             'phases': [_rounded(p, 4) for p in random.uniform(0.0, 2.0 * math.pi, len(lines))],

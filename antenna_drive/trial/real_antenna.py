@@ -177,10 +177,9 @@ def _edges(machine: Records, test: np.void, end: float) -> FloatArray:
 
 def _history(machine: Records, test: NDArray[np.void], times: FloatArray, states: FloatArray,
              edges: FloatArray, statistics: NDArray[np.int64]) -> History:
-    bounds = np.concatenate(([0.0], edges, [np.inf]))
-    stretch = np.searchsorted(bounds, times, side='right') - 1
-    middles = np.where(np.isfinite(bounds[stretch + 1]),
-                       0.5 * (bounds[stretch] + bounds[stretch + 1]), bounds[stretch] + 1.0)
+    bounds = np.concatenate(([0.0], edges, times[-1:]))
+    stretch = np.minimum(np.searchsorted(bounds, times, side='right') - 1, len(edges))
+    middles = 0.5 * (bounds[stretch] + bounds[stretch + 1])
     count = len(times)
     command, bias, tach = np.empty(count), np.empty(count), np.empty((2, count))
     equations.readings(times, middles, states, machine, test[0], command, bias, tach)

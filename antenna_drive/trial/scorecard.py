@@ -26,9 +26,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from antenna_drive.trial import sealing
-from antenna_drive.trial.batch import FAILURE, VERDICT
+from antenna_drive.trial.batch import FAILURE, KEPT, VERDICT
 from antenna_drive.trial.cases import Truth
+from antenna_drive.trial.held_back import closed_fraction, PredictionError
+from antenna_drive.trial.sizes import stated_sizes, StatedSize
 from antenna_drive.trial.verdict import NONE, read_verdict, UNKNOWN, Verdict, VerdictError
+from antenna_drive.trial.wild_programme import KEPT_BACK
 import numpy as np
 
 FIRST_FEW = 3
@@ -36,14 +39,25 @@ OVERCONFIDENT = 0.9
 BINS = 10
 SIZES = ('small', 'middle', 'large')
 SCORED_SINGLE, SCORED_PAIR = 'single', 'pair'
+HEALTHY_AT_SITE = 0.9       # share of the machines for which the figures of a site hold
 
 
 @dataclass(frozen=True)
 class Case:
-    """A truth with its verdict, which is None if the diagnosis failed."""
+    """
+    A truth with its verdict.
+
+    Attributes
+    ----------
+    truth : of the case
+    verdict : None if the diagnosis failed
+    closed : fraction of the gap that is closed on the recording kept back; nan if not predicted
+
+    """
 
     truth: Truth
     verdict: Verdict | None
+    closed: float = math.nan
 
     @property
     def kind(self) -> str:
@@ -86,6 +100,24 @@ class Case:
         return self.effects <= held
 
     @property
+    def alarmed(self) -> bool:
+        """Return whether a verdict says that there is a gap."""
+        return self.verdict is not None and self.verdict.verdict != 'no_gap'
+
+    @property
+    def probability_of_truth(self) -> float:
+        """Return the probability of all entries that name the truth; 0 without a verdict."""
+        if self.verdict is None:
+            return 0.0
+        return min(1.0, sum(entry.probability for entry in self.verdict.which
+                            if self.verdict.means(entry.effects, self.effects)))
+
+    @property
+    def sizes(self) -> list[StatedSize]:
+        """Return the sizes that the first entry states of true effects."""
+        return [] if self.verdict is None else stated_sizes(self.truth, self.verdict)
+
+    @property
     def right(self) -> bool:
         """Return whether the first entry names the truth or its confusable set."""
         return self.named_among(1)
@@ -116,14 +148,24 @@ def read_cases(folder: Path) -> tuple[list[Case], int]:
         place = folder / name
         if (place / VERDICT).exists():
             try:
-                cases.append(Case(truth, read_verdict(place / VERDICT)))
-            except VerdictError:
+                verdict = read_verdict(place / VERDICT)
+                cases.append(Case(truth, verdict, _closed(folder, truth, verdict)))
+            except (VerdictError, PredictionError):
                 cases.append(Case(truth, None))
         elif (place / FAILURE).exists():
             cases.append(Case(truth, None))
         else:
             pending += 1
     return cases, pending
+
+
+def _closed(folder: Path, truth: Truth, verdict: Verdict) -> float:
+    """Return what is closed on the recording that was kept back; nan if it is not predicted."""
+    recording = folder / KEPT / truth['case'] / f'{KEPT_BACK}.csv'
+    if not verdict.held_back or not recording.exists():
+        return math.nan
+    before, after = (folder / truth['case'] / name for name in verdict.held_back.values())
+    return closed_fraction(recording, before, after, truth)
 
 
 class Rate(NamedTuple):
@@ -180,6 +222,34 @@ def reliability(confidences: Sequence[float], right: Sequence[bool]) -> list[Bin
     return bins
 
 
+def site(cases: Sequence[Case]) -> dict[str, float]:
+    """
+    Return the figures for a site where HEALTHY_AT_SITE of the machines are healthy.
+
+    Cases without effect and all others are weighted to that share. nan if either are missing.
+    """
+    healthy = [case for case in cases if case.kind == 'none']
+    faulty = [case for case in cases if case.kind != 'none']
+    groups = [(group, weight / len(group)) for group, weight in (
+        (healthy, HEALTHY_AT_SITE), (faulty, 1.0 - HEALTHY_AT_SITE)) if group]
+
+    def share(part: Callable[[Case], bool], of: Callable[[Case], bool] = lambda case: True
+              ) -> float:
+        total = sum(weight * sum(map(of, group)) for group, weight in groups)
+        chosen = sum(weight * sum(of(case) and part(case) for case in group)
+                     for group, weight in groups)
+        return chosen / total if total and len(groups) == 2 else math.nan
+
+    return {'healthy': HEALTHY_AT_SITE, 'right': share(lambda case: case.right),
+            'alarms': share(lambda case: case.alarmed),
+            'alarms_true': share(lambda case: case.kind != 'none', lambda case: case.alarmed),
+            'named_right': share(lambda case: case.right, _names_an_effect)}
+
+
+def _names_an_effect(case: Case) -> bool:
+    return case.verdict is not None and not case.verdict.which[0].effects & {UNKNOWN, NONE}
+
+
 def calibration_error(bins: Sequence[Bin]) -> float:
     """Return the expected calibration error; nan if there are no cases."""
     total = sum(b.cases for b in bins)
@@ -191,6 +261,11 @@ def calibration_error(bins: Sequence[Bin]) -> float:
 def _median(values: Iterable[float]) -> float:
     finite = [value for value in values if math.isfinite(value)]
     return float(np.median(finite)) if finite else math.nan
+
+
+def _mean(values: Iterable[float]) -> float:
+    known = list(values)
+    return sum(known) / len(known) if known else math.nan
 
 
 def case_reliability(cases: Sequence[Case]) -> list[Bin]:
@@ -246,6 +321,7 @@ def score(cases: Sequence[Case], pending: int = 0) -> dict[str, Any]:
     singles, pairs = by_kind[SCORED_SINGLE], by_kind[SCORED_PAIR]
     outside = by_kind['outside']
     known = [case for case in cases if case.kind != 'outside']
+    sizes = [size for case in (*singles, *pairs) for size in case.sizes]
     rates = {
         'top1': rate(case.right for case in singles),
         'top3': rate(case.named_among(FIRST_FEW) for case in singles),
@@ -259,7 +335,11 @@ def score(cases: Sequence[Case], pending: int = 0) -> dict[str, Any]:
         'top1_exact': rate(case.named_among(1, exactly=True) for case in singles),
         'top3_exact': rate(case.named_among(FIRST_FEW, exactly=True) for case in singles),
         'pairs_one': rate(_one_named(case) for case in pairs),
-        'overconfident_outside': overconfident}
+        'overconfident_outside': overconfident,
+        'detection_rate': rate(case.alarmed for case in cases if case.kind != 'none'),
+        'false_alarm_rate': rate(
+            case.verdict is None or case.alarmed for case in by_kind['none']),
+        'size_coverage': rate(size.covered for size in sizes)}
     figures: dict[str, Any] = {
         'cases': len(cases),
         'failures': sum(case.verdict is None for case in cases),
@@ -273,6 +353,12 @@ def score(cases: Sequence[Case], pending: int = 0) -> dict[str, Any]:
         'seconds_median': _median(case.verdict.seconds for case in cases if case.verdict),
         'pending': pending,
         **{name: value.value for name, value in more_rates.items() if name not in rates},
+        'true_probability_mean': _mean(
+            case.probability_of_truth for case in (*singles, *pairs)),
+        'sizes_compared': len(sizes),
+        'size_error_median': _median(size.relative_error for size in sizes),
+        'closed_held_back_median': _median(case.closed for case in (*singles, *pairs)),
+        'site': site(cases),
         'ci95': {name: [value.low, value.high]
                  for name, value in {**rates, **more_rates}.items()},
         'by_kind': {kind: _summary(group) for kind, group in by_kind.items()},

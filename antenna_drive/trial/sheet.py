@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 SHAPES = {'square': waveform.SQUARE, 'triangle': waveform.TRIANGLE,
-          'multisine': waveform.MULTISINE, 'chirp': waveform.CHIRP}
+          'multisine': waveform.MULTISINE, 'chirp': waveform.CHIRP, 'knots': waveform.KNOTS}
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,9 @@ class CaseSheet:
     ----------
     circuit, filter_1 : constants of Table 1, 'old' or 'new'
     bias : mapping of the input format: circuit, fixed or fixed_step
-    waveform : mapping of the input format: square, triangle, multisine or chirp; empty: rest
+    waveform : mapping of the input format: square, triangle, multisine or chirp; empty: rest.
+        More than that format has: square and triangle with `start_s`; knots, with `times_s`
+        and `rates_deg_s`, between which the rate is linear
     elevation_deg : elevation at the start [deg]
     sensors : grade of the sensors
     parameter_tolerance : largest relative deviation of the machine from the reference, unit 1
@@ -79,6 +81,16 @@ class CaseSheet:
             'elevation_deg': self.elevation_deg, 'sensors': asdict(self.sensors),
             'parameter_tolerance': self.parameter_tolerance}
 
+    def given(self, *, sensors: bool = True) -> dict[str, Any]:
+        """Return what the input format can say of this test, with or without the sensors."""
+        plain = self.plain()
+        kind = self.waveform.get('type')
+        if kind == 'knots' or (kind in ('square', 'triangle') and 'start_s' in self.waveform):
+            del plain['waveform']
+        if not sensors:
+            del plain['sensors']
+        return plain
+
     def record(self) -> NDArray[Any]:
         """Return the record for the compiled equations, shape (1,), waveform.TEST."""
         test = np.zeros(1, waveform.TEST)
@@ -94,6 +106,12 @@ class CaseSheet:
             return test
         shape = self.waveform
         record['shape'] = SHAPES[shape['type']]
+        if shape['type'] == 'knots':
+            count = len(shape['times_s'])
+            record['knots'] = count
+            record['knot_time'][:count] = shape['times_s']
+            record['knot_rate'][:count] = np.radians(shape['rates_deg_s'])
+            return test
         record['amplitude'] = math.radians(shape['amplitude_deg_s'])
         record['start'] = shape.get('start_s', 0.0)
         if shape['type'] in ('square', 'triangle'):

@@ -15,12 +15,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 import json
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 UNKNOWN, NONE = 'unknown', 'none'
 VERDICTS = ('no_gap', 'explained', 'partly_explained', 'unknown_effect')
@@ -32,12 +32,22 @@ class VerdictError(ValueError):
     """A verdict does not have the form of the diagnosis; it counts as a failure."""
 
 
+class Interval(NamedTuple):
+    """A number with its 95 percent interval and unit."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
 @dataclass(frozen=True)
 class VerdictLine:
-    """One line of 'which': effects that act together, and their probability."""
+    """One line of 'which': effects that act together, their probability and parameters."""
 
     effects: frozenset[str]
     probability: float
+    parameters: Mapping[str, Interval] = field(default_factory=dict, compare=False)
 
 
 @dataclass(frozen=True)
@@ -52,6 +62,8 @@ class Verdict:
     confusable : groups of ids that the data cannot separate
     explained_fraction : nan if not given
     seconds : nan if not given
+    held_back : names of the predictions 'before' and 'after' of the recording that was kept
+        back; empty if not given
 
     """
 
@@ -60,6 +72,7 @@ class Verdict:
     confusable: tuple[frozenset[str], ...]
     explained_fraction: float
     seconds: float
+    held_back: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def confusable_with(self, effect: str) -> frozenset[str]:
         """
@@ -144,7 +157,19 @@ def parse_verdict(content: Any) -> Verdict:
     fraction = how_far.get('explained_fraction') if isinstance(how_far, dict) else None
     value = fraction.get('value') if isinstance(fraction, dict) else fraction
     return Verdict(content['verdict'], ranked, tuple(frozenset(group) for group in groups),
-                   _number_or_nan(value), _number_or_nan(content.get('seconds')))
+                   _number_or_nan(value), _number_or_nan(content.get('seconds')),
+                   _held_back(content.get('held_back')))
+
+
+def _held_back(content: Any) -> dict[str, str]:
+    if content is None:
+        return {}
+    names = {key: content.get(key) if isinstance(content, dict) else None
+             for key in ('before', 'after')}
+    # a plain name: what is elsewhere is no part of the verdict
+    if not all(isinstance(name, str) and name == Path(name).name for name in names.values()):
+        raise VerdictError("held_back: not the file names 'before' and 'after'")
+    return {key: str(name) for key, name in names.items()}
 
 
 def _entry(content: Any) -> VerdictLine:
@@ -157,10 +182,28 @@ def _entry(content: Any) -> VerdictLine:
     if isinstance(probability, bool) or not isinstance(probability, (int, float)) or not (
             0.0 <= probability <= 1.0):
         raise VerdictError(f'which.probability: {probability!r}, not a number from 0 to 1')
-    return VerdictLine(frozenset(effects), float(probability))
+    parameters = content.get('parameters')
+    intervals = {name: _interval(value) for name, value in parameters.items()} if isinstance(
+        parameters, dict) else {}
+    return VerdictLine(frozenset(effects), float(probability), {
+        name: interval for name, interval in intervals.items() if interval is not None})
+
+
+def _interval(content: Any) -> Interval | None:
+    """Return a parameter that is stated with its interval, and None if it is not."""
+    bounds = content.get('ci95') if isinstance(content, dict) else None
+    if not isinstance(bounds, list) or len(bounds) != 2:
+        return None
+    value, low, high = (_number_or_nan(number) for number in (content.get('value'), *bounds))
+    if not all(map(math.isfinite, (value, low, high))):
+        return None
+    return Interval(value, low, high, str(content.get('unit', '')))
 
 
 def _number_or_nan(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return math.nan
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError:       # a whole number of JSON has no limit
+        return math.nan

@@ -22,8 +22,9 @@ from antenna_drive.trial.compiled import compiled
 import numpy as np
 from numpy.typing import NDArray
 
-SQUARE, TRIANGLE, MULTISINE, CHIRP, REST = 0, 1, 2, 3, 4
+SQUARE, TRIANGLE, MULTISINE, CHIRP, REST, KNOTS = 0, 1, 2, 3, 4, 5
 MOST_SINES = 32
+MOST_KNOTS = 512
 
 TEST = np.dtype([(name, np.float64) for name in (
     'shape',                    # one of the constants above
@@ -33,6 +34,7 @@ TEST = np.dtype([(name, np.float64) for name in (
     'start', 'duration',        # [s]
     'first_frequency', 'last_frequency',              # of a chirp [Hz]
     'sines',                    # their number
+    'knots',                    # their number; the rate is linear between two of them
     'bias_source',              # 0: share circuit, 1: a source
     'bias_voltage', 'bias_at',  # of the source [V], [s]
     'elevation',                # at the start [rad]
@@ -40,7 +42,25 @@ TEST = np.dtype([(name, np.float64) for name in (
     ('frequency', np.float64, (MOST_SINES,)),         # [Hz]
     ('weight', np.float64, (MOST_SINES,)),
     ('sine_phase', np.float64, (MOST_SINES,)),        # [rad]
+    ('knot_time', np.float64, (MOST_KNOTS,)),         # ascending, equal at a jump [s]
+    ('knot_rate', np.float64, (MOST_KNOTS,)),         # [rad/s]
 ])
+
+
+@compiled
+def between_knots(test: Any, t: float, middle: float) -> float:
+    """Return the rate on the straight line between two knots, which `middle` selects [rad/s]."""
+    low, high = 0, int(test.knots) - 1
+    if middle < test.knot_time[0] or middle >= test.knot_time[high]:
+        return 0.0
+    while high - low > 1:
+        half = (low + high) // 2
+        if test.knot_time[half] <= middle:
+            low = half
+        else:
+            high = half
+    part = (t - test.knot_time[low]) / (test.knot_time[high] - test.knot_time[low])
+    return test.knot_rate[low] + part * (test.knot_rate[high] - test.knot_rate[low])
 
 
 @compiled
@@ -58,18 +78,20 @@ def command(test: Any, t: float, middle: float) -> float:
         a time in the same interval between two corners, which selects the branch [s]
 
     """
+    if test.shape == REST or middle < test.start:
+        return 0.0
     if test.shape == SQUARE:
-        cycle = middle / test.period + test.phase
+        cycle = (middle - test.start) / test.period + test.phase
         return test.amplitude if cycle - math.floor(cycle) < 0.5 else -test.amplitude
     if test.shape == TRIANGLE:
-        cycle = middle / test.period + test.phase
+        cycle = (middle - test.start) / test.period + test.phase
         turn = math.floor(cycle + 0.25)         # quarter before the rise through zero
-        place = t / test.period + test.phase - turn
+        place = (t - test.start) / test.period + test.phase - turn
         if cycle - turn < 0.25:
             return 4.0 * test.amplitude * place
         return 4.0 * test.amplitude * (0.5 - place)
-    if test.shape == REST or middle < test.start:
-        return 0.0
+    if test.shape == KNOTS:
+        return between_knots(test, t, middle)
     if test.shape == MULTISINE:
         total = 0.0
         for k in range(int(test.sines)):
@@ -100,11 +122,14 @@ def corners(test: Any, end: float) -> NDArray[np.float64]:
     if test['bias_source'] > 0.0:
         times.append(float(test['bias_at']))
     if test['shape'] in (SQUARE, TRIANGLE):
-        period, phase = float(test['period']), float(test['phase'])
+        period, phase, start = (float(test[name]) for name in ('period', 'phase', 'start'))
         shift = 0.0 if test['shape'] == SQUARE else 0.25
-        last = math.ceil(2.0 * (end / period + phase)) + 1
+        last = math.ceil(2.0 * ((end - start) / period + phase)) + 1
         first = math.floor(2.0 * phase) - 1
-        times += [(0.5 * k + shift - phase) * period for k in range(first, last + 1)]
+        turns = [(0.5 * k + shift - phase) * period for k in range(first, last + 1)]
+        times += [start, *(start + turn for turn in turns if start == 0.0 or turn > 0.0)]
+    elif test['shape'] == KNOTS:
+        times += test['knot_time'][:int(test['knots'])].tolist()
     elif test['shape'] != REST:
         times.append(float(test['start']))
         if test['shape'] == CHIRP:

@@ -245,6 +245,38 @@ def test_diagnosis_is_told_the_recordings_and_never_the_truth(
     assert (folder / 'case_0002' / 'verdict.json').exists()
 
 
+def test_diagnosis_never_gets_what_is_kept_back(tmp_path: Path, stand_in: Path) -> None:
+    folder = tmp_path / 'trial'
+    manifest = prepare(folder, count=1, wild=True)
+    batch.make_cases(folder, manifest, jobs=1)
+    assert (folder / 'kept' / 'case_0001' / 'rec_d.csv').exists()
+    assert not list(folder.glob('case_*/rec_d*'))
+    assert batch.diagnose_cases(folder, manifest, 1, [], 60.0) == 0
+    told = json.loads(stand_in.read_text())
+    assert [Path(a).name for a in told[1:4]] == ['rec_a.csv', 'rec_b.csv', 'rec_c.csv']
+    assert not any('kept' in argument or 'rec_d' in argument for argument in told)
+
+
+def test_a_wild_trial_is_not_resumed_as_a_tame_one(tmp_path: Path) -> None:
+    prepare(tmp_path, wild=True)
+    with pytest.raises(UserError, match='wild True, not None'):
+        prepare(tmp_path)
+    with pytest.raises(UserError, match='family a, not b'):
+        prepare(tmp_path, wild=True, family='b')
+
+
+@pytest.mark.parametrize('words', [
+    ['--family', 'b'], ['--wild', '--sample-rate', '100']])
+def test_command_refuses_what_does_not_go_together(
+        words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = str(tmp_path / 'x')
+    assert main(['trial', '--cases', '1', '--seed', '1', '--out', out, *words]) == 2
+    told = capsys.readouterr().err.strip()
+    assert len(told.splitlines()) == 1
+    assert words[-2] in told
+    assert not (tmp_path / 'x').exists()
+
+
 @pytest.mark.parametrize(('option', 'value'), [
     ('--cases', '0'), ('--seed', '-1'), ('--tolerance', '0.2'), ('--sample-rate', '20'),
     ('--jobs', '0'), ('--time-limit', '0'), ('--tolerance', 'nan')])

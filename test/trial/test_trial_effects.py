@@ -18,11 +18,11 @@ from __future__ import annotations
 import functools
 import math
 
-from antenna_drive.trial import equations
+from antenna_drive.trial import equations, family_b
 from antenna_drive.trial.cases import draw_truths
 from antenna_drive.trial.effect import Defect
 from antenna_drive.trial.effects import CATALOGUE
-from antenna_drive.trial.machine import reference_machine
+from antenna_drive.trial.machine import LAW_A, LAW_B, reference_machine
 from antenna_drive.trial.outside import OUTSIDE
 from antenna_drive.trial.real_antenna import simulate
 from antenna_drive.trial.sensors import record
@@ -78,8 +78,27 @@ def test_catalogue_names_every_effect_of_the_specification() -> None:
     assert not set(OUTSIDE) & set(CATALOGUE)
 
 
-@pytest.mark.parametrize('effect', [*CATALOGUE.values(), *OUTSIDE.values()],
-                         ids=lambda effect: effect.key)
+OTHER_LAWS = [effect for effect in family_b.CATALOGUE.values()
+              if effect.key.split('.')[1] in family_b.LAWS]
+
+
+def test_family_b_has_other_laws_for_the_same_effects_and_other_outsiders() -> None:
+    assert set(family_b.CATALOGUE) == set(CATALOGUE)
+    for key, effect in family_b.CATALOGUE.items():
+        assert effect.quantities == CATALOGUE[key].quantities
+        assert (effect in OTHER_LAWS) == (effect.form != CATALOGUE[key].form)
+    assert len(family_b.OUTSIDE) >= 12
+    assert not set(family_b.OUTSIDE) & set(OUTSIDE)
+
+
+@pytest.mark.parametrize('effect', OTHER_LAWS, ids=lambda effect: effect.key)
+def test_the_other_law_is_another_one(effect: Defect) -> None:
+    assert np.any(signals(effect, 1.0) != signals(CATALOGUE[effect.key], 1.0))
+
+
+@pytest.mark.parametrize('effect', [*CATALOGUE.values(), *OUTSIDE.values(), *OTHER_LAWS,
+                                    *family_b.OUTSIDE.values()],
+                         ids=lambda effect: effect.form[:40] + effect.key)
 def test_every_effect_shows_at_both_ends_of_its_range(effect: Defect) -> None:
     before = unchanged_signals()
     for size in (0.0, 1.0):
@@ -147,9 +166,56 @@ def test_delay_is_a_delay(frequency: float) -> None:
 
 
 def test_stribeck_falls_as_a_hyperbola() -> None:
-    assert equations.stribeck_torque(4.0, 0.0, 2.0) == 4.0
-    assert equations.stribeck_torque(4.0, -2.0, 2.0) == 2.0
-    assert equations.stribeck_torque(4.0, 6.0, 2.0) == 1.0
+    assert equations.stribeck_torque(4.0, 0.0, 2.0, LAW_A) == 4.0
+    assert equations.stribeck_torque(4.0, -2.0, 2.0, LAW_A) == 2.0
+    assert equations.stribeck_torque(4.0, 6.0, 2.0, LAW_A) == 1.0
+
+
+def test_laws_of_family_b_have_the_limits_of_their_kind() -> None:
+    """Each law agrees with the other at low and at high rate or load, and not between."""
+    assert equations.stribeck_torque(4.0, 0.0, 2.0, LAW_B) == 4.0
+    assert equations.stribeck_torque(4.0, -2.0, 2.0, LAW_B) == 2.0
+    assert equations.stribeck_torque(4.0, 6.0, 2.0, LAW_B) == pytest.approx(0.4)
+    # Eyring's fluid is Newton's at low rate, and a logarithm at high rate
+    assert equations.viscous_torque(0.1, 0.01, 20.0, LAW_B) == pytest.approx(1e-3)
+    rise = (equations.viscous_torque(0.1, 2e5, 20.0, LAW_B)
+            - equations.viscous_torque(0.1, 1e5, 20.0, LAW_B))
+    assert rise == pytest.approx(0.1 * 100.0 * math.log(2.0))
+    for law in (LAW_A, LAW_B):
+        # a dead zone lets nothing through in its middle and takes its half width away far off
+        assert equations.crossover(1e-4, 0.5, law) == pytest.approx(0.0, abs=1e-9)
+        assert equations.crossover(100.0, 0.5, law) == pytest.approx(99.5, abs=1e-4)
+        angles = np.arange(0.0, 2.0 * math.pi, 1e-3)
+        shape = [equations.ripple_shape(a, law) for a in angles]
+        assert np.mean(shape) == pytest.approx(0.0, abs=1e-3)
+        assert 0.9 < np.max(np.abs(shape)) < 1.25
+
+
+def test_hysteresis_of_family_b_settles_at_the_same_share() -> None:
+    """Bouc and Wen's law with exponent 2 is a hyperbolic tangent of the path from rest."""
+    machine = reference_machine()
+    machine.motors['hysteresis'] = 0.2
+    machine.motors['law'] = LAW_B
+    at, lag, step = equations.MOTOR_AT, 0.0, 1e-5
+    y, dy = np.zeros(equations.STATES), np.zeros(equations.STATES)
+    mode, margin = np.zeros(equations.SWITCHES, np.int64), np.zeros(equations.SWITCHES)
+    y[at + equations.W] = 1.0
+    for _ in range(int(0.07 / step)):
+        y[at + equations.LAG_Z] = lag
+        equations.motor_derivative(machine.motors[0], machine, y, dy, at, 0, 0.0, 0.5, mode,
+                                   margin)
+        lag += step * dy[at + equations.LAG_Z]
+    assert lag == pytest.approx(math.tanh(1.0), abs=1e-3)
+
+
+def test_lags_of_family_b_are_as_late_as_they_say() -> None:
+    """The area above the answer to a step is the delay, whatever the order."""
+    delay, step = 0.02, 1e-5
+    y, dy, area = np.zeros(4), np.zeros(4), 0.0
+    for _ in range(20000):
+        area += step * (1.0 - equations.lagged(y, dy, 0, 1.0, delay))
+        y += step * dy
+    assert area == pytest.approx(delay, rel=1e-2)
 
 
 def test_gust_has_the_strength_it_says() -> None:

@@ -21,11 +21,29 @@ from pathlib import Path
 from typing import Any
 
 from antenna_drive.cli import main
+from antenna_drive.machines.antenna.catalogue import catalogue
 from antenna_drive.trial import sealing
-from antenna_drive.trial.scorecard import auroc, calibration_error, Case, rate, reliability, score
+from antenna_drive.trial.cases import draw_truths
+from antenna_drive.trial.effects import CATALOGUE
+from antenna_drive.trial.held_back import noise_power
+from antenna_drive.trial.imperfections import apply_imperfections, imperfect_recording
+from antenna_drive.trial.machine import reference_machine
+from antenna_drive.trial.scorecard import (
+    auroc, calibration_error, Case, rate, read_cases, reliability, score,
+)
+from antenna_drive.trial.sheet import CaseSheet
+from antenna_drive.trial.sizes import size_of
 from antenna_drive.trial.verdict import parse_verdict, Verdict, VerdictError
+from hypothesis import given, strategies as st
+import numpy as np
 import pytest
 
+PLAIN = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.sampled_from(
+        ['before.csv', '../x.csv', '1', '', 10**400]),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(
+        st.sampled_from(['before', 'after', 'gearbox_1.gap.change', 'value', 'ci95', 'unit']),
+        inner, max_size=4), max_leaves=10)
 KEYS = ('cases, failures, top1, top3, within_set, pairs_both, no_gap_on_none, auroc_unknown, '
         'overconfident_outside, ece, explained_fraction_median, seconds_median').split(', ')
 
@@ -104,9 +122,201 @@ def test_every_figure_by_hand() -> None:
     assert figures['confusion']['c.x'] == {'d.x': 1}
 
 
+def test_detection_alarms_and_probability_by_hand() -> None:
+    figures = score(CASES)
+    # of four singles, two pairs and two outside only the failure gives no alarm
+    assert figures['detection_rate'] == 7 / 8
+    assert figures['false_alarm_rate'] == 1 / 2
+    # 0.95; the set's 0.55 + 0.45; 0.2; 0; the pairs 0.85 and 0.25
+    assert figures['true_probability_mean'] == pytest.approx((0.95 + 1.0 + 0.2 + 0.85 + 0.25) / 6)
+    assert figures['ci95']['detection_rate'] == list(rate([True] * 7 + [False]))[1:3]
+
+
+def test_figures_of_a_site_by_hand() -> None:
+    """Two healthy cases weigh 0.9 together, the eight others 0.1."""
+    figures = score(CASES)['site']
+    assert figures['healthy'] == 0.9
+    # right: one of two healthy ones; 2 of 4 singles, 1 of 2 pairs, 1 of 2 outside
+    assert figures['right'] == pytest.approx(0.9 / 2 + 0.1 * 4 / 8)
+    assert figures['alarms'] == pytest.approx(0.9 / 2 + 0.1 * 7 / 8)
+    assert figures['alarms_true'] == pytest.approx(0.0875 / (0.45 + 0.0875))
+    # an effect is named first in one healthy case and six others, three of them rightly
+    assert figures['named_right'] == pytest.approx(0.0375 / (0.45 + 0.075))
+    assert math.isnan(score(CASES[:4])['site']['right'])
+
+
+def sized(key: str, truth_values: dict[str, float], parameter: str, unit: str,
+          stated: tuple[float, float, float], family: str = 'a') -> Case:
+    """Return a case whose verdict states the size of its effect."""
+    content = verdict((key, 1.0))
+    content['which'][0]['parameters'] = {f'{key}.{parameter}': {
+        'value': stated[0], 'ci95': list(stated[1:]), 'unit': unit}}
+    made = truth('single', key)
+    made['effects'][0]['parameters'] = truth_values
+    return Case({**made, 'family': family}, parse_verdict(content))
+
+
+def test_sizes_are_compared_in_the_verdicts_own_terms() -> None:
+    cases = [
+        sized('gearbox_1.gap', {'factor': 1.5}, 'change', '1', (0.45, 0.4, 0.6)),
+        sized('axis.mode_frequency', {'factor': 0.8, 'mode': 2.0}, 'change_2', '1',
+              (-0.25, -0.26, -0.24)),
+        # 0.46 ohm doubled
+        sized('motor_2.armature_resistance', {'factor': 2.0}, 'change', 'ohm', (0.46, 0.4, 0.5)),
+        # -10.74 V shifted by a tenth of itself
+        sized('torque_share.fade_out_voltage', {'shift': -1.074}, 'change', '1', (0.12, 0.0, 0.2)),
+        # 0.069 A tripled
+        sized('motors.coulomb_friction', {'factor': 3.0}, 'torque', 'A', (0.138, 0.1, 0.2)),
+        sized('axis.wind_steady', {'torque': -5e4}, 'torque', 'N m', (-6e4, -5.5e4, -6.5e4)),
+        # not comparable: another law, another unit, another parameter
+        sized('axis.viscous_friction', {'coefficient': 1e6}, 'torque_per_rate', 'N m s/rad',
+              (1e6, 9e5, 2e6)),
+        sized('gearbox_1.hysteresis', {'share': 0.1}, 'share', '1', (0.1, 0.0, 1.0), family='b'),
+        sized('gearbox_1.hysteresis', {'share': 0.1}, 'torque', 'N m', (0.1, 0.0, 1.0)),
+        sized('loop.delay', {'delay': 1e-3}, 'error_time', 'ms', (1e-3, 0.0, 1.0))]
+    compared = [size for each in cases for size in each.sizes]
+    assert [size.relative_error for size in compared] == pytest.approx(
+        [0.1, 0.25, 0.0, 0.2, 0.0, 0.2])
+    assert [size.covered for size in compared] == [True, False, True, True, True, False]
+    figures = score(cases)
+    assert figures['sizes_compared'] == 6
+    assert figures['size_error_median'] == pytest.approx(0.15)
+    assert figures['size_coverage'] == pytest.approx(4 / 6)
+
+
+def test_size_of_an_effect_that_is_not_named_first_is_not_compared() -> None:
+    made = sized('gearbox_1.gap', {'factor': 1.5}, 'change', '1', (0.5, 0.4, 0.6))
+    content = verdict(('gearbox_2.gap', 0.6), ('gearbox_1.gap', 0.4))
+    assert Case(made.truth, parse_verdict(content)).sizes == []
+
+
+@pytest.mark.parametrize('parameters', [
+    None, [], {'gearbox_1.gap.change': 0.5}, {'gearbox_1.gap.change': {'value': 0.5}},
+    {'gearbox_1.gap.change': {'value': 0.5, 'ci95': [0.4, None], 'unit': '1'}}])
+def test_verdict_without_an_interval_still_counts(parameters: Any) -> None:
+    """Parameters are scored where they are stated; older verdicts need not."""
+    content = verdict(('gearbox_1.gap', 1.0))
+    content['which'][0]['parameters'] = parameters
+    made = sized('gearbox_1.gap', {'factor': 1.5}, 'change', '1', (0.5, 0.4, 0.6))
+    again = Case(made.truth, parse_verdict(content))
+    assert again.right
+    assert again.sizes == []
+
+
+@given(PLAIN, PLAIN)
+def test_whatever_a_verdict_adds_is_taken_or_refused_by_name(parameters: Any, names: Any) -> None:
+    content = verdict(('gearbox_1.gap', 1.0))
+    content['which'][0]['parameters'] = parameters
+    content['held_back'] = names
+    made = sized('gearbox_1.gap', {'factor': 1.5}, 'change', '1', (0.5, 0.4, 0.6))
+    try:
+        found = parse_verdict(content)
+    except VerdictError as error:
+        assert str(error).startswith('held_back')
+    else:
+        assert all(math.isfinite(size.relative_error) for size in Case(made.truth, found).sizes)
+        assert all('/' not in name for name in found.held_back.values())
+
+
+def test_every_comparable_size_is_a_parameter_of_the_catalogue() -> None:
+    """Names and units against the catalogue, which the trial itself cannot import."""
+    effects = catalogue()
+    compared = 0
+    for key, defect in CATALOGUE.items():
+        values = defect.draw(0.7, np.random.default_rng(1))
+        size = size_of(key, values)
+        if size is None:
+            continue
+        compared += 1
+        units = {p.name: p.unit for form in effects[key].forms for p in form.parameters}
+        assert f'{key}.{size.parameter}' in units
+        assert size.unit in ('', units[f'{key}.{size.parameter}'])
+        assert size.of(values) != 0.0
+    # by hand: motors 21, gearboxes 6, share 5, axis 7, readings 11, loop 1
+    assert compared == 51
+
+
+@pytest.fixture
+def kept_back(tmp_path: Path) -> Path:
+    """Return a wild trial of one case with a recording kept back: a ramp and noise."""
+    column = {'level': 2.0, 'coloured_share': 0.0, 'corner_hz': 1.0}
+    made = {'case': 'case_0001', **truth('single', 'a.x'), 'sample_rate_hz': 100.0,
+            'sheets': [CaseSheet('old', 'old', {'type': 'circuit'}, {}).plain()],
+            'imperfections': {'spike_share': 0.0, 'noise': {
+                name: column for name in ('current_1_A', 'bias_voltage_V')}}}
+    sealing.seal(tmp_path, {'cases': 1}, [made])
+    (tmp_path / 'case_0001').mkdir()
+    (tmp_path / 'kept' / 'case_0001').mkdir(parents=True)
+    time = np.arange(0.0, 20.0, 0.01)
+    noise = np.random.default_rng(5).normal(0.0, 0.02, (2, len(time)))
+    table(tmp_path / 'kept' / 'case_0001' / 'rec_d.csv', time, time + noise[0], noise[1])
+    table(tmp_path / 'case_0001' / 'before.csv', time, time + 1.0, 0.0 * time)
+    return tmp_path
+
+
+def table(path: Path, *columns: Any) -> None:
+    """Write a CSV of time, one current and the bias voltage."""
+    np.savetxt(path, np.transpose(columns), delimiter=',', comments='',
+               header='time_s,current_1_A,bias_voltage_V')
+
+
+def held_back_case(folder: Path, names: Any) -> Case:
+    """Return the case with a verdict that brings predictions."""
+    content = {**verdict(('a.x', 1.0)), 'held_back': names}
+    (folder / 'case_0001' / 'verdict.json').write_text(json.dumps(content))
+    return read_cases(folder)[0][0]
+
+
+@pytest.mark.parametrize(('error', 'closed'), [
+    (0.0, 1.0), (0.5, 0.75), (1.0, 0.0), (3.0, -1.0)])
+def test_what_is_closed_on_the_recording_kept_back(
+        kept_back: Path, error: float, closed: float) -> None:
+    """The mean square of an error of 1 and of `error`; the bias has no gap and does not count."""
+    time = np.arange(-0.005, 20.0, 0.02)    # other rows: predictions are straight lines
+    table(kept_back / 'case_0001' / 'after.csv', time, time + error, 9.0 + 0.0 * time)
+    case = held_back_case(kept_back, {'before': 'before.csv', 'after': 'after.csv'})
+    assert case.closed == pytest.approx(closed, abs=2e-3)
+    assert score([case])['closed_held_back_median'] == pytest.approx(closed, abs=2e-3)
+
+
+def test_without_predictions_nothing_is_said_about_the_recording_kept_back(
+        kept_back: Path) -> None:
+    case = held_back_case(kept_back, None)
+    assert case.verdict is not None
+    assert math.isnan(case.closed)
+
+
+@pytest.mark.parametrize('names', [
+    {'before': 'before.csv', 'after': 'none.csv'}, {'before': 'before.csv'}, 'before.csv',
+    {'before': 'before.csv', 'after': '../kept/case_0001/rec_d.csv'},
+    {'before': 'before.csv', 'after': 'short.csv'},
+    {'before': 'before.csv', 'after': 'words.csv'}])
+def test_predictions_that_are_none_are_a_failure(kept_back: Path, names: Any) -> None:
+    time = np.arange(0.0, 10.0, 0.01)
+    table(kept_back / 'case_0001' / 'short.csv', time, time, time)
+    (kept_back / 'case_0001' / 'words.csv').write_text('time_s\nnever\n')
+    assert held_back_case(kept_back, names).verdict is None
+
+
+def test_noise_of_a_wild_recording_is_what_the_truth_says() -> None:
+    """The floor against the spread of what the recorder adds to a drive that stands still."""
+    made = draw_truths(1, 8, 0.0, wild=True)[0]
+    own = made['imperfections']
+    own |= {'tach_zero_rad_s': [0.0, 0.0], 'amplifier_zero_V': [0.0, 0.0], 'spike_share': 0.01}
+    machine = reference_machine()
+    apply_imperfections(machine, own)
+    columns = imperfect_recording(
+        machine, CaseSheet('old', 'old', {'type': 'fixed', 'voltage_V': 0.0}, {}), own, 500.0,
+        100.0, np.random.default_rng(4))
+    for name in ('current_2_A', 'tach_rate_1_rad_s', 'bias_voltage_V'):
+        assert noise_power(name, made, columns[name]) == pytest.approx(
+            float(np.var(columns[name])), rel=0.12)
+
+
 def test_nothing_scored_is_no_number() -> None:
     figures = score([])
     assert figures['cases'] == 0
+    assert math.isnan(figures['site']['alarms_true'])
     for name in KEYS[2:]:
         assert math.isnan(figures[name])
 

@@ -1,0 +1,206 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Family B: other laws for the same effects, other outsiders and other programmes.
+
+It is used only to report how a diagnosis does on forms that nothing was tuned on; docs/history.md
+lists each use. Effects have the names, numbers and ranges of `effects`. Those in LAWS act by
+another law, the others are changes of a constant and have only one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+from typing import Any
+
+from antenna_drive.trial import programme
+from antenna_drive.trial.effect import Defect, Parameters, Quantity
+from antenna_drive.trial.effects import CATALOGUE as CATALOGUE_A
+from antenna_drive.trial.effects import Change, gust_of, setting
+from antenna_drive.trial.machine import LAW_B, Records
+from antenna_drive.trial.outside import MOTOR, motor_values
+from antenna_drive.trial.wild_programme import knots, levels, Shapes, SIDEREAL_DEG_S
+import numpy as np
+
+LAWS = {
+    'viscous_friction': "Eyring's fluid: c k asinh(w / k), k 100 rad/s or 6.5 mrad/s",
+    'stribeck_friction': 'rise / (1 + (w / half_rate)^2), at rest too',
+    'friction_asymmetry': 'level times exp(share) when positive, exp(-share) when negative',
+    'load_dependent_friction': 'share T_g^2 / (abs(T_g) + 1 N m)',
+    'torque_ripple': 'flattened sine of the shaft angle, tanh(2 sin a) / tanh 2',
+    'amplifier_dead_zone': 'v - d v / sqrt(v^2 + d^2) of the current demand',
+    'hysteresis': "elastic torque times 1 + share z, z' = (v - abs(v) z abs(z)) / 0.07 rad",
+    'transmission_error': 'two harmonics of the motor angle, sin a + 0.3 sin(2 a + 1)',
+    'position_dependent_friction': 'plates: level times 1 + share tanh(3 sin a) / tanh 3',
+    'wind_gust': "24 sines with Kaimal's spectrum, another draw per recording",
+    'bull_gear_backlash': 'both gaps wider by one half gap times 1 + 0.4 sin(elevation)',
+    'ripple': 'two harmonics, sin a + 0.5 sin(2 a + 0.8), in proportion to the rate',
+    'cyclic_error': 'two harmonics, the third a fifth of the first',
+    'delay': 'of the rate error of both motors, as four equal lags'}
+
+
+def _gust(machine: Records, values: Parameters) -> None:
+    # Kaimal's spectrum of wind speed, f S ~ x / (1 + x)^(5/3).
+    gust_of(machine, values, lambda x: x / (1.0 + x)**(5.0 / 3.0))
+
+
+def _under_law_b(change: Change) -> Change:
+    def changed(machine: Records, values: Parameters) -> None:
+        machine.motors['law'] = machine.structure['law'] = machine.sensors['law'] = LAW_B
+        change(machine, values)
+    return changed
+
+
+def _other_law(effect: Defect) -> Defect:
+    name = effect.key.split('.')[1]
+    if name not in LAWS:
+        return effect
+    change = _gust if name == 'wind_gust' else effect.change
+    return replace(effect, form=LAWS[name], change=_under_law_b(change))
+
+
+CATALOGUE = {key: _other_law(effect) for key, effect in CATALOGUE_A.items()}
+
+
+def _shaker(machine: Records, values: Parameters) -> None:
+    machine.structure['gust'][0, 0] = values['torque']
+    machine.structure['gust_frequency'][0, 0] = 2.0 * math.pi * values['frequency']
+
+
+OUTSIDE: dict[str, Defect] = {effect.key: effect for effect in (
+    Defect('outside.tach_saturation', 'a tachometer saturates, L tanh(w / L), inside the loop',
+           (Quantity('limit', 'rad/s', 500.0, 150.0), MOTOR),
+           motor_values(tach_saturation='limit')),
+    Defect('outside.tach_dead_band', 'brush film of a tachometer, w - d tanh(w / d), '
+           'inside the loop',
+           (Quantity('half_width', 'rad/s', 0.03, 1.0), MOTOR),
+           motor_values(tach_dead_band='half_width')),
+    Defect('outside.loop_crosstalk', "a rate loop sees a share of the other motor's rate",
+           (Quantity('share', '1', 0.02, 0.3, turned='sign'), MOTOR),
+           motor_values(loop_crosstalk='share')),
+    Defect('outside.eddy_brake', 'an eddy-current brake drags, most at one rate',
+           (Quantity('torque', 'N m', 0.5, 8.0), MOTOR, Quantity('rate', 'rad/s', 8.0, 40.0)),
+           motor_values(eddy_brake='torque', eddy_rate='rate')),
+    Defect('outside.magnet_saturation', 'torque constant falls with the square of the current',
+           (Quantity('loss', '1/A^2', 0.004, 0.08), MOTOR),
+           motor_values(magnet_saturation='loss')),
+    Defect('outside.mesh_stiffness', 'gear stiffness varies with the angle of the motor',
+           (Quantity('share', '1', 0.05, 0.5), MOTOR, Quantity('cycles', '1/rev', 1, 12, 'whole')),
+           motor_values(mesh_stiffness='share', mesh_stiffness_cycles='cycles')),
+    Defect('outside.structure_play', 'play in the joint of the first mode',
+           (Quantity('half_play', 'rad', 5e-7, 2e-5),),
+           setting('structure', mode_play='half_play')),
+    Defect('outside.cable_wrap', 'a cable wrap pulls in proportion to the angle',
+           (Quantity('stiffness', 'N m/rad', 3e5, 3e7),), setting('structure', cable='stiffness')),
+    Defect('outside.hard_spot', 'one place of the rail rubs harder',
+           (Quantity('share', '1', 0.3, 3.0), Quantity('at', 'rad', 2e-4, 8e-4),
+            Quantity('width', 'rad', 5e-5, 2e-4)),
+           setting('structure', hard_spot='share', hard_spot_at='at', hard_spot_width='width')),
+    Defect('outside.shaker', 'a machine on the dish shakes it at one frequency',
+           (Quantity('torque', 'N m', 3e3, 1e5), Quantity('frequency', 'Hz', 1.5, 7.0)), _shaker),
+    Defect('outside.command_leak', 'the rate command leaks into the torque share',
+           (Quantity('leak', '1/s', 0.06, 1.0, turned='sign'),),
+           setting('circuit', command_leak='leak')),
+    Defect('outside.ammeter_lag', 'the ammeters follow slowly, first order',
+           (Quantity('time', 's', 0.01, 0.3),), setting('sensors', ammeter_lag='time')),
+    Defect('outside.ammeter_crosstalk', 'each ammeter reads a share of the other current',
+           (Quantity('share', '1', 0.08, 0.4, turned='sign'),),
+           setting('sensors', ammeter_crosstalk='share')),
+    Defect('outside.encoder_play', 'the encoder hangs on a coupling with play',
+           (Quantity('half_play', 'rad', 3e-6, 3e-4),),
+           setting('sensors', encoder_play='half_play')),
+)}
+
+
+def _staircase(duration: float, rest: float, random: np.random.Generator) -> dict[str, Any]:
+    """Five steps up and five steps down, in both directions."""
+    hold = programme.log_uniform(2.0, 5.0, 2, random)
+    size = programme.log_uniform(0.04, 0.15, 4, random)
+    starts = np.arange(rest, duration, hold)
+    place = np.arange(len(starts)) % 20
+    rates = size * (5.0 - np.abs(5.0 - place % 10)) / 5.0 * np.where(place < 10, 1.0, -1.0)
+    return levels(starts.tolist(), rates.tolist(), duration + hold)
+
+
+def _raster(duration: float, rest: float, random: np.random.Generator) -> dict[str, Any]:
+    """Scan lines to and fro at a constant rate, on a source that moves."""
+    rate, line = programme.log_uniform(0.03, 0.12, 4, random), float(random.uniform(3.0, 8.0))
+    turn = float(random.uniform(0.3, 1.0))
+    times, rates, t, sign = [rest], [0.0], rest, 1.0
+    while t < duration:
+        for length in (turn, line):
+            t += length
+            times.append(t)
+            rates.append(SIDEREAL_DEG_S + sign * rate)
+        sign = -sign
+    return knots(times, rates)
+
+
+def _saw_tooth(duration: float, rest: float, random: np.random.Generator) -> dict[str, Any]:
+    """Rise slowly through zero, and fly back."""
+    rate, rise = float(random.uniform(0.4, 0.685)), float(random.uniform(3.0, 6.0))
+    back = float(random.uniform(0.3, 1.0))
+    times, rates, t = [rest], [0.0], rest
+    for length, reached in [(0.5 * rise, rate)] + 200 * [(back, -rate), (rise, rate)]:
+        t += length
+        times.append(t)
+        rates.append(reached)
+        if t > duration:
+            break
+    return knots(times, rates)
+
+
+def _sprints(duration: float, rest: float, random: np.random.Generator) -> dict[str, Any]:
+    """Run without a jerk, to and fro in turn: the rate is a raised cosine."""
+    rate = float(random.uniform(0.4, 0.685))
+    run, pause = float(random.uniform(4.0, 7.0)), float(random.uniform(1.0, 2.0))
+    course = 0.5 - 0.5 * np.cos(2.0 * math.pi * np.arange(7) / 6.0)
+    times: list[float] = []
+    rates: list[float] = []
+    t, sign = rest, 1.0
+    while t < duration:
+        times += (t + run * np.arange(7) / 6.0).tolist()
+        rates += (sign * rate * course).tolist()
+        t, sign = t + run + pause, -sign
+    return knots(times, rates)
+
+
+def _random_binary(duration: float, rest: float, random: np.random.Generator) -> dict[str, Any]:
+    """One rate to and fro, reversed at random beats of a clock."""
+    beat = max(float(random.uniform(0.5, 1.2)), duration / 230.0)
+    starts = np.arange(rest, duration, beat)
+    signs = random.choice([-1.0, 1.0], len(starts))
+    # about zero in the mean: the second half repeats the first with the other sign
+    half = len(starts) // 2
+    signs[half:2 * half] = -signs[:half]
+    size = programme.log_uniform(0.05, 0.2, 4, random)
+    return levels(starts.tolist(), (size * signs).tolist(), duration + beat)
+
+
+def _tones(duration: float, rest: float, random: np.random.Generator) -> dict[str, Any]:
+    """Four tones without a common period."""
+    frequencies = [float(f) for f in np.round(
+        [random.uniform(0.1, 0.25), random.uniform(0.5, 1.1), random.uniform(1.9, 3.1),
+         random.uniform(4.0, 7.0)], 4)]
+    return {'type': 'multisine', 'amplitude_deg_s': programme.log_uniform(0.08, 0.2, 4, random),
+            'frequencies_hz': frequencies, 'weights': [0.7, 0.5, 0.4, 0.3],
+            'phases': [round(float(p), 4) for p in random.uniform(0.0, 2.0 * math.pi, 4)],
+            'start_s': round(max(rest, 0.5), 2)}
+
+
+SHAPES: Shapes = {
+    'slow': {'staircase': _staircase, 'raster': _raster},
+    'fast': {'saw_tooth': _saw_tooth, 'sprints': _sprints},
+    'broad': {'random_binary': _random_binary, 'tones': _tones}}
