@@ -21,12 +21,14 @@ something else in its `step`, has none.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from antenna_drive.emulator.unit import FloatArray, Unit
 from antenna_drive.emulator.units import BlockUnit, inner_steps, SourceUnit
 from antenna_drive.physics import signal_generator
+from antenna_drive.physics.block import Block
 from antenna_drive.physics.compiling import inner
 import numpy as np
 
@@ -54,31 +56,35 @@ class Form(NamedTuple):
     folder: Path
 
 
-def _of_block(unit: Any) -> Form:
-    step = unit.block.step
-    record, x, mode, _, work, y = unit.memory()
+@cache
+def _advance_block(block: Block) -> Any:
+    step = block.step
 
     @inner
     def advance(k: int, h: float, u: FloatArray, y: FloatArray, memory: Any) -> None:
         p, x, mode, work, steps = memory
         step(x, mode, u, p[0], h, steps, work, y)
 
+    return advance
+
+
+@inner
+def _advance_source(k: int, h: float, u: FloatArray, y: FloatArray, memory: Any) -> None:
+    origins, record, bits, rows = memory
+    signal_generator.sample(k + 1, 1, h, origins, record, bits, rows)
+
+
+def _of_block(unit: Any) -> Form:
+    record, x, mode, _, work, y = unit.memory()
     rates = unit.block.rates.function
-    return Form(f'{rates.__module__}.{rates.__qualname__}', advance,
+    return Form(f'{rates.__module__}.{rates.__qualname__}', _advance_block(unit.block),
                 lambda step_s: (record, x, mode, work, inner_steps(step_s)), y,
                 lambda step: None, unit.block.folder)
 
 
 def _of_source(unit: Any) -> Form:
     y = np.zeros((1, len(unit.outputs), 2))
-    sample = signal_generator.sample
-
-    @inner
-    def advance(k: int, h: float, u: FloatArray, y: FloatArray, memory: Any) -> None:
-        origins, record, bits, rows = memory
-        sample(k + 1, 1, h, origins, record, bits, rows)
-
-    return Form(signal_generator.__name__, advance, lambda step_s: (*unit.memory(), y), y[0],
+    return Form(signal_generator.__name__, _advance_source, lambda step_s: (*unit.memory(), y), y[0],
                 unit.reached, Path(signal_generator.__file__).resolve().parent)
 
 

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 import ctypes
+from functools import cache
 from pathlib import Path
 import time
 from typing import Any, Protocol
@@ -95,13 +96,18 @@ class Channel(Protocol):
         """Give back the memory of a message larger than any of ours."""
 
 
-def compiled_exchange(form: Form) -> Any:
-    """Return the compiled loop for a unit: (state, memory) -> reason."""
-    text = _LOOP.format(unit=form.name, step=Word.step, step_s=Time.step_s)
-    names = {'advance': form.advance, 'gather': loop.gather, 'may_step': loop.may_step,
+@cache
+def _compiled(name: str, advance: Any, folder: Path) -> Any:
+    """Return the compiled loop for a `Form`: (state, memory) -> reason."""
+    text = _LOOP.format(unit=name, step=Word.step, step_s=Time.step_s)
+    names = {'advance': advance, 'gather': loop.gather, 'may_step': loop.may_step,
              'read_inputs': loop.read_inputs, 'put_out': loop.put_out}
-    folders = frozenset({Path(__file__).resolve().parent, form.folder})
+    folders = frozenset({Path(__file__).resolve().parent, folder})
     return generated('exchange', text, names, folders).exchange.dispatcher
+
+
+def _loop_of(form: Form) -> Any:
+    return _compiled(form.name, form.advance, form.folder)
 
 
 def compile_ahead(unit: Unit) -> None:
@@ -110,7 +116,7 @@ def compile_ahead(unit: Unit) -> None:
     form = form_of(unit)
     if form is not None:
         state = _state(1, 1, 1, 1, len(unit.inputs), form.outputs, 0)
-        compiled_exchange(form).compile((numba.typeof(state), numba.typeof(form.memory(1e-3))))
+        _loop_of(form).compile((numba.typeof(state), numba.typeof(form.memory(1e-3))))
 
 
 def _state(peers: int, stepping: int, longest: int, length: int, inputs: int,
@@ -155,7 +161,7 @@ class Exchange:
         self._member = member
         self._form = form
         self._channel = channel
-        self._loop = compiled_exchange(form)
+        self._loop = _loop_of(form)
         self._peers = tuple(member.inbox.slots)
         self._rows = {peer: row for row, peer in enumerate(self._peers)}
         self.steps = 0

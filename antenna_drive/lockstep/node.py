@@ -137,10 +137,14 @@ class DriveNode:
             if form is None:
                 raise Unusable('the unit is in plain Python')
             self._channel = RclChannel(self._node, self._link)
-            self._report.exchange = Exchange(self._member, form, self._channel)
+            self._report.exchange = Exchange(self._member, form, self._channel, self._stamps())
         except Unusable as reason:
             self._node.get_logger().info(f'the exchange runs in Python: {reason}')
         return self._report.exchange
+
+    def _stamps(self) -> int:
+        """Return of how many steps the compiled exchange notes the time; for a benchmark."""
+        return 0
 
     def _make_member(self, birth: float, overrides: ros_parameters.Overrides,
                      own: dict[str, tuple[Entry, Value]]) -> Member:
@@ -239,7 +243,7 @@ class DriveNode:
         before = member.step
         reason = exchange.run(self._every, pace)
         if member.step != before:
-            self._made(exchange.outputs)
+            self._made(exchange, before)
         if reason in (compiled_loop.TAKE_FAILED, compiled_loop.PUBLISH_FAILED):
             self._give_up(exchange, reason)
         elif reason == compiled_loop.MISSING:
@@ -247,11 +251,11 @@ class DriveNode:
         return member.step != before and reason == compiled_loop.LIMIT or reason in (
             compiled_loop.STEPPED, compiled_loop.FOREIGN, compiled_loop.MISSING)
 
-    def _made(self, outputs: FloatArray) -> None:
-        """Do what is due after steps of the compiled exchange."""
+    def _made(self, exchange: Exchange, before: int) -> None:
+        """Do what is due after the steps that the compiled exchange has made since `before`."""
         member = self._member
         if self._every and member.step % self._every == 0 and not member.fault:
-            self._readings.publish(member.step, member.step_s, outputs)
+            self._readings.publish(member.step, member.step_s, exchange.outputs)
         self._stepped()
 
     def _give_up(self, exchange: Exchange, reason: int) -> None:
