@@ -22,7 +22,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-from antenna_drive.bench.stamps import Stamps
+from antenna_drive.bench.stamps import Stamps, WARM_STEPS
 from antenna_drive.emulator.wiring import DRIVE
 
 
@@ -30,6 +30,7 @@ def main() -> int:
     """Run the node of UNIT and record its steps; return its exit code."""
     from antenna_drive.emulator.unit import FloatArray
     from antenna_drive.lockstep import node
+    from antenna_drive.lockstep.exchange import Exchange
 
     unit, path, last, *arguments = sys.argv[1:]
     stamps = Stamps(path, int(last))
@@ -41,6 +42,19 @@ def main() -> int:
                 stamps.due_s = self._pace.due(0, self._member.step_s)
             stamps.note(step)
             super()._publish(outputs)
+
+        def _make_exchange(self) -> Exchange | None:
+            exchange = super()._make_exchange()
+            if exchange is not None:
+                exchange.pauses = [WARM_STEPS, int(last)]
+            return exchange
+
+        def _stamps(self) -> int:
+            return int(last) + 1
+
+        def _made(self, exchange: Exchange, before: int) -> None:
+            stamps.note_all(exchange.stamps, before + 1, self._member.step)
+            super()._made(exchange, before)
 
     node.DriveNode = MeasuredNode  # type: ignore[misc]
     return int(importlib.import_module(DRIVE.units[unit].node).main(arguments))

@@ -55,6 +55,15 @@ class Stamps:
         if step > self._last:
             return
         self._times[step] = time.monotonic_ns()
+        self._note_time_used(step)
+
+    def note_all(self, times: NDArray[np.float64], first: int, last: int) -> None:
+        """Record the times [s] that a compiled loop has noted of steps `first` to `last`."""
+        last = min(last, self._last)
+        self._times[first:last + 1] = 1e9 * times[first:last + 1]
+        self._note_time_used(last)
+
+    def _note_time_used(self, step: int) -> None:
         if step == WARM_STEPS:
             self._cpu_s = time.process_time()
         elif step == self._last:

@@ -161,6 +161,14 @@ class SourceUnit(_DriveUnit):
             if part in ('rate', 'torque') and key not in self._SCALES:
                 self._origins[0 if part == 'rate' else 1] = self._next * self._step_s
 
+    def memory(self) -> tuple[Any, ...]:
+        """Return the waveforms' origins, record and bits, for a compiled loop."""
+        return self._origins, self._record, self._bits
+
+    def reached(self, k: int) -> None:
+        """Note that a compiled loop has given the test signals up to t_k."""
+        self._next = k + 1
+
     def ahead(self, k: int, count: int) -> FloatArray:
         """
         Give the test signals at t_k+1 and the macro-steps after it, as `step` would.

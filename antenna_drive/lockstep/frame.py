@@ -53,11 +53,11 @@ class FrameLayout:
         self.signals = tuple(signals)
         self.length = len(columns)
         self.label = ', '.join(columns)
-        self._prefix = _cdr_prefix(self.label, self.length)
+        self.prefix = _cdr_prefix(self.label, self.length)
         self._data = struct.Struct(f'<{self.length}d')
         self._header = struct.Struct('<3d')
         self._outputs = struct.Struct(f'<{2 * len(self.signals)}d')
-        self._size = len(self._prefix) + self._data.size
+        self._size = len(self.prefix) + self._data.size
 
     def encode(self, run: float, step: int, step_s: float, packed: bytes = b'') -> bytes:
         """
@@ -71,7 +71,12 @@ class FrameLayout:
             value and time derivative of each signal, as little-endian doubles
 
         """
-        return self._prefix + self._header.pack(run, step, step_s) + packed
+        return self.prefix + self._header.pack(run, step, step_s) + packed
+
+    @property
+    def packed_size(self) -> int:
+        """Return how many bytes `encode` packs behind the header."""
+        return self._outputs.size
 
     def unpack(self, packed: bytes) -> tuple[float, ...]:
         """Return the values and derivatives that `encode` packs behind the header."""
@@ -83,9 +88,9 @@ class FrameLayout:
 
     def decode(self, message: bytes) -> tuple[float, ...] | None:
         """Return the numbers of a message of exactly this layout, None for any other message."""
-        if len(message) != self._size or not message.startswith(self._prefix):
+        if len(message) != self._size or not message.startswith(self.prefix):
             return None
-        return self._data.unpack_from(message, len(self._prefix))
+        return self._data.unpack_from(message, len(self.prefix))
 
 
 def _cdr_prefix(label: str, length: int) -> bytes:

@@ -165,6 +165,21 @@ class Inbox:
         while self._early and self.step - self._early[0][2] > DEPTH:
             self.refuse(self._early.popleft()[0], Refusal.WRONG_RUN)
 
+    def resume(self, step: int) -> None:
+        """Want the frames of `step` next: somebody else has used those before it."""
+        self.step = step
+        self._awaited = (self.run, float(step))
+
+    @property
+    def stepping(self) -> tuple[str, ...]:
+        """Return the peers that are waited for at every step, the slowest first."""
+        return tuple(self._stepping)
+
+    @property
+    def holds_early(self) -> bool:
+        """Return whether frames of another run wait for their fate."""
+        return bool(self._early)
+
     def holds(self, peer: str) -> bool:
         """Return whether the peer's frame of the current step is there."""
         return self.slots[peer][self.step % DEPTH] is not None

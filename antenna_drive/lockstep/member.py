@@ -53,6 +53,8 @@ class Member:
     run, step, step_s : the run (0.0: none yet), the step last put out, its length [s]
     resting : True when the conductor has said that no run is in progress
     fault : why the unit cannot go on in this run, '' if it can
+    sources : of each input of the unit, the peer and the column of its value in a frame
+    packed : the bytes of the outputs last put out
 
     """
 
@@ -87,7 +89,7 @@ class Member:
         self.birth = birth
         self.conductor = conductor
         self.layout = FrameLayout(unit.outputs)
-        columns = [_column(name, outputs) for name in unit.inputs]
+        columns = self.sources = [_column(name, outputs) for name in unit.inputs]
         peers = {peer: None for peer, _ in columns}
         if unit.name != conductor:
             peers[conductor] = None
@@ -106,12 +108,12 @@ class Member:
         # one memory: a numpy array is slow to write single numbers to
         self._numbers = array('d', bytes(2 * 8 * len(columns)))
         self._inputs = np.asarray(self._numbers).reshape(-1, 2)
-        self._packed = b''
+        self.packed = bytes(self.layout.packed_size)
         self._shape = (len(unit.outputs), 2)
         self._reads_itself = any(peer == unit.name for peer, _ in columns)
         self._own_slots: list[Frame | None] = [None] * DEPTH
-        self._sources = [(self._own_slots if peer == unit.name else self.inbox.slots[peer], column)
-                         for peer, column in columns]
+        self._read = [(self._own_slots if peer == unit.name else self.inbox.slots[peer], column)
+                      for peer, column in columns]
 
     @property
     def run(self) -> float:
@@ -189,6 +191,17 @@ class Member:
             return None
         return None if self.inbox.missing() else self._advance()
 
+    def steady(self) -> bool:
+        """Return whether nothing is due but the next steps of the run in progress."""
+        return (self.run != NO_RUN and not self.fault and self._announced is None
+                and not self.inbox.holds_early)
+
+    def follow(self, step: int, outputs: FloatArray) -> None:
+        """Take over at `step` from whoever has made the steps up to it with this unit."""
+        self.inbox.resume(step)
+        self.step = step
+        self._checked(outputs)
+
     def _begin_announced(self, frame: Frame) -> FloatArray | None:
         self._announced = None
         outputs = self._begin(frame[0], frame[2])
@@ -197,7 +210,7 @@ class Member:
 
     def message(self) -> bytes:
         """Return the serialised message of the step last put out."""
-        return self.layout.encode(self.run, self.step, self.step_s, self._packed)
+        return self.layout.encode(self.run, self.step, self.step_s, self.packed)
 
     def _begin(self, run: float, step_s: float, step: int = 0) -> FloatArray | None:
         self.inbox.begin(run, step)
@@ -211,7 +224,7 @@ class Member:
         slot = self.step % DEPTH
         numbers = self._numbers
         place = 0
-        for slots, column in self._sources:
+        for slots, column in self._read:
             frame = slots[slot]
             assert frame is not None
             numbers[place] = frame[column]
@@ -231,7 +244,7 @@ class Member:
             packed = outputs.tobytes()
             values = self.layout.unpack(packed)
             if all_finite(values):
-                self._packed = packed
+                self.packed = packed
                 if self._reads_itself:
                     self._own_slots[self.step % DEPTH] = (
                         self.run, float(self.step), self.step_s, *values)
@@ -332,7 +345,7 @@ class Conductor(Member):
         self.wanted_step_s = step_s
         self.last_step = last_step
         self.ended = False
-        self._used = dict.fromkeys(observers, 0.0)
+        self.used = dict.fromkeys(observers, 0.0)
         self._heard: dict[str, float] = {}
         self._begin_again = True
         # Our step when a member said hello, or last spoke of another run.
@@ -352,13 +365,13 @@ class Conductor(Member):
             self.inbox.refuse(peer, Refusal.WRONG_RUN)
             self._hear(peer, frame)
             self._elsewhere_at[peer] = self.step
-        elif peer in self._used and frame[0] == self.run:
-            self._used[peer] = max(self._used[peer], frame[1])
+        elif peer in self.used and frame[0] == self.run:
+            self.used[peer] = max(self.used[peer], frame[1])
         else:
             self.inbox.offer(peer, frame)
             for name, birth in self.inbox.hellos:
                 self._heard[name] = max(self._heard[name], birth)
-                if name in self._used or self.ended or self.fault:
+                if name in self.used or self.ended or self.fault:
                     self._begin_again = True
                 self._hello_at[name] = self.step
             self.inbox.hellos.clear()
@@ -388,7 +401,7 @@ class Conductor(Member):
         if self.run == NO_RUN:
             return self.unheard()
         missing = self.inbox.missing()
-        if self._used:
+        if self.used:
             missing += self._behind()
         return missing
 
@@ -397,7 +410,12 @@ class Conductor(Member):
         least = self.step - SLACK
         if self.last_step is not None and self.step > self.last_step:
             least = self.step
-        return tuple(name for name, used in self._used.items() if used < least)
+        return tuple(name for name, used in self.used.items() if used < least)
+
+    def steady(self) -> bool:
+        """Return whether nothing is due but the next steps of the run in progress."""
+        return (super().steady() and not self.ended and not self._begin_again
+                and (self.last_step is None or self.step < self.last_step))
 
     def new_run(self, now: float, stands_still: bool = False) -> FloatArray | None:
         """
@@ -425,7 +443,7 @@ class Conductor(Member):
         self._hello_at.clear()
         self._elsewhere_at.clear()
         self.ended = False
-        self._used = dict.fromkeys(self._used, 0.0)
+        self.used = dict.fromkeys(self.used, 0.0)
         run = max(float(int(now)), self.birth + 1.0, self.run + 1.0,
                   *(heard + 1.0 for heard in self._heard.values()))
         return self._begin(run, self.wanted_step_s)

@@ -22,9 +22,12 @@ import time
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
-from antenna_drive.lockstep import ros_parameters
+from antenna_drive.lockstep import compiled_loop, ros_parameters
+from antenna_drive.lockstep.compiled_unit import form_of
+from antenna_drive.lockstep.exchange import BRIEF_WAIT_S, Exchange
 from antenna_drive.lockstep.member import Conductor, Member
 from antenna_drive.lockstep.pace import LEAD_S, Pace
+from antenna_drive.lockstep.rcl_channel import RclChannel, Unusable
 from antenna_drive.lockstep.readings import ChangeRecord, READING_QOS, Readings
 from antenna_drive.lockstep.report import Report
 from antenna_drive.lockstep.ros_link import FrameLink
@@ -32,9 +35,6 @@ from antenna_drive.lockstep.serving import Serving
 from antenna_drive.parameters.schema import Entry, Value
 from rclpy.node import Node
 from std_msgs.msg import Float64
-
-# A wait for a single peer [s]; after it, whatever may come ends a wait.
-_BRIEF_WAIT_S = 0.02
 
 # No wait is longer than this [s]: signals and reports are served in between.
 _LONGEST_WAIT_S = 0.2
@@ -47,11 +47,13 @@ PACE = Entry('1', 0.0, 1e3, 'how many times faster than real time, 0: as fast as
              live=True)
 LEAD = Entry('s', 0.0, 1.0, 'how long before it is due a step may be made')
 STEP = Entry('s', 1e-5, 0.1, 'macro-step')
+EXCHANGE = Entry('', description='auto: the compiled exchange where it can be used; '
+                 'python: the exchange in Python', choices=('auto', 'python'))
 DURATION = Entry('s', 0.0, 1e9, 'simulated time after which the run ends, 0: never')
 
 # What a node itself may be told, beside the settings of its unit.
-OWN_PARAMETERS = ('config', 'wiring', 'publish_rate', 'run.step', 'run.pace', 'run.lead',
-                  'run.duration', 'run.observers')
+OWN_PARAMETERS = ('config', 'wiring', 'exchange', 'publish_rate', 'run.step', 'run.pace',
+                  'run.lead', 'run.duration', 'run.observers')
 
 
 class DriveNode:
@@ -100,6 +102,8 @@ class DriveNode:
             name: item for name, item in unit.settings().items() if name not in fed_by_topic}
         rate_hz = overrides.number('publish_rate', PUBLISH_RATE, 100.0)
         own: dict[str, tuple[Entry, Value]] = {'publish_rate': (PUBLISH_RATE, rate_hz)}
+        exchange = overrides.get('exchange', EXCHANGE, 'auto')
+        own['exchange'] = (EXCHANGE, exchange)
         self._pace: Pace | None = None
         self._member = self._make_member(birth, overrides, own)
         overrides.check_all_known([*settings, *own])
@@ -110,7 +114,7 @@ class DriveNode:
         ros_parameters.declare(node, {**settings, **own})
         self._own_entries = {name: entry for name, (entry, _) in own.items()}
         self._link = FrameLink(node, self._member.layouts)
-        self.tuning.wake = self._link.wake
+        self.tuning.wake = self._wake
         self._readings = Readings(node, unit.outputs, rate_hz, self._pace is not None,
                                   _number(settings.get(_AMPERES)))
         self._record = ChangeRecord(node)
@@ -123,6 +127,24 @@ class DriveNode:
         self._quiet = False
         self._stands_still = False
         self._said_end = False
+        self._channel: RclChannel | None = None
+        self._exchange = self._make_exchange() if exchange == 'auto' else None
+
+    def _make_exchange(self) -> Exchange | None:
+        """Make the compiled exchange, or say once why there is none."""
+        form = form_of(self._unit)
+        try:
+            if form is None:
+                raise Unusable('the unit is in plain Python')
+            self._channel = RclChannel(self._node, self._link)
+            self._report.exchange = Exchange(self._member, form, self._channel, self._stamps())
+        except Unusable as reason:
+            self._node.get_logger().info(f'the exchange runs in Python: {reason}')
+        return self._report.exchange
+
+    def _stamps(self) -> int:
+        """Return of how many steps the compiled exchange notes the time; for a benchmark."""
+        return 0
 
     def _make_member(self, birth: float, overrides: ros_parameters.Overrides,
                      own: dict[str, tuple[Entry, Value]]) -> Member:
@@ -161,15 +183,27 @@ class DriveNode:
         if 'publish_rate' in own:
             self._readings.rate_hz = _as_float(own['publish_rate'])
             self._every = self._readings.every(self._member.step_s or 1e-3)
+            self._wake()
         if 'run.pace' in own and self._pace is not None:
+            exchange = self._exchange
             self._pace.change(_as_float(own['run.pace']), time.monotonic(),
-                              self._member.step)
-            self._link.wake()
+                              self._member.step if exchange is None else exchange.step)
+            self._wake()
         return ''
+
+    def _wake(self) -> None:
+        """End a wait, or a turn of the compiled exchange, from any thread."""
+        exchange = self._exchange
+        if exchange is not None:
+            exchange.ask()
+        self._link.wake()
 
     def stop(self) -> None:
         """End `spin` soon; may be called from a signal handler."""
         self._stop = True
+        exchange = self._exchange
+        if exchange is not None:
+            exchange.ask()
 
     def spin(self) -> None:
         """Take part in runs until `stop` is called."""
@@ -179,6 +213,8 @@ class DriveNode:
             gc.freeze()
             self._hello()
             while not self._stop:
+                if self._exchange is not None and self._exchanged(self._exchange):
+                    continue
                 outputs = self._go_on()
                 if outputs is not None:
                     self._publish(outputs)
@@ -186,6 +222,49 @@ class DriveNode:
                     self._wait_for_anything()
         finally:
             serving.close()
+            self._exchange = None
+            if self._channel is not None:
+                self._channel.close()
+
+    def _exchanged(self, exchange: Exchange) -> bool:
+        """
+        Let the compiled exchange make the steps that it can make.
+
+        Returns
+        -------
+        False if something is due that only Python does
+
+        """
+        member, pace = self._member, self._pace
+        exchange.listen()
+        if (self._stop or self._quiet or self.tuning.pending or not member.steady()
+                or pace is not None and pace.factor > 0.0 and not pace.begun):
+            return False
+        before = member.step
+        reason = exchange.run(self._every, pace)
+        if member.step != before:
+            self._made(exchange, before)
+        if reason in (compiled_loop.TAKE_FAILED, compiled_loop.PUBLISH_FAILED):
+            self._give_up(exchange, reason)
+        elif reason == compiled_loop.MISSING:
+            self._wait_for_anything()
+        return member.step != before and reason == compiled_loop.LIMIT or reason in (
+            compiled_loop.STEPPED, compiled_loop.FOREIGN, compiled_loop.MISSING)
+
+    def _made(self, exchange: Exchange, before: int) -> None:
+        """Do what is due after the steps that the compiled exchange has made since `before`."""
+        member = self._member
+        if self._every and member.step % self._every == 0 and not member.fault:
+            self._readings.publish(member.step, member.step_s, exchange.outputs)
+        self._stepped()
+
+    def _give_up(self, exchange: Exchange, reason: int) -> None:
+        self._exchange = self._report.exchange = None
+        self._node.get_logger().warning(
+            f'the exchange goes on in Python: {compiled_loop.REASONS[reason]}, '
+            f'status {exchange.status}')
+        if reason == compiled_loop.PUBLISH_FAILED and not self._member.fault:
+            self._link.publish(self._member.message())
 
     def _hello(self) -> None:
         self._link.publish(self._member.layout.hello(self._member.birth))
@@ -227,6 +306,9 @@ class DriveNode:
             self._begun()
         if self._every and step % self._every == 0:
             self._readings.publish(step, member.step_s, outputs)
+        self._stepped()
+
+    def _stepped(self) -> None:
         self._quiet = self._stands_still = False
         self._report.stepped()
         now = time.monotonic()
@@ -260,7 +342,7 @@ class DriveNode:
         for peer in missing:
             frame = link.take(peer)
             if frame is None:
-                link.wait_for(peer, _BRIEF_WAIT_S)
+                link.wait_for(peer, BRIEF_WAIT_S)
                 frame = link.take(peer)
                 if frame is None:
                     return False

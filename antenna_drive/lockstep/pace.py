@@ -61,6 +61,16 @@ class Pace:
         self._start = now
         self._first_step = step
 
+    @property
+    def begun(self) -> bool:
+        """Return whether the timetable has begun."""
+        return self._begun
+
+    @property
+    def timetable(self) -> tuple[float, int]:
+        """Return when the timetable began on the caller's clock [s], and with which step."""
+        return self._start, self._first_step
+
     def due(self, step: int, step_s: float) -> float:
         """Return when `step` is due at this pace, which is not 0, on the caller's clock [s]."""
         return self._start + (step - self._first_step) * step_s / self.factor

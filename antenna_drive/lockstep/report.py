@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from antenna_drive.lockstep.exchange import Exchange
 from antenna_drive.lockstep.member import Conductor, Member
 from antenna_drive.lockstep.pace import Pace
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -60,6 +61,7 @@ class Report:
         self.next_s = 0.0
         self.last_change = ''
         self.refused_values = 0
+        self.exchange: Exchange | None = None
 
     def stepped(self) -> None:
         """Note that the node has gone on."""
@@ -155,5 +157,8 @@ class Report:
         if self._pace is not None:
             values.append(('pace', repr(self._pace.factor)))
             values.append(('late steps', str(self._pace.late_steps)))
+        values.append(('exchange', 'compiled' if self.exchange else 'Python'))
+        if self.exchange:
+            values.append(('compiled steps', str(self.exchange.steps)))
         values.append(('last change', self.last_change))
         return values

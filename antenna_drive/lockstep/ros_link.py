@@ -42,7 +42,7 @@ FRAME_QOS = QoSProfile(
 )
 
 
-class _NotForExecutors(CallbackGroup):
+class NotForExecutors(CallbackGroup):
     """The group of the subscriptions that no executor may serve."""
 
     def can_execute(self, entity: Any) -> bool:
@@ -63,7 +63,7 @@ class FrameLink:
         self._layouts = dict(layouts)
         self._publisher = node.create_publisher(
             Float64MultiArray, f'{node.get_name()}/frame', FRAME_QOS)
-        self._group = _NotForExecutors()
+        self._group = NotForExecutors()
         self._subscriptions = {
             peer: node.create_subscription(
                 Float64MultiArray, f'{peer}/frame', _never_called, FRAME_QOS,
@@ -94,7 +94,7 @@ class FrameLink:
             return None
         message: bytes = taken[0]  # type: ignore[assignment]
         frame = decode(message)
-        return _read(message) if frame is None else frame
+        return read_message(message) if frame is None else frame
 
     def wait_for(self, peer: str, timeout_s: float) -> None:
         """Sleep until a frame of this peer is there or time is up."""
@@ -118,13 +118,24 @@ class FrameLink:
         """End a wait, from any thread."""
         self._guard.trigger()
 
+    def handles(self) -> tuple[Any, Any, dict[str, Any]]:
+        """Return rclpy's handles of publisher, guard condition and subscriptions by peer."""
+        return self._publisher.handle, self._guard_handle, self._handles
+
     def publishers(self) -> dict[str, int]:
         """Return how many publishers each peer's frame topic has."""
         return {peer: item.get_publisher_count() for peer, item in self._subscriptions.items()}
 
 
-def _read(message: bytes) -> tuple[float, ...]:
-    # Somebody else's layout or byte order, or no Float64MultiArray at all.
+def read_message(message: bytes) -> tuple[float, ...]:
+    """
+    Return the numbers of a message of somebody else's layout or byte order.
+
+    Returns
+    -------
+    none at all if it is no Float64MultiArray, or longer than any that is taken
+
+    """
     if len(message) > FRAME.value():
         return ()
     try:

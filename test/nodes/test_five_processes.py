@@ -40,6 +40,11 @@ from antenna_drive.lockstep.processes import DriveProcesses  # noqa: E402, I100
 from drive_watch import Recorder, Watch  # noqa: E402
 
 NAME = 'watcher'
+PYTHON = {'exchange': 'python'}
+# The exchange of each unit: compiled where nothing is said.
+EXCHANGES: dict[str, dict[str, Any]] = {
+    'compiled': {}, 'mixed': {'motor_1': PYTHON, 'plant': PYTHON},
+    'python': dict.fromkeys(UNITS, PYTHON)}
 ENDLESS: dict[str, Any] = {'run.pace': 0.0, 'run.observers': [NAME]}
 
 
@@ -50,6 +55,23 @@ def in_process(steps: int, step_s: float, config: tuple[str, ...] = (),
     samples = simulate(drive, steps * step_s, step_s, changes).samples
     assert samples.shape[0] == steps + 1
     return samples
+
+
+def on(exchange: str, parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Return parameters of nodes with those of an exchange."""
+    return {unit: {**EXCHANGES[exchange].get(unit, {}), **parameters.get(unit, {})}
+            for unit in UNITS}
+
+
+def assert_exchange(watch: Watch, exchange: str) -> None:
+    """Make sure that each node's exchange is the one that it was told, and makes steps."""
+    for unit in UNITS:
+        if unit in EXCHANGES[exchange]:
+            watch.until(lambda unit=unit: watch.value(  # type: ignore[misc]
+                unit, 'exchange') == 'Python', f'the exchange of {unit}')
+        else:
+            watch.until(lambda unit=unit: int(watch.value(  # type: ignore[misc]
+                unit, 'compiled steps') or 0) > 100, f'compiled steps of {unit}')
 
 
 def assert_same_bits(got: FloatArray, want: FloatArray) -> None:
@@ -79,10 +101,11 @@ def test_random_start_order_and_a_busy_machine_change_no_bit() -> None:
 
 
 @pytest.mark.usefixtures('fresh_domain')
-def test_changes_refusals_and_foreign_frames_in_one_run() -> None:
+@pytest.mark.parametrize('exchange', EXCHANGES)
+def test_changes_refusals_and_foreign_frames_in_one_run(exchange: str) -> None:
     parameters = {'test_signal': {**ENDLESS, 'waveform': 'external', 'run.step': 2e-3}}
     with Watch() as watch, Recorder(NAME) as recorder, DriveProcesses(
-            parameters) as processes:
+            on(exchange, parameters)) as processes:
         watch.until(lambda: _at_step(recorder, processes, 50), 'step 50')
         command = watch.float_publisher('test_signal/external')
         for value in (1e-4, -2e-4, 3e-4):
@@ -90,6 +113,7 @@ def test_changes_refusals_and_foreign_frames_in_one_run() -> None:
             command(value)
             watch.until(lambda noted=noted: len(recorder.changes) > noted,  # type: ignore[misc]
                         'the command in the record')
+        assert_exchange(watch, exchange)
         _change_live(watch)
         _attack(watch, recorder)
         target = recorder.steps + 500
@@ -166,9 +190,11 @@ def _attack(watch: Watch, recorder: Recorder) -> None:
 
 
 @pytest.mark.usefixtures('fresh_domain')
-def test_each_node_killed_is_missed_and_started_again_begins_a_new_run() -> None:
+@pytest.mark.parametrize('exchange', EXCHANGES)
+def test_each_node_killed_is_missed_and_started_again_begins_a_new_run(
+        exchange: str) -> None:
     with Watch() as watch, Recorder(NAME) as recorder, DriveProcesses(
-            {'test_signal': ENDLESS}) as processes:
+            on(exchange, {'test_signal': ENDLESS})) as processes:
         watch.until(lambda: _at_step(recorder, processes, 100), 'step 100')
         pids = {unit: processes.process(unit).pid for unit in UNITS}
         for victim in UNITS:
@@ -198,9 +224,10 @@ def test_each_node_killed_is_missed_and_started_again_begins_a_new_run() -> None
 
 
 @pytest.mark.usefixtures('fresh_domain')
-def test_a_run_that_somebody_invents_stops_no_drive() -> None:
+@pytest.mark.parametrize('exchange', EXCHANGES)
+def test_a_run_that_somebody_invents_stops_no_drive(exchange: str) -> None:
     with Watch() as watch, Recorder(NAME) as recorder, DriveProcesses(
-            {'test_signal': ENDLESS}) as processes:
+            on(exchange, {'test_signal': ENDLESS})) as processes:
         watch.until(lambda: _at_step(recorder, processes, 100), 'step 100')
         length = 3 + 2 * sum(
             name.startswith('test_signal/') for name in recorder.observer.names)

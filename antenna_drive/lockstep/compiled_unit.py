@@ -1,0 +1,99 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The unit of a member in a form that the compiled exchange can call.
+
+Units of exactly these types have one; a unit in plain Python, or a subclass that may do
+something else in its `step`, has none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from antenna_drive.emulator.unit import FloatArray, Unit
+from antenna_drive.emulator.units import BlockUnit, inner_steps, SourceUnit
+from antenna_drive.physics import signal_generator
+from antenna_drive.physics.block import Block
+from antenna_drive.physics.compiling import inner
+import numpy as np
+
+
+class Form(NamedTuple):
+    """
+    What a compiled loop needs of a unit.
+
+    Attributes
+    ----------
+    name : tells the form from others
+    advance : compiled (k, h, u, y, memory), one macro-step of h [s] from step k
+    memory : gives the last argument, for a macro-step [s]; asked anew after each change
+    outputs : y, value and time derivative in each row
+    reached : tells the unit that the loop has gone on to a step
+    folder : of the sources that it is compiled from
+
+    """
+
+    name: str
+    advance: Any
+    memory: Callable[[float], tuple[Any, ...]]
+    outputs: FloatArray
+    reached: Callable[[int], None]
+    folder: Path
+
+
+@cache
+def _advance_block(block: Block) -> Any:
+    step = block.step
+
+    @inner
+    def advance(k: int, h: float, u: FloatArray, y: FloatArray, memory: Any) -> None:
+        p, x, mode, work, steps = memory
+        step(x, mode, u, p[0], h, steps, work, y)
+
+    return advance
+
+
+@inner
+def _advance_source(k: int, h: float, u: FloatArray, y: FloatArray, memory: Any) -> None:
+    origins, record, bits, rows = memory
+    signal_generator.sample(k + 1, 1, h, origins, record, bits, rows)
+
+
+def _of_block(unit: Any) -> Form:
+    record, x, mode, _, work, y = unit.memory()
+    rates = unit.block.rates.function
+    return Form(f'{rates.__module__}.{rates.__qualname__}', _advance_block(unit.block),
+                lambda step_s: (record, x, mode, work, inner_steps(step_s)), y,
+                lambda step: None, unit.block.folder)
+
+
+def _of_source(unit: Any) -> Form:
+    y = np.zeros((1, len(unit.outputs), 2))
+    return Form(signal_generator.__name__, _advance_source,
+                lambda step_s: (*unit.memory(), y), y[0],
+                unit.reached, Path(signal_generator.__file__).resolve().parent)
+
+
+# By exact type: a subclass may do something else in its step.
+FORMS: dict[type[Unit], Callable[[Any], Form]] = {BlockUnit: _of_block, SourceUnit: _of_source}
+
+
+def form_of(unit: Unit) -> Form | None:
+    """Return the compiled form of a unit, None if it has none."""
+    make = FORMS.get(type(unit))
+    return make(unit) if make else None

@@ -1,0 +1,111 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Where the compiled exchange is used, and where it is not."""
+
+from __future__ import annotations
+
+import ctypes
+
+from antenna_drive.emulator.unit import Signal
+from antenna_drive.emulator.units import BlockUnit, build, SourceUnit
+from antenna_drive.emulator.wiring import UNITS
+from antenna_drive.lockstep import compiled_loop
+from antenna_drive.lockstep.compiled_unit import form_of
+from antenna_drive.lockstep.exchange import Exchange
+from antenna_drive.lockstep.member import Conductor, SLACK
+from antenna_drive.lockstep.pace import Pace
+from antenna_drive.parameters import load
+from memory_channel import Frame, MemoryChannel
+import pytest
+
+OUTPUTS = {'test_signal': (Signal('a', 'rad', ''), Signal('b', 'V', '')),
+           'plant': (Signal('a', 'rad', ''),)}
+
+
+class Conducted:
+    """A conductor with a loop, a plant and an observer, as far as frames can tell."""
+
+    def __init__(self, last_step: int | None = None) -> None:
+        self.sent: list[Frame] = []
+        unit = build('test_signal', load())
+        form = form_of(unit)
+        assert form is not None
+        self.member = Conductor(unit, 1.0, 1e-3, last_step, OUTPUTS, ['watcher'])
+        self.channel = MemoryChannel(self.member.layout, self.member.layouts, self.sent.append)
+        self.exchange = Exchange(self.member, form, self.channel)
+        self.member.receive('plant', (0.0, 2.0, 0.0, 0.0, 0.0))
+        self.member.receive('watcher', (0.0, 2.0, 0.0))
+        assert self.member.new_run(10.0) is not None
+        self.run_id = self.member.run
+
+    def give(self, first: int, last: int) -> None:
+        """Let the plant's frames arrive."""
+        self.channel.arrived['plant'] += [
+            (self.run_id, float(k), 1e-3, 0.0, 0.0) for k in range(first, last + 1)]
+
+
+def test_every_unit_of_the_drive_has_a_loop_but_a_subclass_has_none() -> None:
+    drive = load()
+    for name in UNITS:
+        unit = build(name, drive)
+        assert form_of(unit) is not None
+        kind = type('Other', (type(unit),), {})
+        assert isinstance(unit, (BlockUnit, SourceUnit))
+        unit.__class__ = kind
+        assert form_of(unit) is None, 'its step may do something else'
+
+
+def test_the_loop_waits_for_an_observer_that_falls_behind() -> None:
+    drive = Conducted()
+    drive.give(0, 2 * SLACK)
+    assert drive.exchange.run(limit_s=60.0) == compiled_loop.MISSING
+    assert drive.member.step == SLACK + 1
+    assert drive.member.missing() == ('watcher',)
+    drive.channel.arrived['watcher'] += [(drive.run_id, 3.0, 1e-3), (drive.run_id, 7.0, 1e-3)]
+    assert drive.exchange.run(limit_s=60.0) == compiled_loop.MISSING
+    assert drive.member.step == SLACK + 8
+    assert drive.member.used == {'watcher': 7.0}
+    assert [frame[1] for frame in drive.sent] == list(range(1, SLACK + 9))
+
+
+def test_the_loop_gives_the_steps_of_python() -> None:
+    drive, alone = Conducted(last_step=40), build('test_signal', load())
+    drive.give(0, 40)
+    assert drive.exchange.run(every=7, limit_s=60.0) == compiled_loop.STEPPED
+    assert drive.member.step == 7
+    assert drive.exchange.run(limit_s=60.0) == compiled_loop.LAST_STEP
+    alone.start(1e-3)
+    law = [alone.step(k, drive.exchange.outputs[:0]).ravel().tolist() for k in range(40)]
+    assert [list(frame[3:]) for frame in drive.sent] == law
+
+
+def test_the_loop_counts_late_steps_and_returns_when_it_is_asked() -> None:
+    drive, pace = Conducted(last_step=5), Pace(1.0)
+    pace.note(0, 1e-3, 0.0)  # due long ago, on the clock since the machine was started
+    drive.give(0, 5)
+    drive.exchange.ask()
+    assert drive.exchange.run(pace=pace, limit_s=60.0) == compiled_loop.LIMIT
+    assert drive.member.step == 0
+    drive.exchange.listen()
+    assert drive.exchange.run(pace=pace, limit_s=60.0) == compiled_loop.LAST_STEP
+    assert pace.late_steps == 5
+
+
+def test_what_is_not_there_is_named() -> None:
+    pytest.importorskip('rclpy', reason='rclpy is not installed')
+    from antenna_drive.lockstep import rcl_channel
+    with pytest.raises(rcl_channel.Unusable, match='no_such_function is not there'):
+        rcl_channel._address(ctypes.CDLL(None), 'no_such_function')
+    with pytest.raises(rcl_channel.Unusable, match='libno_such_library is not loaded'):
+        rcl_channel._loaded('no_such_library')
