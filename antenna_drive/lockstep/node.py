@@ -102,7 +102,7 @@ class DriveNode:
             name: item for name, item in unit.settings().items() if name not in fed_by_topic}
         rate_hz = overrides.number('publish_rate', PUBLISH_RATE, 100.0)
         own: dict[str, tuple[Entry, Value]] = {'publish_rate': (PUBLISH_RATE, rate_hz)}
-        exchange = overrides.get('exchange', EXCHANGE, 'auto')
+        exchange = overrides.get('exchange', EXCHANGE, 'python')
         own['exchange'] = (EXCHANGE, exchange)
         self._pace: Pace | None = None
         self._member = self._make_member(birth, overrides, own)
