@@ -73,7 +73,6 @@ def run_drive_unit(default_name: str, names: Sequence[str], args: Sequence[str] 
     """
     def make(name: str, wired: Wiring, config: Sequence[str], given: Mapping[str, Any]) -> Unit:
         from antenna_drive.emulator import units
-        from antenna_drive.lockstep.exchange import compile_ahead
         import numpy as np
         if name not in names:
             raise UserError(f'{name}: no such unit, allowed for this node are {", ".join(names)}; '
@@ -82,7 +81,6 @@ def run_drive_unit(default_name: str, names: Sequence[str], args: Sequence[str] 
         # compile now, not in the first step
         unit.start(1e-3)
         unit.step(0, np.zeros((len(unit.inputs), 2)))
-        compile_ahead(unit)
         return unit
 
     return _run(default_name, make, args, fed_by_topic, description, wiring)

@@ -24,7 +24,7 @@ from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.lockstep import compiled_loop, ros_parameters
 from antenna_drive.lockstep.compiled_unit import form_of
-from antenna_drive.lockstep.exchange import BRIEF_WAIT_S, Exchange
+from antenna_drive.lockstep.exchange import BRIEF_WAIT_S, compile_ahead, Exchange
 from antenna_drive.lockstep.member import Conductor, Member
 from antenna_drive.lockstep.pace import LEAD_S, Pace
 from antenna_drive.lockstep.rcl_channel import RclChannel, Unusable
@@ -102,7 +102,7 @@ class DriveNode:
             name: item for name, item in unit.settings().items() if name not in fed_by_topic}
         rate_hz = overrides.number('publish_rate', PUBLISH_RATE, 100.0)
         own: dict[str, tuple[Entry, Value]] = {'publish_rate': (PUBLISH_RATE, rate_hz)}
-        exchange = overrides.get('exchange', EXCHANGE, 'auto')
+        exchange = overrides.get('exchange', EXCHANGE, 'python')
         own['exchange'] = (EXCHANGE, exchange)
         self._pace: Pace | None = None
         self._member = self._make_member(birth, overrides, own)
@@ -136,6 +136,7 @@ class DriveNode:
         try:
             if form is None:
                 raise Unusable('the unit is in plain Python')
+            compile_ahead(self._unit)
             self._channel = RclChannel(self._node, self._link)
             self._report.exchange = Exchange(self._member, form, self._channel, self._stamps())
         except Unusable as reason:

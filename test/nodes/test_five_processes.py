@@ -40,11 +40,8 @@ from antenna_drive.lockstep.processes import DriveProcesses  # noqa: E402, I100
 from drive_watch import Recorder, Watch  # noqa: E402
 
 NAME = 'watcher'
-PYTHON = {'exchange': 'python'}
-# The exchange of each unit: compiled where nothing is said.
-EXCHANGES: dict[str, dict[str, Any]] = {
-    'compiled': {}, 'mixed': {'motor_1': PYTHON, 'plant': PYTHON},
-    'python': dict.fromkeys(UNITS, PYTHON)}
+# The units whose exchange is compiled.
+EXCHANGES = {'compiled': UNITS, 'mixed': ('test_signal', 'motor_2', 'torque_share'), 'python': ()}
 ENDLESS: dict[str, Any] = {'run.pace': 0.0, 'run.observers': [NAME]}
 
 
@@ -59,14 +56,14 @@ def in_process(steps: int, step_s: float, config: tuple[str, ...] = (),
 
 def on(exchange: str, parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
     """Return parameters of nodes with those of an exchange."""
-    return {unit: {**EXCHANGES[exchange].get(unit, {}), **parameters.get(unit, {})}
-            for unit in UNITS}
+    return {unit: {'exchange': 'auto' if unit in EXCHANGES[exchange] else 'python',
+                   **parameters.get(unit, {})} for unit in UNITS}
 
 
 def assert_exchange(watch: Watch, exchange: str) -> None:
     """Make sure that each node's exchange is the one that it was told, and makes steps."""
     for unit in UNITS:
-        if unit in EXCHANGES[exchange]:
+        if unit not in EXCHANGES[exchange]:
             watch.until(lambda unit=unit: watch.value(  # type: ignore[misc]
                 unit, 'exchange') == 'Python', f'the exchange of {unit}')
         else:
