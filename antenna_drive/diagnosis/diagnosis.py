@@ -186,8 +186,9 @@ def _evidence(problem: LeastSquares, hypotheses: Sequence[Hypothesis], best: Hyp
               explained: float | None) -> Evidence:
     """Return the fits with what each leaves; only that of the best has converged."""
     top = verdict.best(hypotheses, problem.settings)
+    raw = problem.residuals({})
     return Evidence(hypotheses, [
-        lack_of_fit(problem, best if h is top else h, explained if h.effects else None)
+        lack_of_fit(problem, raw, best if h is top else h, explained if h.effects else None)
         for h in hypotheses])
 
 

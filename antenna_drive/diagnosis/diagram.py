@@ -19,7 +19,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-# The layout of a machine that gives none: so many blocks in a row, so wide, so far apart.
+# The default layout: number of blocks in a row, their width and the gap between them.
 _IN_A_ROW, _WIDTH, _GAP = 4, 170, 20
 
 

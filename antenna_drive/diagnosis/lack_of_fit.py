@@ -25,7 +25,8 @@ from antenna_drive.diagnosis.verdict import LackOfFit
 import numpy as np
 
 
-def lack_of_fit(problem: LeastSquares, best: Hypothesis, explained: float | None) -> LackOfFit:
+def lack_of_fit(problem: LeastSquares, raw: FloatArray, best: Hypothesis,
+                explained: float | None) -> LackOfFit:
     """
     Return what the best hypothesis leaves, after a fit that has converged.
 
@@ -33,13 +34,14 @@ def lack_of_fit(problem: LeastSquares, best: Hypothesis, explained: float | None
     ----------
     problem
         the whole tests
+    raw
+        residuals of the model as configured, shape (n,)
     best
         hypothesis
     explained
         upper end of the interval of what it explains of withheld data, None without effects
 
     """
-    raw = problem.residuals({})
     loudest, fast, fast_left = _fast(problem, raw, best)
     point = best.state.point()
     implausibility = max((form.implausibility(point) for form in best.forms), default=0.0)
