@@ -177,7 +177,7 @@ def gather(s: Any) -> int:
             return reason
     for peer in range(s.peers.shape[0]):
         while (not s.peers[peer, Peer.stepping]
-               and s.used[peer] < w[Word.step] - w[Word.slack]):
+               and s.used[peer] < max(0, w[Word.step] - w[Word.slack])):
             reason = _take_or_wait(s, peer)
             if reason != _GO_ON:
                 return reason
