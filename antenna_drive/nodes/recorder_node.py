@@ -142,6 +142,7 @@ class _RecorderNode:
                 if not came:
                     self._guarded(self._recorder.idle)
                 self._look()
+            self._follower.finish()
             self._gather(OUTPUTS)
             self._guarded(self._recorder.close)
             self._look()
