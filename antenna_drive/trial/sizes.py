@@ -26,9 +26,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from antenna_drive.trial import nominal
 from antenna_drive.trial.effect import Parameters
 from antenna_drive.trial.family_b import LAWS
+from antenna_drive.trial.machine import DESIGN, nominal
 from antenna_drive.trial.verdict import Interval, Verdict
 
 
@@ -70,7 +70,8 @@ _BY_NAME: Mapping[str, Size] = {
     'friction_asymmetry': _same('share', 'share', '1'),
     'torque_constant': _relative(),
     'armature_resistance': Size(
-        'change', 'ohm', lambda values: (values['factor'] - 1.0) * nominal.RESISTANCE.value),
+        'change', 'ohm',
+        lambda values: (values['factor'] - 1.0) * nominal('motors', 'resistance')),
     'amplifier_gain': _relative(),
     'amplifier_offset': _same('offset', 'voltage', 'V'),
     'current_limit': _relative(),
@@ -79,7 +80,7 @@ _BY_NAME: Mapping[str, Size] = {
     'hysteresis': _same('share', 'share', '1'),
     'bias_pot': _relative(),
     'fade_out_voltage': Size(
-        'change', '1', lambda values: values['shift'] / nominal.FADE_OUT_VOLTAGE.value),
+        'change', '1', lambda values: values['shift'] / nominal('circuit', 'fade_out')),
     'share_filter': _relative('rate_change'),
     'filter_1_gain': _relative(),
     'filter_1_pole': _relative(),
@@ -95,7 +96,7 @@ _BY_NAME: Mapping[str, Size] = {
 _COULOMB = {
     'axis': _relative(),
     'motor': Size('torque', 'A', lambda values: (
-        (values['factor'] - 1.0) * nominal.MOTOR_COULOMB.value))}
+        (values['factor'] - 1.0) * DESIGN['motor_coulomb']))}
 
 
 def size_of(effect: str, values: Parameters) -> Size | None:
