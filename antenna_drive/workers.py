@@ -21,24 +21,13 @@ Ctrl-C through, and its processes outlive a parent that is killed. These do neit
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 import os
 import signal
-import sys
 import warnings
 
-
-@contextmanager
-def worker_threads(count: int) -> Iterator[ThreadPoolExecutor]:
-    """Give a pool of threads; after an error nothing that waits in it is begun."""
-    pool = ThreadPoolExecutor(count)
-    try:
-        yield pool
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        raise
-    pool.shutdown()
+from antenna_drive.programs import end_with_parent
 
 
 @contextmanager
@@ -72,18 +61,10 @@ def expect_overflow() -> None:
                                       'encountered', RuntimeWarning)
 
 
-def end_with(parent: int) -> None:
-    """Let the kernel end this process when its parent ends (on Linux); at once if it has."""
-    if sys.platform.startswith('linux'):
-        import ctypes
-        pr_set_pdeathsig = 1  # linux/prctl.h
-        ctypes.CDLL(None).prctl(pr_set_pdeathsig, int(signal.SIGTERM))
-        if os.getppid() != parent:
-            os._exit(0)
-
-
 def _become_worker(parent: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    end_with(parent)
+    end_with_parent()
+    if os.getppid() != parent:
+        os._exit(0)
     expect_overflow()

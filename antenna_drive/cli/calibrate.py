@@ -27,18 +27,15 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-import sys
 from typing import Any
 
-from antenna_drive import cli
 from antenna_drive.calibration.configuration import configuration
 from antenna_drive.calibration.problem import read_problem
 from antenna_drive.calibration.report import report
 from antenna_drive.calibration.search import read_log, search
-from antenna_drive.cli.output import (
-    add_json_option, Progress, replaced, STANDARD_OUTPUT, write_json,
-)
+from antenna_drive.cli.output import add_json_option, give, Progress, replaced
 from antenna_drive.parameters.files import config_dir
+from antenna_drive.programs import NEGATIVE, OK
 
 COUNT = 2000
 
@@ -76,11 +73,8 @@ def run(arguments: argparse.Namespace) -> int:
         stream.write(configuration(problem, found.best.shares, arguments.start).encode())
     with Progress('uncertainties', 1.0) as shown:
         told = report(problem, found, arguments.trade_off, shown.update, also)
-    if arguments.json is not None:
-        write_json(told, arguments.json)
-    if arguments.json != STANDARD_OUTPUT:
-        _write(told)
-    return cli.OK if all(item['met'] for item in told['targets']) else cli.NEGATIVE
+    give(told, arguments.json, _text(told))
+    return OK if all(item['met'] for item in told['targets']) else NEGATIVE
 
 
 def _find(targets: str) -> str | Path:
@@ -89,7 +83,7 @@ def _find(targets: str) -> str | Path:
     return shipped if not Path(targets).exists() and shipped.is_file() else targets
 
 
-def _write(told: dict[str, Any]) -> None:
+def _text(told: dict[str, Any]) -> str:
     lines = [f'{told["candidates"]} candidates, cost {told["start_cost"]:.4g} -> '
              f'{told["cost"]:.4g}', '',
              _TARGET.format('', 'target', 'start', 'obtained', 'aim', 'tolerance')]
@@ -111,7 +105,7 @@ def _write(told: dict[str, Any]) -> None:
         lines += [f'  {point["level"]:>10.4g}  {point["cost_of_the_others"]:<10.4g}'
                   f'{"misses " + ", ".join(point["missed"]) if point["missed"] else ""}'
                   for point in curve]
-    sys.stdout.write('\n'.join(lines) + '\n')
+    return '\n'.join(lines)
 
 
 _TARGET = '{:<8}{:<24}{:>10}{:>12}  {:<16}{:>10}'

@@ -30,10 +30,11 @@ from pathlib import Path
 import time
 from typing import Any
 
-from antenna_drive.cli.output import Progress
+from antenna_drive.cli.output import check_options, Progress
 from antenna_drive.cli.settings import parse_settings
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.errors import UserError
+from antenna_drive.parameters.schema import Entry
 from antenna_drive.recording.recorder import RunRecorder
 from antenna_drive.recording.sheet import load_sheet
 
@@ -43,7 +44,7 @@ _PATIENCE_S = 60.0  # until the drive begins, and from step to step
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command understands."""
-    parser.add_argument('--duration', type=_positive, required=True, metavar='S',
+    parser.add_argument('--duration', type=float, required=True, metavar='S',
                         help='simulated time to record [s]')
     parser.add_argument('--out', type=Path, required=True, metavar='BAG',
                         help='the folder to write; it must not be there yet')
@@ -52,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--set', nargs='+', default=(), metavar='UNIT.NAME=VALUE', dest='settings',
                         help='parameters of single nodes, such as torque_share.bias_pot=0.8')
     parser.add_argument('--sheet', type=Path, metavar='FILE', help='a test sheet for the bag')
-    parser.add_argument('--step', type=_positive, default=0.001, metavar='S',
+    parser.add_argument('--step', type=float, default=0.001, metavar='S',
                         help='macro-step [s]; 0.001 if not given')
     parser.add_argument('--pace', type=float, default=0.0, metavar='K',
                         help='times real time; 0, as fast as possible, if not given')
@@ -61,6 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Start, record, end."""
+    check_options(args, duration=Entry('s', 1e-5, 1e9), step=Entry('s', 1e-5, 0.1))
     parameters = parse_settings(args.settings)
     recorder = RunRecorder(
         args.out, {f'{unit}/{s.name}': s.unit for unit, own in OUTPUTS.items() for s in own},
@@ -123,10 +125,3 @@ class _Watch:
             raise UserError(f'the drive does not go on at step {self._done + 1}: waiting for '
                             f'{", ".join(observer.missing)}')
         return False
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value <= 1e9:
-        raise argparse.ArgumentTypeError(f'{text} given, allowed is a number above 0')
-    return value

@@ -26,8 +26,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from antenna_drive.cli.output import Progress
-from antenna_drive.errors import UserError
+from antenna_drive.cli.output import check_options, Progress
+from antenna_drive.parameters.schema import Entry
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,9 +57,7 @@ def run(args: argparse.Namespace) -> int:
     from antenna_drive.recording.mcap_format import write_bag
     from antenna_drive.recording.runs import from_run
 
-    if not 0.0 < args.duration < float('inf') or args.every < 1:
-        raise UserError(f'--duration {args.duration:g} --every {args.every}: allowed is a '
-                        'duration above 0 s, and every 1st step or fewer')
+    check_options(args, duration=Entry('s', 1e-5, 1e9), every=Entry('', 1, whole=True))
     refuse_existing(args.out)
     drive = overridden(load(*args.config), parse_settings(args.settings))
     with Progress('running', 1.0) as progress:

@@ -30,6 +30,7 @@ from antenna_drive.calibration.problem import read_problem
 from antenna_drive.cli.article import CONFIGURATION
 from antenna_drive.parameters.files import config_dir
 from antenna_drive.parameters.sets import changed
+from antenna_drive.programs import BAD_INPUT, OK
 import numpy as np
 import pytest
 
@@ -219,7 +220,7 @@ def test_the_command_gives_rows_and_contradictions_as_json(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('antenna_drive.cli.article.EXPERIMENTS', ('T3a', 'T4a'))
     target = tmp_path / 'article.json'
-    assert cli.main(['article', '--config', 'reference', '--json', str(target)]) == cli.OK
+    assert cli.main(['article', '--config', 'reference', '--json', str(target)]) == OK
     told = json.loads(target.read_text())
     assert {row['id'].partition('.')[0] for row in told['rows']} == {'T3a', 'T4a'}
     for row in told['rows']:
@@ -230,5 +231,5 @@ def test_the_command_gives_rows_and_contradictions_as_json(
 
 
 def test_an_unknown_parameter_set_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(['article', '--config', 'referense']) == cli.BAD_INPUT
+    assert cli.main(['article', '--config', 'referense']) == BAD_INPUT
     assert 'did you mean reference?' in capsys.readouterr().err
