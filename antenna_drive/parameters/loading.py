@@ -23,13 +23,13 @@ a section motor_1 or motor_2: `motor_1: {gearbox: {half_gap: 0.2}}`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields, MISSING
+from dataclasses import fields, MISSING, replace
 from pathlib import Path
 from typing import Any, get_type_hints
 
 from antenna_drive.parameters import files
 from antenna_drive.parameters.plain_yaml import read_yaml
-from antenna_drive.parameters.schema import Entry, nearest, ParameterError, Value
+from antenna_drive.parameters.schema import Entry, mapping_of, nearest, ParameterError, Value
 from antenna_drive.parameters.sets import (
     Ammeter, Amplifier, Armature, Axis, Drive, Encoder, entries, Filter1, Gearbox, Motor,
     MotorDrive, Plant, RateCommand, Share, Tachometer, TestSignal, TorqueShare, Waveform,
@@ -50,6 +50,8 @@ _ENTRY_KEYS = ('value', 'unit', 'range', 'source', 'note')
 
 # What a file says of one parameter, by dotted name, and which file says it.
 _Given = dict[str, tuple[Value, str]]
+# What a section may say: of an entry or of a section within it.
+_Known = dict[str, Any]
 
 
 def load(*sources: str | Path, kind: Any = Drive) -> Drive:
@@ -104,93 +106,45 @@ def find(source: str | Path) -> Path:
 
 
 def _read(path: Path, sections: Mapping[str, type]) -> tuple[str, _Given]:
-    content = read_yaml(path)
-    if content is None:
-        content = {}
-    if not isinstance(content, dict):
-        raise ParameterError(f'{path}: {type(content).__name__} given, '
-                             'allowed is a mapping of sections')
-    base = content.pop('base', 'reference')
-    if base not in ('reference', 'none'):
-        raise ParameterError(f'{path}: base: {base!r} given, allowed is reference or none')
+    """Return the base that a file names, and what it says of parameters."""
+    known: _Known = {name: dict(entries(kind)) for name, kind in sections.items()}
+    motor = {name: dict(entries(kind)) for name, kind in MOTOR_SECTIONS.items()}
+    start = dict(entries(MotorDrive))[START_IN_GAP]
+    known.update(dict.fromkeys(MOTOR_SIGNS, {**motor, START_IN_GAP: start}))
+    known['test_signal'] = {**dict.fromkeys(TEST_SIGNAL_PARTS, dict(entries(Waveform))),
+                            **dict(entries(TestSignal))}
     given: _Given = {}
-    allowed = (*sections, *MOTOR_SIGNS, 'test_signal')
-    for section, body in content.items():
-        if section in sections:
-            _section(path, str(section), sections[section], body, given)
-        elif section in MOTOR_SIGNS:
-            _motor_section(path, str(section), body, given)
-        elif section == 'test_signal':
-            _test_signal_section(path, body, given)
-        else:
-            raise ParameterError(
-                f'{path}: {section}: no such section{nearest(str(section), allowed)}; '
-                f'allowed are {", ".join(allowed)}')
+    content = read_yaml(path)
+    try:
+        content = dict(mapping_of('', {} if content is None else content))
+        base = content.pop('base', 'reference')
+        if base not in ('reference', 'none'):
+            raise ParameterError(f'base: {base!r} given, allowed is reference or none')
+        _take('', content, known, str(path), given)
+    except ParameterError as error:
+        raise ParameterError(f'{path}: {error}') from None
     return base, given
 
 
-def _mapping(path: Path, key: str, body: Any) -> Mapping[str, Any]:
-    if not isinstance(body, dict):
-        raise ParameterError(f'{path}: {key}: {body!r} given, allowed is a mapping of entries')
-    return body
-
-
-def _section(path: Path, name: str, kind: type, body: Any, given: _Given) -> None:
-    known = dict(entries(kind))
-    for key, item in _mapping(path, name, body).items():
-        if key not in known:
-            raise ParameterError(f'{path}: {name}.{key}: no such entry'
-                                 f'{nearest(str(key), tuple(known))}; '
-                                 f'allowed are {", ".join(known)}')
-        given[f'{name}.{key}'] = (_entry(path, f'{name}.{key}', known[key], item), str(path))
-
-
-def _motor_section(path: Path, motor: str, body: Any, given: _Given) -> None:
-    allowed = (*MOTOR_SECTIONS, START_IN_GAP)
-    for key, item in _mapping(path, motor, body).items():
-        if key in MOTOR_SECTIONS:
-            _section(path, f'{motor}.{key}', MOTOR_SECTIONS[key], item, given)
-        elif key == START_IN_GAP:
-            entry = dict(entries(MotorDrive))[START_IN_GAP]
-            given[f'{motor}.{key}'] = (_entry(path, f'{motor}.{key}', entry, item), str(path))
+def _take(prefix: str, body: Any, known: _Known, source: str, given: _Given) -> None:
+    """Put what a section says of parameters, and its own sections, into `given`."""
+    for key, item in mapping_of(prefix.rstrip('.'), body, known).items():
+        part = known[key]
+        if isinstance(part, Entry):
+            given[f'{prefix}{key}'] = (_value(f'{prefix}{key}', part, item), source)
         else:
-            raise ParameterError(f'{path}: {motor}.{key}: no such section'
-                                 f'{nearest(str(key), allowed)}; '
-                                 f'allowed are {", ".join(allowed)}')
+            _take(f'{prefix}{key}.', item, part, source, given)
 
 
-def _test_signal_section(path: Path, body: Any, given: _Given) -> None:
-    own = dict(entries(TestSignal))
-    for key, item in _mapping(path, 'test_signal', body).items():
-        if key in TEST_SIGNAL_PARTS:
-            _section(path, f'test_signal.{key}', Waveform, item, given)
-        elif key in own:
-            given[f'test_signal.{key}'] = (
-                _entry(path, f'test_signal.{key}', own[key], item), str(path))
-        else:
-            allowed = (*TEST_SIGNAL_PARTS, *own)
-            raise ParameterError(f'{path}: test_signal.{key}: no such entry'
-                                 f'{nearest(str(key), allowed)}; '
-                                 f'allowed are {", ".join(allowed)}')
-
-
-def _entry(path: Path, key: str, entry: Entry, item: Any) -> Value:
-    try:
-        if not isinstance(item, dict):
-            return entry.check(key, item)
-        for part in item:
-            if part not in _ENTRY_KEYS:
-                raise ParameterError(f'{key}: {part}: no such part of an entry'
-                                     f'{nearest(str(part), _ENTRY_KEYS)}; '
-                                     f'allowed are {", ".join(_ENTRY_KEYS)}')
-        if 'value' not in item:
-            raise ParameterError(f'{key}: value is missing, allowed is {entry.allowed()}')
-        if 'unit' in item and item['unit'] != entry.unit:
-            raise ParameterError(
-                f'{key}: unit {item["unit"]!r} given, allowed is {entry.unit!r}')
-        return _narrowed(key, entry, item).check(key, item['value'])
-    except ParameterError as error:
-        raise ParameterError(f'{path}: {error}') from None
+def _value(key: str, entry: Entry, item: Any) -> Value:
+    if not isinstance(item, dict):
+        return entry.check(key, item)
+    mapping_of(key, item, _ENTRY_KEYS)
+    if 'value' not in item:
+        raise ParameterError(f'{key}: value is missing, allowed is {entry.allowed()}')
+    if 'unit' in item and item['unit'] != entry.unit:
+        raise ParameterError(f'{key}: unit {item["unit"]!r} given, allowed is {entry.unit!r}')
+    return _narrowed(key, entry, item).check(key, item['value'])
 
 
 def _narrowed(key: str, entry: Entry, item: Mapping[str, Any]) -> Entry:
@@ -203,8 +157,7 @@ def _narrowed(key: str, entry: Entry, item: Mapping[str, Any]) -> Entry:
     if not numbers or not entry.low <= bounds[0] <= bounds[1] <= entry.high:
         raise ParameterError(f'{key}: range {bounds!r} given, allowed is [low, high] within '
                              f'[{entry.low:g}, {entry.high:g}]')
-    return Entry(entry.unit, float(bounds[0]), float(bounds[1]), entry.description, entry.live,
-                 entry.choices, entry.lengths, entry.whole)
+    return replace(entry, low=float(bounds[0]), high=float(bounds[1]))
 
 
 def _drive(given: _Given, source: str, kind: Any, more: Mapping[str, type]) -> Drive:

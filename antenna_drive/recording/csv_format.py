@@ -29,7 +29,6 @@ from collections.abc import Iterator, Sequence
 import csv
 from dataclasses import replace
 from decimal import Decimal
-import difflib
 import math
 from pathlib import Path
 import re
@@ -38,6 +37,7 @@ import warnings
 
 from antenna_drive.errors import one_line
 from antenna_drive.limits import CSV_LINE, SAMPLES, SIGNALS, TEXT
+from antenna_drive.parameters.schema import nearest
 from antenna_drive.recording.atomic import new_file, refuse_existing
 from antenna_drive.recording.plain import from_json, PlainDataError, to_json
 from antenna_drive.recording.recording import (
@@ -265,10 +265,8 @@ def _header(path: Path, line: int, header: list[str]) -> list[str]:
                 raise cell.refuse(str(error)) from None
         else:
             known = [TIME, *FIELD_COLUMNS]
-            close = difflib.get_close_matches(column, known, n=1)
-            hint = f', did you mean {close[0]}?' if close else ''
             raise cell.refuse(
-                f'no such column {one_line(repr(column), 40)}{hint} Allowed are '
+                f'no such column {one_line(repr(column), 40)}{nearest(column, known)} Allowed are '
                 f"{', '.join(known)} and 'unit/signal [unit]'; antenna-drive import --map reads "
                 'other columns')
         if name in names:

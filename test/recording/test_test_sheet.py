@@ -89,7 +89,7 @@ def test_nothing_is_known_of_an_empty_file(tmp_path: Path) -> None:
     ('bias: {bias_pot: 0.8}', r'bias\.type: None given, allowed is one of circuit, fixed'),
     ('bias: {type: fixed, bias_pot: 0.8}', r'bias\.bias_pot: no such entry.*voltage_V'),
     ('bias: {type: circuit, bias_pot: 1.2}', r'bias\.bias_pot: 1.2 given.*from 0 to 1'),
-    ('bias: 5.69', 'bias: float given, allowed is a mapping'),
+    ('bias: 5.69', 'bias: 5.69 given, allowed is a mapping'),
     ('waveform: {type: square, period_s: 0}', r'waveform\.period_s: 0 given'),
     ('waveform: {type: multisine, weights: [' + 33 * '1,' + ']}',
      r'waveform\.weights: 33 numbers given, allowed are up to 32'),
