@@ -33,13 +33,11 @@ from typing import Any
 from antenna_drive.cli.output import check_options, Progress
 from antenna_drive.cli.settings import parse_settings
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
-from antenna_drive.errors import UserError
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.recording.recorder import RunRecorder
 from antenna_drive.recording.sheet import load_sheet
 
 _NAME = 'recorder'
-_PATIENCE_S = 60.0  # until the drive begins, and from step to step
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -69,59 +67,31 @@ def run(args: argparse.Namespace) -> int:
         load_sheet(args.sheet) if args.sheet else None, recorded_by=_NAME)
     from antenna_drive.lockstep.observer import Observer
     from antenna_drive.lockstep.processes import DriveProcesses
+    from antenna_drive.lockstep.sampling import RunWatch
     last = round(args.duration / args.step)
     parameters.setdefault(TEST_SIGNAL, {}).update({
         'run.step': args.step, 'run.pace': args.pace, 'run.duration': last * args.step,
         'run.observers': [_NAME]})
-    watch = _Watch(recorder, last)
+
+    def step(number: int, time_s: float, samples: Any) -> None:
+        if number <= last:
+            recorder.step(number, samples[:, 0].tolist())
+            watch.done = number
+
+    def complete() -> bool:
+        if not watch.complete(processes, observer):
+            return False
+        recorder.idle()
+        # what is in force comes by another way than the steps
+        return recorder.knows_configuration or time.monotonic() > watch.deadline
+
     try:
-        with Observer(_NAME, watch.step, on_begin=watch.begin,
-                      on_change=recorder.told) as observer:
-            with DriveProcesses(parameters, config=args.config) as processes:
-                with Progress('recording', last, quiet=args.quiet) as progress:
-                    observer.spin(lambda: watch.complete(processes, observer, progress))
+        with Observer(_NAME, step, on_begin=recorder.begin, on_change=recorder.told) as observer, \
+                DriveProcesses(parameters, config=args.config) as processes, \
+                Progress('recording', last, quiet=args.quiet) as progress:
+            watch = RunWatch(last, progress.update)
+            observer.spin(complete)
     finally:
         recorder.close()
     print(f'{recorder.steps} steps, {last * args.step:g} s: {recorder.path}')
     return 0
-
-
-class _Watch:
-    """What has been recorded, and whether the drive still goes on."""
-
-    def __init__(self, recorder: RunRecorder, last: int) -> None:
-        self._recorder = recorder
-        self._last = last
-        self._done = -1
-        self._seen = -1
-        self._next_look = 0.0
-        self._deadline = time.monotonic() + _PATIENCE_S
-
-    def begin(self, run_id: int, step_s: float) -> None:
-        """Begin a bag."""
-        self._recorder.begin(run_id, step_s)
-
-    def step(self, number: int, time_s: float, samples: Any) -> None:
-        """Write a step."""
-        if number <= self._last:
-            self._recorder.step(number, samples[:, 0].tolist())
-            self._done = number
-
-    def complete(self, processes: Any, observer: Any, progress: Progress) -> bool:
-        """Tell whether everything is recorded; UserError if it will never be."""
-        now = time.monotonic()
-        if now < self._next_look and self._done < self._last:
-            return False
-        self._next_look = now + 0.1
-        progress.update(max(0, self._done))
-        if self._done >= self._last:
-            self._recorder.idle()
-            # what is in force comes by another way than the steps
-            return self._recorder.knows_configuration or now > self._deadline
-        processes.check()
-        if self._done != self._seen:
-            self._seen, self._deadline = self._done, now + _PATIENCE_S
-        if now > self._deadline:
-            raise UserError(f'the drive does not go on at step {self._done + 1}: waiting for '
-                            f'{", ".join(observer.missing)}')
-        return False

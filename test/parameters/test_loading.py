@@ -90,7 +90,7 @@ def test_a_file_lies_over_the_reference_and_a_motor_may_differ(tmp_path: Path) -
     ('gearbox: {stiffness: {value: 30.0, unit: Nm/deg}}', r"unit 'Nm/deg' given, allowed is"),
     ('gearbox: {stiffness: {value: 30.0, range: [40, 50]}}', r'30\.0 given, allowed .* 40 to 50'),
     ('gearbox: {stiffness: {value: 30.0, range: [-4, 50]}}', r'range \[-4, 50\] given'),
-    ('gearbox: {stiffness: {vaule: 30.0}}', r'vaule: no such part of an entry, did you mean val'),
+    ('gearbox: {stiffness: {vaule: 30.0}}', r'vaule: no such entry, did you mean val'),
     ('gearbox: {stiffness: {unit: N m/rad}}', r'value is missing'),
     ('gearbox: {stiffness: 1.0, stiffness: 2.0}', 'column 27: the key stiffness is given twice'),
     ('gearbox: [1, 2]', r'gearbox: \[1, 2\] given, allowed is a mapping'),

@@ -101,7 +101,7 @@ def test_nothing_is_known_of_an_empty_file(tmp_path: Path) -> None:
     ('elevation_deg: yes', 'elevation_deg: True given'),
     ('elevation_deg: 1' + 400 * '0', "elevation_deg: 'a int' given"),
     ('circuit: [new]', "circuit: 'a list' given"),
-    ('- circuit', 'the sheet: list given'),
+    ('- circuit', r"\['circuit'\] given, allowed is a mapping"),
     ('start: rest\nstart: rest', 'line 2, column 1: the key start is given twice'),
     ('bias: &a {type: fixed}\nwaveform: *a', 'line 2, column 11: an alias is not allowed'),
     ('circuit: {', 'line 1, column 11'),
