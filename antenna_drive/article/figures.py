@@ -116,7 +116,7 @@ def _loaded(results: Results, circuit: str) -> Figure:
 
 
 def _square_wave(results: Results, name: str, signals: Sequence[tuple[str, str, str]],
-                 scale: float, label: str, command: bool = False) -> Figure:
+                 scale: float, label: str) -> Figure:
     figure, axes = _one()
     run = results.run(name)
     for signal, text, style in signals:

@@ -34,7 +34,6 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
 from antenna_drive.article.contradictions import Contradiction, contradictions
 from antenna_drive.article.experiments import DriveExperiment
@@ -42,7 +41,6 @@ from antenna_drive.article.measures import Results, with_circuits
 from antenna_drive.article.rows import Row, rows
 from antenna_drive.cli.output import add_json_option, give, Progress, replaced
 from antenna_drive.emulator.run import MACRO_STEP, Run, simulate
-from antenna_drive.emulator.units import home
 from antenna_drive.parameters import Drive
 from antenna_drive.programs import NEGATIVE, OK
 import numpy as np
@@ -93,15 +91,11 @@ def _through_nodes(configuration: list[str]) -> Callable[[DriveExperiment, Drive
     def run_one(experiment: DriveExperiment, drive: Drive) -> Run:
         if experiment.name not in THROUGH_NODES:
             return simulate(drive, experiment.duration)
-        settings: dict[str, dict[str, Any]] = {}
-        for parameter, value in experiment.settings.items():
-            unit, name = home(parameter)
-            settings.setdefault(unit, {})[name] = value
         steps = round(experiment.duration / MACRO_STEP)
         with Progress(f'{experiment.name}, five processes', steps) as shown:
-            sampled = sample_processes(steps, MACRO_STEP, name='article', parameters=settings,
-                                       config=[*configuration, experiment.circuit],
-                                       progress=shown.update)
+            sampled = sample_processes(
+                steps, MACRO_STEP, name='article', settings=experiment.settings,
+                config=[*configuration, experiment.circuit], progress=shown.update)
         return Run(MACRO_STEP, np.arange(steps + 1), sampled.names, sampled.samples)
 
     return run_one

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import time
 
 from antenna_drive.emulator.unit import FloatArray
+from antenna_drive.emulator.units import home
 from antenna_drive.emulator.wiring import TEST_SIGNAL
 from antenna_drive.errors import UserError
 from antenna_drive.lockstep.observer import Observer
@@ -54,7 +55,7 @@ class Sampled:
 
 
 def sample_processes(steps: int, step_s: float, *, name: str = 'observer',
-                     parameters: Mapping[str, Mapping[str, Parameter]] | None = None,
+                     settings: Mapping[str, Parameter] | None = None,
                      config: Sequence[str] = (), pace: float = 0.0, namespace: str = '',
                      domain_id: int | None = None,
                      progress: Callable[[int], None] | None = None) -> Sampled:
@@ -67,7 +68,9 @@ def sample_processes(steps: int, step_s: float, *, name: str = 'observer',
         number and length [s] of the macro-steps
     name
         name of the observing node
-    parameters, config, namespace, domain_id
+    settings
+        parameters of the drive by dotted name, such as 'torque_share.circuit.bias_pot'
+    config, namespace, domain_id
         see DriveProcesses
     pace
         how many times faster than real time, 0 for as fast as possible
@@ -79,10 +82,12 @@ def sample_processes(steps: int, step_s: float, *, name: str = 'observer',
     UserError : a process has ended by itself or the drive does not go on
 
     """
-    given = {unit: dict(values) for unit, values in (parameters or {}).items()}
-    given[TEST_SIGNAL] = {**given.get(TEST_SIGNAL, {}), 'run.step': float(step_s),
-                          'run.pace': float(pace), 'run.duration': steps * step_s,
-                          'run.observers': [name]}
+    given: dict[str, dict[str, Parameter]] = {
+        TEST_SIGNAL: {'run.step': float(step_s), 'run.pace': float(pace),
+                      'run.duration': steps * step_s, 'run.observers': [name]}}
+    for parameter, value in (settings or {}).items():
+        unit, key = home(parameter)
+        given.setdefault(unit, {})[key] = value
     processes = DriveProcesses(given, config=config, namespace=namespace, domain_id=domain_id)
     watch = RunWatch(steps, progress)
     moments: dict[str, float] = {}

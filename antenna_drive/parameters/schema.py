@@ -47,7 +47,7 @@ class Entry:
 
     """
 
-    unit: str
+    unit: str = ''
     low: float = -math.inf
     high: float = math.inf
     description: str = ''
