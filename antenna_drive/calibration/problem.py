@@ -39,7 +39,7 @@ from antenna_drive.article.measures import (
     article_experiments, article_measures, Measure, OLD_CIRCUIT, Reading, Results,
 )
 from antenna_drive.parameters import Drive, load, ParameterError
-from antenna_drive.parameters.loading import find, MOTOR_SECTIONS, SECTIONS
+from antenna_drive.parameters.loading import find, MOTOR_SECTIONS, PLACES, SECTIONS
 from antenna_drive.parameters.plain_yaml import read_yaml
 from antenna_drive.parameters.schema import Entry, mapping_of, nearest
 from antenna_drive.parameters.sets import changed, entries, values
@@ -50,8 +50,6 @@ KINDS = ('value', 'at_least', 'at_most')
 # The miss of a figure that cannot be evaluated, in tolerances.
 _UNREADABLE = 100.0
 _LIST_ITEM = re.compile(r'(?P<key>.+)\[(?P<index>\d+)\]')
-_OWN_SECTIONS = {'axis': 'plant.axis', 'encoder': 'plant.encoder',
-                 'torque_share': 'torque_share.circuit', 'filter_1': 'torque_share.filter_1'}
 
 
 @dataclass(frozen=True)
@@ -260,7 +258,7 @@ def drive_names(key: str) -> list[str]:
     section, _, entry = key.partition('.')
     if section in MOTOR_SECTIONS:
         return [f'{motor}.{key}' for motor in ('motor_1', 'motor_2')]
-    return [f'{_OWN_SECTIONS[section]}.{entry}']
+    return [f'{PLACES[section]}.{entry}']
 
 
 def read_problem(source: str | Path, start: Sequence[str] = ()) -> CalibrationProblem:

@@ -23,7 +23,7 @@ a section motor_1 or motor_2: `motor_1: {gearbox: {half_gap: 0.2}}`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields, MISSING, replace
+from dataclasses import fields, is_dataclass, MISSING, replace
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -32,7 +32,7 @@ from antenna_drive.parameters.plain_yaml import read_yaml
 from antenna_drive.parameters.schema import Entry, mapping_of, nearest, ParameterError, Value
 from antenna_drive.parameters.sets import (
     Ammeter, Amplifier, Armature, Axis, Drive, Encoder, entries, Filter1, Gearbox, Motor,
-    MotorDrive, Plant, RateCommand, Share, Tachometer, TestSignal, TorqueShare, Waveform,
+    MotorDrive, RateCommand, Tachometer, TestSignal, TorqueShare, Waveform,
 )
 
 MOTOR_SECTIONS: dict[str, type] = {
@@ -43,6 +43,9 @@ SECTIONS: dict[str, type] = {
     'axis': Axis, 'encoder': Encoder, 'torque_share': TorqueShare, 'filter_1': Filter1,
     **MOTOR_SECTIONS,
 }
+# Where the sets of the drive are that have a section of their own.
+PLACES = {'axis': 'plant.axis', 'encoder': 'plant.encoder',
+          'torque_share': 'torque_share.circuit', 'filter_1': 'torque_share.filter_1'}
 MOTOR_SIGNS = {'motor_1': -1.0, 'motor_2': 1.0}
 START_IN_GAP = 'start_in_gap'
 TEST_SIGNAL_PARTS = ('rate', 'torque')
@@ -82,7 +85,7 @@ def load(*sources: str | Path, kind: Any = Drive) -> Drive:
         given.update(content)
     if not alone:
         given = {**_read(find('reference'), SECTIONS)[1], **given}
-    return _drive(given, str(sources[-1]) if sources else 'reference', kind, more)
+    return _drive(given, str(sources[-1]) if sources else 'reference', kind)
 
 
 def find(source: str | Path) -> Path:
@@ -160,54 +163,47 @@ def _narrowed(key: str, entry: Entry, item: Mapping[str, Any]) -> Entry:
     return replace(entry, low=float(bounds[0]), high=float(bounds[1]))
 
 
-def _drive(given: _Given, source: str, kind: Any, more: Mapping[str, type]) -> Drive:
-    axis = _set(Axis, ('axis',), given, source)
+def _drive(given: _Given, source: str, kind: Any) -> Drive:
+    axis: Axis = _set(Axis, PLACES['axis'], given, source)
     _check_modes(axis, given)
-    torque_share = _set(TorqueShare, ('torque_share',), given, source)
-    if torque_share.saturation_low > torque_share.saturation_high:
+    for motor, sign in MOTOR_SIGNS.items():
+        given[f'{motor}.sign'] = sign, source
+        given[f'{motor}.gear_ratio'] = axis.gear_ratio, source
+    drive: Drive = _set(kind, '', given, source)
+    share = drive.torque_share.circuit
+    if share.saturation_low > share.saturation_high:
         raise ParameterError(f'{given["torque_share.saturation_low"][1]}: '
-                             'torque_share.saturation_low: '
-                             f'{torque_share.saturation_low:g} given, '
-                             'allowed is at most saturation_high '
-                             f'({torque_share.saturation_high:g} V)')
-    parts = {part: _set(Waveform, (f'test_signal.{part}',), given, source)
-             for part in TEST_SIGNAL_PARTS}
-    for part, waveform in parts.items():
-        check_waveform(waveform, f'{source}: test_signal.{part}')
-    drive: Drive = kind(
-        test_signal=_set(TestSignal, ('test_signal',), given, source, **parts),
-        motor_1=_motor('motor_1', axis, given, source),
-        motor_2=_motor('motor_2', axis, given, source),
-        torque_share=Share(circuit=torque_share,
-                           filter_1=_set(Filter1, ('filter_1',), given, source)),
-        plant=Plant(axis=axis, encoder=_set(Encoder, ('encoder',), given, source)),
-        **{name: _set(item, (name,), given, source) for name, item in more.items()})
+                             f'torque_share.saturation_low: {share.saturation_low:g} given, '
+                             f'allowed is at most saturation_high ({share.saturation_high:g} V)')
+    for part in TEST_SIGNAL_PARTS:
+        check_waveform(getattr(drive.test_signal, part), f'{source}: test_signal.{part}')
     return drive
 
 
-def _motor(motor: str, axis: Axis, given: _Given, source: str) -> MotorDrive:
-    parts = {name: _set(kind, (f'{motor}.{name}', name), given, source)
-             for name, kind in MOTOR_SECTIONS.items()}
-    start = given.get(f'{motor}.{START_IN_GAP}', (0.0, ''))[0]
-    return MotorDrive(sign=MOTOR_SIGNS[motor], gear_ratio=axis.gear_ratio,
-                      start_in_gap=start, **parts)  # type: ignore[arg-type]
+def _set(kind: type, place: str, given: _Given, source: str) -> Any:
+    """
+    Build a set and those within it.
 
-
-def _set(kind: type, sections: tuple[str, ...], given: _Given, source: str, **parts: Any) -> Any:
-    """Build one set from the first of `sections` that gives each of its entries."""
-    found: dict[str, Any] = dict(parts)
+    A section of a file goes by the place of its set in the drive, such as motor_1.gearbox, or by
+    the name that all sets of this kind share, such as gearbox.
+    """
+    shared = next((section for section, own in PLACES.items() if own == place),
+                  place.rpartition('.')[2])
+    hints = get_type_hints(kind)
+    found: dict[str, Any] = {}
     for item in fields(kind):
-        if 'entry' not in item.metadata:
+        if is_dataclass(hints[item.name]):
+            within = f'{place}.{item.name}' if place else item.name
+            found[item.name] = _set(hints[item.name], within, given, source)
             continue
-        for section in sections:
-            if f'{section}.{item.name}' in given:
-                found[item.name] = given[f'{section}.{item.name}'][0]
-                break
-        else:
-            if item.default is MISSING:
-                entry: Entry = item.metadata['entry']
-                raise ParameterError(f'{source}: {sections[-1]}.{item.name}: is missing, '
-                                     f'allowed is {entry.allowed()}')
+        names = [name for name in (f'{place}.{item.name}', f'{shared}.{item.name}')
+                 if name in given]
+        if names:
+            found[item.name] = given[names[0]][0]
+        elif item.default is MISSING:
+            entry: Entry = item.metadata['entry']
+            raise ParameterError(f'{source}: {shared}.{item.name}: is missing, '
+                                 f'allowed is {entry.allowed()}')
     return kind(**found)
 
 
