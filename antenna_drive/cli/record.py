@@ -31,7 +31,9 @@ import time
 from typing import Any
 
 from antenna_drive.cli.output import check_options, Progress
-from antenna_drive.cli.settings import parse_settings
+from antenna_drive.cli.settings import (
+    add_config_option, add_settings_option, parse_settings,
+)
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.recording.recorder import RunRecorder
@@ -46,10 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='simulated time to record [s]')
     parser.add_argument('--out', type=Path, required=True, metavar='BAG',
                         help='the folder to write; it must not be there yet')
-    parser.add_argument('--config', nargs='+', default=(), metavar='FILE',
-                        help='configuration files or names of sets in config/, later over earlier')
-    parser.add_argument('--set', nargs='+', default=(), metavar='UNIT.NAME=VALUE', dest='settings',
-                        help='parameters of single nodes, such as torque_share.bias_pot=0.8')
+    add_config_option(parser)
+    add_settings_option(parser)
     parser.add_argument('--sheet', type=Path, metavar='FILE', help='a test sheet for the bag')
     parser.add_argument('--step', type=float, default=0.001, metavar='S',
                         help='macro-step [s]; 0.001 if not given')

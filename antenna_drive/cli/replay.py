@@ -30,6 +30,7 @@ from pathlib import Path
 
 from antenna_drive.cli.output import add_json_option, check_options, give
 from antenna_drive.cli.reading import add_recording_options, read
+from antenna_drive.cli.settings import add_config_option
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.recording.atomic import refuse_existing
 from antenna_drive.recording.mcap_format import write_bag
@@ -39,8 +40,7 @@ from antenna_drive.recording.replay import distances, twin
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command understands."""
     add_recording_options(parser)
-    parser.add_argument('--config', nargs='+', default=(), metavar='FILE',
-                        help='configuration files or names of sets in config/, later over earlier')
+    add_config_option(parser)
     parser.add_argument('--out', type=Path, metavar='BAG',
                         help='the folder to write, not there yet; RECORDING_twin if not given')
     parser.add_argument('--step', type=float, metavar='S',

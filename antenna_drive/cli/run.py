@@ -27,6 +27,9 @@ import argparse
 from pathlib import Path
 
 from antenna_drive.cli.output import check_options, Progress
+from antenna_drive.cli.settings import (
+    add_config_option, add_settings_option, parse_settings,
+)
 from antenna_drive.parameters.schema import Entry
 
 
@@ -36,10 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='simulated time [s]')
     parser.add_argument('--out', type=Path, required=True, metavar='FILE',
                         help='what to write; it must not be there yet')
-    parser.add_argument('--config', nargs='+', default=(), metavar='FILE',
-                        help='configuration files or names of sets in config/, later over earlier')
-    parser.add_argument('--set', nargs='+', default=(), metavar='UNIT.NAME=VALUE', dest='settings',
-                        help='parameters of single units, such as torque_share.bias_pot=0.8')
+    add_config_option(parser)
+    add_settings_option(parser)
     parser.add_argument('--step', type=float, default=1e-3, metavar='S',
                         help='macro-step [s] (default: %(default)s)')
     parser.add_argument('--every', type=int, default=1, metavar='N',
@@ -48,7 +49,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the drive and write what it did."""
-    from antenna_drive.cli.settings import parse_settings
     from antenna_drive.emulator.run import Emulator
     from antenna_drive.emulator.units import overridden
     from antenna_drive.parameters import load

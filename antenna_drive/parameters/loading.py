@@ -31,18 +31,14 @@ from antenna_drive.parameters import files
 from antenna_drive.parameters.plain_yaml import read_yaml
 from antenna_drive.parameters.schema import Entry, mapping_of, nearest, ParameterError, Value
 from antenna_drive.parameters.sets import (
-    Ammeter, Amplifier, Armature, Axis, Drive, Encoder, entries, Filter1, Gearbox, Motor,
-    MotorDrive, RateCommand, Tachometer, TestSignal, TorqueShare, Waveform,
+    Axis, Drive, Encoder, entries, Filter1, MotorDrive, TestSignal, TorqueShare, Waveform,
 )
 
 MOTOR_SECTIONS: dict[str, type] = {
-    'rate_command': RateCommand, 'amplifier': Amplifier, 'armature': Armature, 'motor': Motor,
-    'gearbox': Gearbox, 'tachometer': Tachometer, 'ammeter': Ammeter,
-}
-SECTIONS: dict[str, type] = {
-    'axis': Axis, 'encoder': Encoder, 'torque_share': TorqueShare, 'filter_1': Filter1,
-    **MOTOR_SECTIONS,
-}
+    name: kind for name, kind in get_type_hints(MotorDrive).items()
+    if isinstance(kind, type) and is_dataclass(kind)}
+SECTIONS: dict[str, type] = {'axis': Axis, 'encoder': Encoder, 'torque_share': TorqueShare,
+                             'filter_1': Filter1, **MOTOR_SECTIONS}
 # Where the sets of the drive are that have a section of their own.
 PLACES = {'axis': 'plant.axis', 'encoder': 'plant.encoder',
           'torque_share': 'torque_share.circuit', 'filter_1': 'torque_share.filter_1'}

@@ -26,6 +26,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 import csv
 from dataclasses import replace
 from decimal import Decimal
@@ -397,8 +398,7 @@ def write_csv(recording: Recording, path: str | Path, *, field: bool = False,
     targets = [beside, *([sheet_path] if recording.sheet else []), path]
     for target in targets:
         refuse_existing(target)
-    written: list[Path] = []
-    try:
+    with ExitStack() as undo:
         for target in targets:
             with new_file(target) as stream:
                 if target == beside:
@@ -407,12 +407,9 @@ def write_csv(recording: Recording, path: str | Path, *, field: bool = False,
                     stream.write(dump_sheet(recording.sheet).encode())
                 else:
                     _write_rows(stream, list(chosen), channels, stamps)
-            written.append(target)
-    except BaseException:
-        for target in written:
-            target.unlink(missing_ok=True)
-        raise
-    return tuple(written)
+            undo.callback(target.unlink, missing_ok=True)
+        undo.pop_all()
+    return tuple(targets)
 
 
 def _write_rows(stream: IO[bytes], columns: Sequence[str], channels: Sequence[Channel],

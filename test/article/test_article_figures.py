@@ -69,7 +69,7 @@ def test_every_figure_is_a_file_and_on_the_page(
 
 @pytest.mark.parametrize('number', AXES)
 def test_axes_are_the_articles(number: int, results: Results, short_load: None) -> None:
-    draw = next(draw for own, _, draw in figures.FIGURES if own == number)
+    draw = figures.FIGURES[number]
     axes = draw(results).axes
     x, y = AXES[number]
     labels = [axis.get_xlabel() for axis in axes if axis.get_xlabel()]
