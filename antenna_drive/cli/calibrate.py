@@ -72,9 +72,9 @@ def run(arguments: argparse.Namespace) -> int:
     with replaced(arguments.out) as stream:
         stream.write(configuration(problem, found.best.shares, arguments.start).encode())
     with Progress('uncertainties', 1.0) as shown:
-        told = report(problem, found, arguments.trade_off, shown.update, also)
-    give(told, arguments.json, _text(told))
-    return OK if all(item['met'] for item in told['targets']) else NEGATIVE
+        fitted = report(problem, found, arguments.trade_off, shown.update, also)
+    give(fitted, arguments.json, _text(fitted))
+    return OK if all(item['met'] for item in fitted['targets']) else NEGATIVE
 
 
 def _find(targets: str) -> str | Path:
@@ -83,24 +83,24 @@ def _find(targets: str) -> str | Path:
     return shipped if not Path(targets).exists() and shipped.is_file() else targets
 
 
-def _text(told: dict[str, Any]) -> str:
-    lines = [f'{told["candidates"]} candidates, cost {told["start_cost"]:.4g} -> '
-             f'{told["cost"]:.4g}', '',
+def _text(fitted: dict[str, Any]) -> str:
+    lines = [f'{fitted["candidates"]} candidates, cost {fitted["start_cost"]:.4g} -> '
+             f'{fitted["cost"]:.4g}', '',
              _TARGET.format('', 'target', 'start', 'obtained', 'aim', 'tolerance')]
-    for item in told['targets']:
+    for item in fitted['targets']:
         aim = f'{"" if item["kind"] == "value" else item["kind"].replace("_", " ") + " "}'
         lines.append(_TARGET.format(
             '' if item['met'] else 'MISSED', item['figure'], f'{item["start"]:.4g}',
             f'{item["obtained"]:.4g}', f'{aim}{item["aim"]:g}', f'{item["tolerance"]:g}'))
     lines += ['', _PARAMETER.format('', 'parameter', 'value', 'alone', 'with all others')]
-    for item in told['parameters']:
+    for item in fitted['parameters']:
         lines.append(_PARAMETER.format(
             '' if item['determined'] else 'OPEN', item['name'], f'{item["value"]:.5g}',
             _range(item['conditional']), _range(item['marginal'])))
     lines += ['', 'parameters that can compensate for each other, with their correlation:']
     lines += [f'  {item["first"]} and {item["second"]}: {item["correlation"]:+.2f}'
-              for item in told['correlations']] or ['  none']
-    for figure, curve in told['trade_offs'].items():
+              for item in fitted['correlations']] or ['  none']
+    for figure, curve in fitted['trade_offs'].items():
         lines += ['', f'least cost of the other targets, by {figure}:']
         lines += [f'  {point["level"]:>10.4g}  {point["cost_of_the_others"]:<10.4g}'
                   f'{"misses " + ", ".join(point["missed"]) if point["missed"] else ""}'

@@ -110,7 +110,7 @@ def replaced(path: Path) -> Iterator[IO[bytes]]:
     """
     Give a stream whose content takes the place of `path` at the end, if all went well.
 
-    Whoever looks at `path` sees the old content or the new, never a part of it.
+    A reader of `path` sees the old content or the new, never a part of it.
 
     Raises
     ------

@@ -15,7 +15,7 @@
 From a command line to a running node, and back to an exit code.
 
 This module imports neither ROS 2 nor numpy until it has to, so that Ctrl-C is answered from
-the first moment and a machine without ROS 2 is told so in one line.
+the first moment, and a machine without ROS 2 gets one line that says so.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from antenna_drive.parameters.schema import Value
     from rclpy.node import Node
 
-# The process that a node must not outlive, by number; set by whoever starts nodes for himself.
+# The number of the process that a node must not outlive; set by a program that starts nodes.
 PARENT = 'ANTENNA_DRIVE_PARENT'
 
 # Makes the unit of a node: its name, the wiring, configuration files, what else was given by name.

@@ -51,7 +51,7 @@ EXCHANGE = Entry('', description='auto: the compiled exchange where it can be us
                  'python: the exchange in Python', choices=('auto', 'python'))
 DURATION = Entry('s', 0.0, 1e9, 'simulated time after which the run ends, 0: never')
 
-# What a node itself may be told, beside the settings of its unit.
+# The parameters of a node itself, beside the settings of its unit.
 OWN_PARAMETERS = ('config', 'wiring', 'exchange', 'publish_rate', 'run.step', 'run.pace',
                   'run.lead', 'run.duration', 'run.observers')
 

@@ -25,7 +25,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
 PERIOD_S = 1.0
-# A wait is told after this; with the period above that is within two seconds.
+# A wait is reported after this; with the period above that is within two seconds.
 PATIENCE_S = 0.9
 # A run that goes on makes a step within this; else another that was announced takes its place.
 STANDSTILL_S = 0.2

@@ -27,7 +27,7 @@ class Serving:
     """
     Serves a node's subscriptions, services and timers until it is closed.
 
-    Whatever arrives may be wrong: a callback that fails is told and counted, and the next one
+    Whatever arrives may be wrong: a callback that fails is logged, and the next one
     is served.
 
     Attributes

@@ -45,7 +45,7 @@ NAME = 'recorder'
 OK, FAILED = 0, 1
 # No wait is longer than this [s]; then what was written is made safe.
 _LONGEST_WAIT_S = 0.25
-# How long a new run may take to tell its configuration before its absence is told [s].
+# How long a new run may take to send its configuration before a warning [s].
 _PATIENCE_S = 5.0
 
 
