@@ -188,8 +188,8 @@ THREADS = """from concurrent.futures import ThreadPoolExecutor
     tasks = [pool.submit(time.sleep, 3600) for _ in range(5)]
     print('ready', flush=True)
     tasks[0].result()"""
-HANGING = """print('ready', flush=True)
-    try:
+HANGING = """try:
+        print('ready', flush=True)
         while True: time.sleep(0.05)
     finally:
         print('unwinding', flush=True)
