@@ -12,12 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-The typed parameter sets of the drive.
+The typed parameter sets of the drive: what each parameter is, its unit and what is allowed.
 
-sets.yaml says what each parameter is, its unit and what is allowed. Values come from config/. A
-parameter with a default here is the term of an effect that the article's model does not have: its
-default is neutral, and the physics is then the article's.
-Currents are in article amperes.
+Values come from config/. A parameter with a default here is the term of an effect that the
+article's model does not have: its default is neutral, and the physics is then the article's.
+Letters in [ ] are the symbols of docs/model.md. Currents are in article amperes.
 """
 
 from __future__ import annotations
@@ -25,161 +24,189 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 import math
-from pathlib import Path
-from types import MappingProxyType
 from typing import Any, TypeVar
 
 from antenna_drive.parameters.schema import Entry, Value
-import yaml
 
 Set = TypeVar('Set')
 # A choice is a text in a set; in the set's record it is the text's place among the choices.
 Choice = Any
 
-_TABLE: dict[str, dict[str, dict[str, Any]]] = yaml.load(
-    Path(__file__).with_suffix('.yaml').read_text(encoding='utf-8'),
-    Loader=getattr(yaml, 'CSafeLoader', yaml.SafeLoader))
 # The greatest numbers of flexible modes and of sines in a multisine that a set can hold.
-MODES_LIMIT: int = _TABLE['Axis']['mode_inertias']['lengths'][1]
-SINES_LIMIT: int = _TABLE['Waveform']['frequencies']['lengths'][1]
+MODES_LIMIT = 6
+SINES_LIMIT = 32
+
+WAVEFORMS = ('zero', 'square', 'saw_tooth', 'saw_tooth_jump', 'step', 'sine', 'chirp', 'multisine',
+             'prbs', 'external')
+BIAS_SOURCES = ('circuit', 'fixed')
+SHARE_STARTS = ('zero', 'steady')
 
 
-def _described(kind: type[Set]) -> type[Set]:
-    """Give each parameter of a set its entry, which sets.yaml holds under the set's name."""
-    for item in fields(kind):  # type: ignore[arg-type]
-        row = _TABLE[kind.__name__].get(item.name)
-        if row is not None:
-            given: dict[str, Any] = {
-                key: tuple(value) if isinstance(value, list) else value
-                for key, value in row.items()}
-            item.metadata = MappingProxyType({'entry': Entry(**given)})
-    return kind
+def _given(unit: str, low: float, high: float, description: str, *, live: bool = False) -> Any:
+    """Declare a number that a configuration must give."""
+    return field(metadata={'entry': Entry(unit, low, high, description, live)})
 
 
-@_described
+def _effect(neutral: float, unit: str, low: float, high: float, description: str) -> Any:
+    """Declare the term of an unmodelled effect, with its neutral value."""
+    return field(default=neutral, metadata={'entry': Entry(unit, low, high, description)})
+
+
+def _option(default: Any, entry: Entry) -> Any:
+    return field(default=default, metadata={'entry': entry})
+
+
+_PHASE = ('rad', -2.0 * math.pi, 2.0 * math.pi)
+
+
 @dataclass(frozen=True, kw_only=True)
 class RateCommand:
     """Transfer function 1, Table 1."""
 
-    k_s: float
-    k_1: float
-    tau_1: float
+    k_s: float = _given('1', 0.01, 10.0, 'scale of the rate command')
+    k_1: float = _given('V s/rad', 1.0, 1e5, 'volts per axis rate')
+    tau_1: float = _given('s', 1e-4, 10.0, 'time constant')
 
 
-@_described
 @dataclass(frozen=True, kw_only=True)
 class Amplifier:
     """Amplifiers 1 and 2 of Fig. 6."""
 
-    rate_gain: float
-    integral_time: float
-    lag: float
-    current_feedback_gain: float
-    tach_gain: float
-    bias_command_gain: float
-    offset: float = 0.0
-    crossover: float = 0.0
-    forward_gain_share: float = 1.0
-    dead_zone: float = 0.0
-    delay: float = 0.0
+    rate_gain: float = _given('A/V', 1e-3, 1e3, 'proportional gain of amplifier 1 [k_r]')
+    integral_time: float = _given('s', 1e-3, 100.0, 'integral time of amplifier 1 [T_2]')
+    lag: float = _given('s', 1e-4, 10.0, 'lag behind amplifier 1 [T_a]')
+    current_feedback_gain: float = _given(
+        'ohm', 0.0, 1e3, 'current feedback of amplifier 2 [G_a]')
+    tach_gain: float = _given('V s/rad', 1e-6, 10.0, 'volts per tachometer rate [k_t]')
+    bias_command_gain: float = _given(
+        '1', 0.0, 10.0, 'share of the counter torque that reaches amplifier 1 [s_F]')
+    offset: float = _effect(0.0, 'V', -1.0, 1.0, 'offset at the input of amplifier 1')
+    crossover: float = _effect(
+        0.0, 'A', 0.0, 10.0, 'demand that the crossover of amplifier 2 swallows')
+    forward_gain_share: float = _effect(
+        1.0, '1', 0.1, 10.0, 'gain of amplifier 2 as a share of R + G_a')
+    dead_zone: float = _effect(
+        0.0, 'V', 0.0, 1.0, 'half the width within which amplifier 1 does not answer')
+    delay: float = _effect(
+        0.0, 's', 0.0, 0.1, 'time by which the rate error comes late, to first order')
 
 
-@_described
 @dataclass(frozen=True, kw_only=True)
 class Armature:
     """The motor's armature, Fig. 6."""
 
-    resistance: float
-    inductance: float
-    back_emf_constant: float
-    physical_amperes_per_article_ampere: float
-    voltage_limit: float
-    back_emf_share: float = 1.0
-    resistance_change: float = 0.0
+    resistance: float = _given('ohm', 1e-3, 1e3, 'armature resistance [R]')
+    inductance: float = _given('H', 1e-5, 10.0, 'armature inductance [L]')
+    back_emf_constant: float = _given('V s/rad', 1e-4, 1e3, 'back-EMF constant [k_b]')
+    physical_amperes_per_article_ampere: float = _given(
+        '1', 0.1, 100.0, 'real amperes in one article ampere [kappa]')
+    voltage_limit: float = _given('V', 1.0, 1e4, 'greatest armature voltage [V_max]')
+    back_emf_share: float = _effect(
+        1.0, '1', 0.1, 10.0, "back-EMF as a share of what the amplifier's limiter is made for")
+    resistance_change: float = _effect(
+        0.0, 'ohm', -1e3, 1e3, 'resistance beyond the one that amplifier 2 is made for')
 
 
-@_described
 @dataclass(frozen=True, kw_only=True)
 class Motor:
     """The motor's mechanics, Fig. 7."""
 
-    torque_constant: float
-    friction_torque_per_ampere: float
-    current_limit: float
-    rotor_inertia: float
-    coulomb_torque: float
-    stiction_ratio: float
-    velocity_threshold: float
-    viscous_friction: float = 0.0
-    viscous_rate: float = 10.0
-    flow_index: float = 1.0
-    stribeck_torque: float = 0.0
-    stribeck_rate: float = 5.0
-    stribeck_shape: float = 2.0
-    friction_asymmetry: float = 0.0
-    load_dependent_friction: float = 0.0
-    torque_ripple: float = 0.0
-    torque_ripple_cycles: float = 12.0
-    torque_ripple_phase: float = 0.0
-    torque_ripple_second: float = 0.0
-    torque_ripple_second_phase: float = 0.0
-    torque_ripple_third: float = 0.0
-    torque_ripple_third_phase: float = 0.0
+    torque_constant: float = _given('N m/A', 1e-3, 1e3, 'torque per article ampere [k_m]')
+    friction_torque_per_ampere: float = _given(
+        'N m/A', 1e-3, 1e3, 'what one article ampere of friction counts as a torque')
+    current_limit: float = _given('A', 1e-2, 1e3, 'greatest current [i_max]')
+    rotor_inertia: float = _given('kg m^2', 1e-6, 1e3, 'rotor inertia [J_m]')
+    coulomb_torque: float = _given('A', 0.0, 100.0, 'Coulomb friction of the motor [T_c]')
+    stiction_ratio: float = _given('1', 1.0, 5.0, 'stiction over Coulomb friction, Eq. (4)')
+    velocity_threshold: float = _given(
+        'rad/s', 0.0, 1.0, 'rate below which friction can stop the rotor [v_t]')
+    viscous_friction: float = _effect(
+        0.0, 'N m s/rad', 0.0, 1.0, 'friction torque per rate, at viscous_rate')
+    viscous_rate: float = _effect(
+        10.0, 'rad/s', 1e-3, 1e3, 'rate at which the flow index makes no difference')
+    flow_index: float = _effect(
+        1.0, '1', 0.1, 3.0, 'exponent of the rate in viscous friction: below 1 it thins')
+    stribeck_torque: float = _effect(
+        0.0, 'N m', 0.0, 10.0, 'friction above the Coulomb level at creep')
+    stribeck_rate: float = _effect(
+        5.0, 'rad/s', 1e-3, 1e3, 'rate at which the Stribeck torque has fallen to 1/e')
+    stribeck_shape: float = _effect(
+        2.0, '1', 0.1, 4.0, 'exponent of the rate in the fall of the Stribeck torque')
+    friction_asymmetry: float = _effect(
+        0.0, '1', -0.9, 0.9, 'share by which forward friction exceeds the mean of both ways')
+    load_dependent_friction: float = _effect(
+        0.0, '1', 0.0, 0.5, 'friction torque per gear torque')
+    torque_ripple: float = _effect(0.0, 'N m', 0.0, 20.0, 'amplitude of the torque ripple')
+    torque_ripple_cycles: float = _effect(
+        12.0, '1', 0.1, 200.0, 'cycles of the torque ripple per motor revolution')
+    torque_ripple_phase: float = _effect(0.0, *_PHASE, 'phase of the torque ripple')
+    torque_ripple_second: float = _effect(
+        0.0, 'N m', 0.0, 20.0, 'amplitude of the second harmonic of the torque ripple')
+    torque_ripple_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
+    torque_ripple_third: float = _effect(
+        0.0, 'N m', 0.0, 20.0, 'amplitude of the third harmonic of the torque ripple')
+    torque_ripple_third_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
 
 
-@_described
 @dataclass(frozen=True, kw_only=True)
 class Gearbox:
     """The gearbox with backlash, Eq. (1), referred to the motor shaft."""
 
-    stiffness: float
-    half_gap: float
-    contact_damping: float
-    hysteresis: float = 0.0
-    hysteresis_share: float = 0.0
-    hysteresis_angle: float = 0.02
-    transmission_error: float = 0.0
-    transmission_error_cycles: float = 1.0
-    transmission_error_phase: float = 0.0
-    transmission_error_second: float = 0.0
-    transmission_error_second_phase: float = 0.0
-    transmission_error_third: float = 0.0
-    transmission_error_third_phase: float = 0.0
+    stiffness: float = _given('N m/rad', 1e-3, 1e6, 'torsional stiffness [k_g]')
+    half_gap: float = _given('rad', 0.0, 10.0, 'half the backlash gap [b]')
+    contact_damping: float = _given(
+        'N m s/rad', 0.0, 1e3, 'damping of the touching flanks [d_g]')
+    hysteresis: float = _effect(0.0, 'N m', 0.0, 20.0, 'torque of the internal friction')
+    hysteresis_share: float = _effect(
+        0.0, '1', 0.0, 0.9, 'internal friction as a share of the elastic torque')
+    hysteresis_angle: float = _effect(
+        0.02, 'rad', 1e-4, 1.0, 'wind-up over which the internal friction builds up')
+    transmission_error: float = _effect(
+        0.0, 'rad', 0.0, 1.0, 'amplitude of the transmission error')
+    transmission_error_cycles: float = _effect(
+        1.0, '1', 0.001, 200.0, 'cycles of the transmission error per motor revolution')
+    transmission_error_phase: float = _effect(0.0, *_PHASE, 'phase of the transmission error')
+    transmission_error_second: float = _effect(
+        0.0, 'rad', 0.0, 1.0, 'amplitude of the second harmonic of the transmission error')
+    transmission_error_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
+    transmission_error_third: float = _effect(
+        0.0, 'rad', 0.0, 1.0, 'amplitude of the third harmonic of the transmission error')
+    transmission_error_third_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
 
 
-@_described
 @dataclass(frozen=True, kw_only=True)
 class Tachometer:
     """The motor's tachometer; amplifier 1 sees its errors."""
 
-    gain: float = 1.0
-    offset: float = 0.0
-    ripple: float = 0.0
-    ripple_cycles: float = 1.0
-    ripple_phase: float = 0.0
-    ripple_second: float = 0.0
-    ripple_second_phase: float = 0.0
-    ripple_third: float = 0.0
-    ripple_third_phase: float = 0.0
+    gain: float = _effect(1.0, '1', 0.1, 10.0, 'reading per rate')
+    offset: float = _effect(0.0, 'rad/s', -10.0, 10.0, 'reading at standstill')
+    ripple: float = _effect(0.0, '1', 0.0, 1.0, 'amplitude of the ripple, as a share of the rate')
+    ripple_cycles: float = _effect(1.0, '1', 0.1, 200.0, 'cycles of the ripple per revolution')
+    ripple_phase: float = _effect(0.0, *_PHASE, 'phase of the ripple')
+    ripple_second: float = _effect(
+        0.0, '1', 0.0, 1.0, 'amplitude of the second harmonic of the ripple')
+    ripple_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
+    ripple_third: float = _effect(
+        0.0, '1', 0.0, 1.0, 'amplitude of the third harmonic of the ripple')
+    ripple_third_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
 
 
-@_described
 @dataclass(frozen=True, kw_only=True)
 class Ammeter:
     """The reading of the motor current; no loop sees its errors."""
 
-    gain: float = 1.0
-    offset: float = 0.0
+    gain: float = _effect(1.0, '1', 0.1, 10.0, 'reading per current')
+    offset: float = _effect(0.0, 'A', -10.0, 10.0, 'reading at no current')
 
 
-@_described
 @dataclass(frozen=True, kw_only=True)
 class MotorDrive:
     """One motor with its amplifiers and its gearbox: G_o of Fig. 6."""
 
-    sign: float
-    gear_ratio: float
-    start_in_gap: float = 0.0
+    sign: float = _given('1', -1.0, 1.0, 'sign of the counter torque in this motor [s]')
+    gear_ratio: float = _given('1', 1.0, 1e6, 'motor turns per turn of the axis [N]')
+    start_in_gap: float = _option(
+        0.0, Entry('1', -1.0, 1.0, 'place of the motor in its gap at the start, -1 to 1'))
     rate_command: RateCommand
     amplifier: Amplifier
     armature: Armature
@@ -189,38 +216,59 @@ class MotorDrive:
     ammeter: Ammeter
 
 
-@_described
 @dataclass(frozen=True, kw_only=True)
 class Axis:
     """The antenna about one axis: hub, friction and flexible modes."""
 
-    gear_ratio: float
-    inertia_hub: float
-    mode_inertias: tuple[float, ...]
-    mode_frequencies: tuple[float, ...]
-    mode_damping_ratios: tuple[float, ...]
-    pointing_elevation: tuple[float, ...]
-    pointing_cross_elevation: tuple[float, ...]
-    coulomb_torque: float
-    friction_torque_per_ampere: float
-    stiction_ratio: float
-    velocity_threshold: float
-    start_elevation: float = math.pi / 4
-    viscous_friction: float = 0.0
-    viscous_rate: float = 0.001
-    flow_index: float = 1.0
-    stribeck_torque: float = 0.0
-    stribeck_rate: float = 0.0001
-    stribeck_shape: float = 2.0
-    friction_wave: float = 0.0
-    friction_wave_cycles: float = 100.0
-    friction_wave_phase: float = 0.0
-    friction_wave_second: float = 0.0
-    friction_wave_second_phase: float = 0.0
-    friction_wave_third: float = 0.0
-    friction_wave_third_phase: float = 0.0
-    gravity_torque: float = 0.0
-    steady_wind_torque: float = 0.0
+    gear_ratio: float = _given('1', 1.0, 1e6, 'motor turns per turn of the axis [N]')
+    inertia_hub: float = _given('kg m^2', 1.0, 1e12, 'inertia of the hub [J_0]')
+    mode_inertias: tuple[float, ...] = field(metadata={'entry': Entry(
+        'kg m^2', 1e-3, 1e12, 'inertia of each mode [m_j]', lengths=(1, MODES_LIMIT))})
+    mode_frequencies: tuple[float, ...] = field(metadata={'entry': Entry(
+        'Hz', 1e-3, 100.0, 'frequency of each mode, hub held [omega_j / 2 pi]',
+        lengths=(1, MODES_LIMIT))})
+    mode_damping_ratios: tuple[float, ...] = field(metadata={'entry': Entry(
+        '1', 0.0, 1.0, 'damping ratio of each mode [zeta_j]', lengths=(1, MODES_LIMIT))})
+    pointing_elevation: tuple[float, ...] = field(metadata={'entry': Entry(
+        '1', -100.0, 100.0, 'elevation error per bend of each mode', lengths=(1, MODES_LIMIT))})
+    pointing_cross_elevation: tuple[float, ...] = field(metadata={'entry': Entry(
+        '1', -100.0, 100.0, 'cross-elevation error per bend of each mode',
+        lengths=(1, MODES_LIMIT))})
+    coulomb_torque: float = _given(
+        'A', 0.0, 1e3, 'Coulomb friction, as current of both motors together')
+    friction_torque_per_ampere: float = _given(
+        'N m/A', 1e-3, 1e3, 'what one article ampere of friction counts as a motor torque')
+    stiction_ratio: float = _given('1', 1.0, 5.0, 'stiction over Coulomb friction, Eq. (4)')
+    velocity_threshold: float = _given(
+        'rad/s', 0.0, 1e-3, 'rate below which friction can stop the axis [v_t]')
+    start_elevation: float = _option(
+        math.pi / 4, Entry('rad', -0.2, 3.4, 'elevation at the start'))
+    viscous_friction: float = _effect(
+        0.0, 'N m s/rad', 0.0, 1e10, 'friction torque per rate, at viscous_rate')
+    viscous_rate: float = _effect(
+        1e-3, 'rad/s', 1e-7, 1.0, 'rate at which the flow index makes no difference')
+    flow_index: float = _effect(
+        1.0, '1', 0.1, 3.0, 'exponent of the rate in viscous friction: below 1 it thins')
+    stribeck_torque: float = _effect(
+        0.0, 'N m', 0.0, 1e7, 'friction above the Coulomb level at creep')
+    stribeck_rate: float = _effect(
+        1e-4, 'rad/s', 1e-7, 1.0, 'rate at which the Stribeck torque has fallen to 1/e')
+    stribeck_shape: float = _effect(
+        2.0, '1', 0.1, 4.0, 'exponent of the rate in the fall of the Stribeck torque')
+    friction_wave: float = _effect(
+        0.0, '1', 0.0, 0.9, 'share by which friction varies with the angle')
+    friction_wave_cycles: float = _effect(
+        100.0, '1', 0.1, 1e5, 'cycles of that variation per turn of the axis')
+    friction_wave_phase: float = _effect(0.0, *_PHASE, 'phase of that variation')
+    friction_wave_second: float = _effect(
+        0.0, '1', 0.0, 0.9, 'amplitude of the second harmonic of that variation')
+    friction_wave_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
+    friction_wave_third: float = _effect(
+        0.0, '1', 0.0, 0.9, 'amplitude of the third harmonic of that variation')
+    friction_wave_third_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
+    gravity_torque: float = _effect(
+        0.0, 'N m', -1e7, 1e7, 'imbalance: torque at zero elevation, pulling down')
+    steady_wind_torque: float = _effect(0.0, 'N m', -1e7, 1e7, 'torque of a steady wind')
 
     @property
     def mode_inertias_count(self) -> int:
@@ -228,20 +276,22 @@ class Axis:
         return len(self.mode_inertias)
 
 
-@_described
 @dataclass(frozen=True, kw_only=True)
 class Encoder:
     """The reading of the axis angle; no loop sees its errors."""
 
-    offset: float = 0.0
-    step: float = 0.0
-    cyclic_error: float = 0.0
-    cyclic_error_cycles: float = 4096.0
-    cyclic_error_phase: float = 0.0
-    cyclic_error_second: float = 0.0
-    cyclic_error_second_phase: float = 0.0
-    cyclic_error_third: float = 0.0
-    cyclic_error_third_phase: float = 0.0
+    offset: float = _effect(0.0, 'rad', -1.0, 1.0, 'reading at angle zero')
+    step: float = _effect(0.0, 'rad', 0.0, 0.1, 'size of one count')
+    cyclic_error: float = _effect(0.0, 'rad', 0.0, 0.1, 'amplitude of the cyclic error')
+    cyclic_error_cycles: float = _effect(
+        4096.0, '1', 1.0, 1e6, 'cycles of the cyclic error per turn')
+    cyclic_error_phase: float = _effect(0.0, *_PHASE, 'phase of the cyclic error')
+    cyclic_error_second: float = _effect(
+        0.0, 'rad', 0.0, 0.1, 'amplitude of the second harmonic of the cyclic error')
+    cyclic_error_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
+    cyclic_error_third: float = _effect(
+        0.0, 'rad', 0.0, 0.1, 'amplitude of the third harmonic of the cyclic error')
+    cyclic_error_third_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -252,34 +302,37 @@ class Plant:
     encoder: Encoder
 
 
-@_described
 @dataclass(frozen=True, kw_only=True)
 class TorqueShare:
     """The torque-share circuit, Fig. 14 and Table 1."""
 
-    bias_pot: float
-    fade_out_voltage: float
-    current_to_voltage: float
-    saturation_low: float
-    saturation_high: float
-    k_2: float
-    s_2: float
-    k_3: float
-    g_4: float
-    bias_source: Choice = 'circuit'
-    fixed_voltage: float = 0.0
-    start: Choice = 'zero'
-    voltmeter_gain: float = 1.0
+    bias_pot: float = _given('1', 0.0, 1.0, 'bias pot, scales the bias voltage [k_p]', live=True)
+    fade_out_voltage: float = _given(
+        'V', -50.0, 0.0, 'voltage that widens the flat part of the bias [f_o]', live=True)
+    current_to_voltage: float = _given('V/A', 1e-3, 100.0, 'volts per current [c_i]')
+    saturation_low: float = _given('V', -50.0, 50.0, 'lower limit of Eq. (10)')
+    saturation_high: float = _given('V', -50.0, 50.0, 'upper limit of Eq. (10)')
+    k_2: float = _given('1/s', -100.0, 0.0, 'gain of transfer function 2')
+    s_2: float = _given('1/s', 1e-3, 100.0, 'pole of transfer functions 2 and 4')
+    k_3: float = _given('1/s', 1e-3, 100.0, 'gain and pole of transfer function 3')
+    g_4: float = _given('1', 0.0, 100.0, 'transfer function 4 over transfer function 2')
+    bias_source: Choice = _option('circuit', Entry(
+        '', description='where the bias voltage comes from', live=True, choices=BIAS_SOURCES))
+    fixed_voltage: float = _option(0.0, Entry(
+        'V', -50.0, 50.0, 'bias voltage of a fixed source', live=True))
+    start: Choice = _option('zero', Entry(
+        '', description='state of the circuit at the start', choices=SHARE_STARTS))
+    voltmeter_gain: float = _effect(1.0, '1', 0.1, 10.0, 'reading per bias voltage')
 
 
-@_described
 @dataclass(frozen=True, kw_only=True)
 class Filter1:
     """Filter 1, Eq. (15), as k' / (s + p)."""
 
-    gain: float
-    pole: float
-    difference_gain: float
+    gain: float = _given('1/s', 0.0, 1e4, "gain [k']", live=True)
+    pole: float = _given('1/s', 0.0, 1e3, 'pole [p]', live=True)
+    difference_gain: float = _given(
+        'V/A', 1e-3, 1e3, 'volts per difference of the currents [k_f]')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -290,25 +343,31 @@ class Share:
     filter_1: Filter1
 
 
-@_described
 @dataclass(frozen=True, kw_only=True)
 class Waveform:
     """A test signal over time; amplitude in the unit of what it commands."""
 
-    waveform: Choice = 'zero'
-    amplitude: float = 0.0
-    offset: float = 0.0
-    period: float = 5.0
-    phase: float = 0.0
-    start_after: float = 0.0
-    sweep_from: float = 0.1
-    sweep_to: float = 5.0
-    sweep_time: float = 30.0
-    frequencies: tuple[float, ...] = (0.3, 0.7, 1.5)
-    weights: tuple[float, ...] = (0.4, 0.3, 0.3)
-    phases: tuple[float, ...] = (0.0, 0.0, 0.0)
-    bit_time: float = 0.2
-    external: float = 0.0
+    waveform: Choice = _option('zero', Entry(
+        '', description='shape of the signal', live=True, choices=WAVEFORMS))
+    amplitude: float = _option(0.0, Entry(
+        'SI', -1e9, 1e9, 'greatest value, rad/s or N m', live=True))
+    offset: float = _option(0.0, Entry('SI', -1e9, 1e9, 'added to the waveform', live=True))
+    period: float = _option(5.0, Entry('s', 0.01, 1e5, 'period', live=True))
+    phase: float = _option(0.0, Entry('1', -1.0, 1.0, 'start within the period', live=True))
+    start_after: float = _option(0.0, Entry(
+        's', 0.0, 1e6, 'time before which the signal is zero', live=True))
+    sweep_from: float = _option(0.1, Entry('Hz', 0.0, 500.0, 'first frequency', live=True))
+    sweep_to: float = _option(5.0, Entry('Hz', 0.0, 500.0, 'last frequency', live=True))
+    sweep_time: float = _option(30.0, Entry('s', 0.01, 1e5, 'time of one sweep', live=True))
+    frequencies: tuple[float, ...] = _option((0.3, 0.7, 1.5), Entry(
+        'Hz', 0.0, 500.0, 'frequencies of a multisine', live=True, lengths=(1, SINES_LIMIT)))
+    weights: tuple[float, ...] = _option((0.4, 0.3, 0.3), Entry(
+        '1', -100.0, 100.0, 'weights of a multisine', live=True, lengths=(1, SINES_LIMIT)))
+    phases: tuple[float, ...] = _option((0.0, 0.0, 0.0), Entry(
+        'rad', -100.0, 100.0, 'phases of a multisine', live=True, lengths=(1, SINES_LIMIT)))
+    bit_time: float = _option(0.2, Entry('s', 1e-3, 1e3, 'time of one bit of a PRBS', live=True))
+    external: float = _option(0.0, Entry(
+        'SI', -1e9, 1e9, 'value commanded from outside', live=True))
 
     @property
     def frequencies_count(self) -> int:
@@ -316,7 +375,6 @@ class Waveform:
         return len(self.frequencies)
 
 
-@_described
 @dataclass(frozen=True, kw_only=True)
 class TestSignal:
     """What the drive is commanded: a rate [rad/s], and a torque on the axis [N m]."""
@@ -325,7 +383,7 @@ class TestSignal:
 
     rate: Waveform = field(default_factory=Waveform)
     torque: Waveform = field(default_factory=Waveform)
-    delay: float = 0.0
+    delay: float = _effect(0.0, 's', 0.0, 1.0, 'time by which the command comes late')
 
 
 @dataclass(frozen=True, kw_only=True)
