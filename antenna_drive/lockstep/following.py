@@ -31,7 +31,7 @@ from antenna_drive.lockstep.frame import all_finite, HEADER, LARGEST_RUN, NO_RUN
 
 Frame = tuple[float, ...]
 
-# Units are a few steps apart at most; more incomplete steps than these are somebody's invention.
+# Units are a few steps apart at most; more incomplete steps than this are not genuine.
 _DEPTH = 4096
 
 # Runs of which frames are kept, and runs that are over and remembered as such.

@@ -159,7 +159,7 @@ class Inbox:
         self.step += 1
         self._awaited = (self.run, float(self.step))
         # Nobody can announce a run and let this one go on: what came early and is still
-        # waiting so many steps later belongs to no run.
+        # waiting this many steps later belongs to no run.
         while self._early and self.step - self._early[0][2] > DEPTH:
             self.refuse(self._early.popleft()[0], Refusal.WRONG_RUN)
 
