@@ -20,7 +20,7 @@ of samples; between two that differ by more than their neighbours do, a jump is 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 import math
 from typing import Any, Protocol
@@ -129,6 +129,40 @@ class RecordedCommand:
         """Return the times up to `end` at which the command jumps [s]."""
         return self.jumps[self.jumps < end]
 
+    def part(self, begin: float, end: float) -> RecordedCommand:
+        """Return the command between two times [s], in a time that counts from the first."""
+        # one sample beyond either end keeps the straight lines to it
+        first = max(int(np.searchsorted(self.time, begin, side='right')) - 1, 0)
+        last = int(np.searchsorted(self.time, end)) + 1
+        inside = (self.jumps > begin) & (self.jumps < end)
+        return RecordedCommand(self.time[first:last] - begin, self.value[first:last],
+                               self.jumps[inside] - begin)
+
+
+@dataclass(frozen=True)
+class LaterCommand:
+    """A command that is known by its waveform, in a time that counts from `begin` [s]."""
+
+    command: SheetCommand
+    begin: float
+
+    def __call__(self, time: FloatArray) -> FloatArray:
+        """Return the rate command [rad/s] at these times [s]."""
+        return self.command(time + self.begin)
+
+    def knots(self, end: float) -> FloatArray:
+        """Return the times up to `end` at which the command or its slope jumps [s]."""
+        knots = self.command.knots(self.begin + end) - self.begin
+        return np.asarray(knots[knots > 0.0])
+
+
+def command_between(command: SheetCommand | RecordedCommand, begin: float,
+                    end: float) -> CommandedRate:
+    """Return a command between two times [s], in a time that counts from the first."""
+    if isinstance(command, RecordedCommand):
+        return command.part(begin, end)
+    return LaterCommand(command, begin) if begin else command
+
 
 @dataclass(frozen=True)
 class Bias:
@@ -137,6 +171,10 @@ class Bias:
     before: float = 0.0
     after: float = 0.0
     at: float = 0.0
+
+    def later(self, begin: float) -> Bias:
+        """Return the source in a time that counts from `begin` [s]."""
+        return replace(self, at=self.at - begin)
 
 
 @dataclass(frozen=True)
