@@ -31,6 +31,7 @@ from antenna_drive.machines.antenna.field_recording import (
 from antenna_drive.machines.antenna.inference import completed
 from antenna_drive.machines.antenna.sensors import jitter_of, SensorModel
 from antenna_drive.machines.antenna.sheet_settings import as_the_sheet_says
+from antenna_drive.machines.antenna.suitability import check
 from antenna_drive.machines.antenna.windows import Window, windows
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed, Drive
@@ -119,11 +120,14 @@ def prepared(recordings: Mapping[str, Recording], drive: Drive, note: Note) -> l
 
     Raises
     ------
-    UserError : a recording lacks the rate command, or a reading to compare, or nearly
+    UserError : a recording lacks the rate command or readings, or cannot be of this drive
 
     """
-    found = completed([FieldRecording.of(name, recording, note)
-                       for name, recording in recordings.items()], drive, note)
+    found = [FieldRecording.of(name, recording, note) for name, recording in recordings.items()]
+    for recording in found:
+        if not recording.is_planned:
+            check(recording, drive, note)
+    found = completed(found, drive, note)
     most = 1 if len(found) >= _MANY else 2
     tests = []
     for recording in found:

@@ -50,7 +50,7 @@ _BEFORE_S = 1.0
 _REST_S, _REST_LEFT_S = 12.0, 5.0
 # In the middle of a motion the slowest states, integrators of the amplifiers that work against
 # each other, are forgotten to a few standard deviations within this time [s].
-_SETTLING_S = 10.0
+_SETTLING_S = 15.0
 # Windows in the middle of a motion begin at multiples of this [s].
 _GRID_S = 1.0
 # Windows are sought within this time from the start [s].
