@@ -61,7 +61,7 @@ _FROM_START_S = 60.0
 # that is not known, and each second that is simulated and not compared. (Of 25 long recordings of
 # practice, those whose bias steps in the middle gain 1.1 to 2.1 by a later window, the others up
 # to 0.6.)
-_UNKNOWN_COST, _COST_PER_S = 0.5, 0.007
+_UNKNOWN_COST, _COST_PER_S = 0.5, 0.015
 # Runs that weigh windows: longest step and spacing of samples [s].
 _STEP_S, _SAMPLE_S = 5.3e-3, 0.04
 # Responses beyond this many standard deviations tell no more.
