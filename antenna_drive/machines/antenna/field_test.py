@@ -133,7 +133,7 @@ def prepared(recordings: Mapping[str, Recording], drive: Drive, note: Note) -> l
     for recording in found:
         configured, bias = as_the_sheet_says(recording.sheet, drive)
         chosen = windows(recording, configured, bias, most)
-        tests += [_test(recording, window, configured, bias) for window in chosen]
+        tests += [window_of(recording, window, configured, bias) for window in chosen]
         if not (len(chosen) == 1 and math.isinf(chosen[0].end)):
             note(f'{recording.name}: of {recording.end:.0f} s, ' + ' and '.join(
                 f'{window.compared:.0f} to {min(window.end, recording.end):.0f} s'
@@ -141,7 +141,7 @@ def prepared(recordings: Mapping[str, Recording], drive: Drive, note: Note) -> l
     return tests
 
 
-def _test(recording: FieldRecording, window: Window, drive: Drive, bias: Bias) -> FieldTest:
+def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bias) -> FieldTest:
     """Return one window of a recording, made ready."""
     name = recording.name
     time = recording.thinned(window.compared, window.end)
