@@ -51,8 +51,9 @@ _ASTRAY = 0.005
 _SAME_POT = 0.03
 # A pot of a sheet is doubted if it is off by this share.
 _OTHER_POT = 0.25
-# Settings of the fade-out that are tried, as factors to the configured one.
-_FADE_OUTS = (1.0, 0.55, 0.7, 0.85, 1.15, 1.3, 1.45)
+# Settings of the fade-out that are tried, as factors to the configured one. Another one than
+# configured must fit better by this factor.
+_FADE_OUTS, _ODD = (1.0, 0.55, 0.7, 0.85, 1.15, 1.3, 1.45), 1.3
 # The circuit is fed with this much of a recording [s], at this rate [Hz].
 _FED_S, _FED_HZ = 120.0, 100.0
 # The drive is simulated for this long after its motion begins or the bias steps [s].
@@ -284,7 +285,8 @@ def _fit(recordings: Sequence[FieldRecording], circuit: str, drive: Drive) -> _F
             shapes.append(tried[starts[-1]])
         shape = np.concatenate(shapes)
         pot = _pot(whole, shape)
-        fits.append(_Fit(_misfit(whole, shape, pot), round(min(pot, 1.0), 3), tuple(starts)))
+        misfit = _misfit(whole, shape, pot) * (1.0 if factor == 1.0 else _ODD)
+        fits.append(_Fit(misfit, round(min(pot, 1.0), 3), tuple(starts)))
     return min(fits, key=lambda fit: fit.misfit)
 
 
