@@ -26,7 +26,7 @@ from antenna_drive.machines.antenna.windows import first_window, Window
 from antenna_drive.parameters import load
 from antenna_drive.parameters.sets import changed
 from antenna_drive.recording.recording import Recording
-from antenna_drive.recording.sheet import CircuitBias, FixedStepBias, TestSheet
+from antenna_drive.recording.sheet import CircuitBias, FixedStepBias, TestSheet, Triangle
 from field_runs import FAST_TRIANGLE, field_run, NOISE, SLOW_SQUARE
 import numpy as np
 import pytest
@@ -138,3 +138,28 @@ def test_a_step_in_the_sheet_is_shifted_with_the_window() -> None:
     test = compared(**{name: Recording(recording.channels, sheet=sheet) for name in 'abc'})[0]
     seen = test.measured[:, BIAS] > 3.0
     assert np.array_equal(seen, test.simulated(2.5e-3)[:, BIAS] > 3.0)
+
+
+@pytest.mark.parametrize('signal, repeats', [
+    ({'waveform': 'chirp', 'amplitude': 1e-3, 'sweep_from': 0.1, 'sweep_to': 4.0,
+      'sweep_time': 28.0}, False),
+    (FAST_TRIANGLE, True), (SLOW_SQUARE, True),
+])
+def test_a_recorded_sweep_is_searched_whole(signal: dict[str, Any], repeats: bool) -> None:
+    test, = compared(rec=field_run(DRIVE, 30.0, SHEET, start_after=1.0, **signal))
+    assert test.repeats == repeats
+
+
+def test_a_late_window_keeps_the_time_of_the_recorder() -> None:
+    """A sheet's waveform is 6 ms off after a minute if the recorder's clock is off by 1e-4."""
+    late = changed(DRIVE, {'torque_share.circuit.bias_source': 'fixed'})
+    run = field_run(late, 150.0, changes={70_000: {'torque_share': {'fixed_voltage': 6.0}}},
+                    **FAST_TRIANGLE)
+    fast = Recording.from_arrays(run['plant/encoder'].time_s * (1.0 + 1e-4), {
+        name: run[name].values for name in run}, sheet=TestSheet(
+            circuit='new', filter_1='new', waveform=Triangle(np.degrees(8e-3), 6.0, 0.0)))
+    test = compared(a=fast, b=fast, c=fast)[0]
+    begin = round(float(test.name.split()[1].split('-')[0]) - float(test.time[0]))
+    at = (test.time + begin) / (1.0 + 1e-4)
+    expected = np.interp(at, run['plant/encoder'].time_s, run['test_signal/rate_command'].values)
+    assert np.abs(test.command(test.time) - expected).max() < 8e-3 * 1e-3

@@ -221,31 +221,6 @@ def _periodic(after: FloatArray, before: FloatArray, cycle: int) -> FloatArray |
 
 
 @dataclass(frozen=True)
-class LaterCommand:
-    """A command that is known by its waveform, in a time that counts from `begin` [s]."""
-
-    command: SheetCommand
-    begin: float
-
-    def __call__(self, time: FloatArray) -> FloatArray:
-        """Return the rate command [rad/s] at these times [s]."""
-        return self.command(time + self.begin)
-
-    def knots(self, end: float) -> FloatArray:
-        """Return the times up to `end` at which the command or its slope jumps [s]."""
-        knots = self.command.knots(self.begin + end) - self.begin
-        return np.asarray(knots[knots > 0.0])
-
-
-def command_between(command: SheetCommand | RecordedCommand, begin: float,
-                    end: float) -> CommandedRate:
-    """Return a command between two times [s], in a time that counts from the first."""
-    if isinstance(command, RecordedCommand):
-        return command.part(begin, end)
-    return LaterCommand(command, begin) if begin else command
-
-
-@dataclass(frozen=True)
 class Bias:
     """A source of bias voltage: `before` until `at` [s], `after` from then on [V]."""
 

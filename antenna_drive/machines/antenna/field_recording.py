@@ -20,7 +20,9 @@ from dataclasses import dataclass, replace
 
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.errors import UserError
-from antenna_drive.machines.antenna.excitation import RecordedCommand, SheetCommand
+from antenna_drive.machines.antenna.excitation import (
+    CommandedRate, RecordedCommand, SheetCommand,
+)
 from antenna_drive.machines.antenna.samples import spikes
 from antenna_drive.recording import sheet as sheets
 from antenna_drive.recording.recording import Channel, NANOSECONDS, Recording
@@ -44,6 +46,9 @@ SAMPLE_RATE = 70.0
 # The time of a recording that starts later than the first number [s] counts from its first
 # sample, unless it joined the sheet's waveform within the second.
 _PROMPT_S, _JOINED_S = 1.0, 60.0
+# A waveform of the sheet is played by the command's clock, the readings are of the recorder's.
+# Within this time, 100 millionths of it make a tenth of a sample [s].
+_CLOCK_S = 15.0
 # Least number of samples.
 _FEWEST = 10
 # The axis is at rest while the command is below this share of its greatest size.
@@ -138,6 +143,23 @@ class FieldRecording:
         moving = np.abs(self.rates.values) > _AT_REST * float(np.abs(self.rates.values).max())
         moving &= self.rates.time_s >= 0.0
         return float(self.rates.time_s[np.argmax(moving)]) if moving.any() else self.end
+
+    def command_between(self, begin: float, compared: float, end: float) -> CommandedRate:
+        """
+        Return the command of a window, in a time that counts from its beginning.
+
+        Parameters
+        ----------
+        begin, compared, end
+            of the window, see `Window` [s]
+
+        """
+        if begin == 0.0 and compared < _CLOCK_S and isinstance(self.command, SheetCommand):
+            return self.command
+        # later, the recorder's clock is off by more than its samples tell the command
+        recorded = (self.command if isinstance(self.command, RecordedCommand) else
+                    RecordedCommand.of(self.rates.time_s, self.rates.values))
+        return recorded.part(begin, end)
 
     def thinned(self, begin: float, end: float) -> FloatArray:
         """Return the times of samples to compare, begin <= time < end [s]."""

@@ -23,7 +23,7 @@ from typing import Any
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.emulator import batch
 from antenna_drive.machines.antenna.excitation import (
-    Bias, command_between, CommandedRate, LaterCommand, Longest, schedule, SheetCommand,
+    Bias, CommandedRate, Longest, schedule, SheetCommand,
 )
 from antenna_drive.machines.antenna.field_recording import (
     BIAS, CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldRecording, Note, TACH_1, TACH_2, UNITS,
@@ -46,6 +46,9 @@ __all__ = ('BIAS', 'CHANNELS', 'CURRENT_1', 'CURRENT_2', 'ENCODER', 'TACH_1', 'T
 _MANY = 3
 # Step of the run that places the encoder's readings of a window of unknown start [s].
 _STEP_S = 5.3e-3
+# A command is a sweep if it reverses in one half of a test more often than in the other by this
+# factor, seen at this many places.
+_SWEEP, _LOOKS = 2.0, 2000
 # The angle at the beginning of a window is read in this time [s].
 _ANGLE_S = 0.1
 
@@ -99,10 +102,12 @@ class FieldTest:
 
     @property
     def repeats(self) -> bool:
-        """Return whether a part of the test shows what the whole does; not so with a chirp."""
-        known = (self.command.command if isinstance(self.command, LaterCommand)
-                 else self.command)
-        return not (isinstance(known, SheetCommand) and isinstance(known.waveform, sheets.Chirp))
+        """Return whether a part of the test shows what the whole does; not so with a sweep."""
+        if isinstance(self.command, SheetCommand):
+            return not isinstance(self.command.waveform, sheets.Chirp)
+        rate = self.command(np.linspace(self.time[0], self.time[-1], _LOOKS))
+        early, late = (np.count_nonzero(np.diff(np.sign(part))) for part in np.split(rate, 2))
+        return bool(max(early, late) <= _SWEEP * (min(early, late) + 1))
 
 
 def prepared(recordings: Mapping[str, Recording], drive: Drive, note: Note) -> list[FieldTest]:
@@ -155,7 +160,7 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
     if not math.isinf(window.end):
         name = f'{name} {window.compared:.0f}-{time[-1]:.0f} s'
     test = FieldTest(
-        name, record_of(drive), command_between(recording.command, window.begin, time[-1]),
+        name, record_of(drive), recording.command_between(window.begin, window.compared, time[-1]),
         bias.later(window.begin), time - window.begin, measured, slope,
         SensorModel.of(recording.sheet.sensors),
         jitter_of(recording.command, recording.rates.time_s, recording.rates.values),

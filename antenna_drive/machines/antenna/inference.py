@@ -29,7 +29,7 @@ from typing import Any
 
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.emulator import batch
-from antenna_drive.machines.antenna.excitation import command_between, Longest, schedule
+from antenna_drive.machines.antenna.excitation import Longest, schedule
 from antenna_drive.machines.antenna.field_recording import (
     CURRENT_1, CURRENT_2, FieldRecording, Note,
 )
@@ -372,7 +372,7 @@ def _misfit_of_currents(recording: FieldRecording, drive: Drive) -> float:
     if isinstance(recording.sheet.bias, FixedStepBias):
         end = max(end, bias.at)
     time = recording.thinned(first.compared, end + _SIMULATED_S)
-    plan = schedule(command_between(recording.command, first.begin, float(time[-1])),
+    plan = schedule(recording.command_between(first.begin, first.compared, float(time[-1])),
                     bias.later(first.begin), time - first.begin, Longest(_STEP_S))
     off = recording.measured(time)[0] - batch.run(record_of(drive), plan)[:, :, 0]
     if np.isfinite(off[:, [CURRENT_1, CURRENT_2]]).any(axis=0).all():

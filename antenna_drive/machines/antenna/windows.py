@@ -29,7 +29,7 @@ import math
 from typing import Any
 
 from antenna_drive.emulator import batch
-from antenna_drive.machines.antenna.excitation import Bias, command_between, Longest, schedule
+from antenna_drive.machines.antenna.excitation import Bias, Longest, schedule
 from antenna_drive.machines.antenna.field_recording import FieldRecording
 from antenna_drive.machines.antenna.sensors import SensorModel
 from antenna_drive.parameters.records import place_of, record_of
@@ -161,8 +161,7 @@ class _Telling:
     def __init__(self, recording: FieldRecording, drive: Drive, bias: Bias) -> None:
         """Run the drive without the effects, and with each."""
         samples = np.arange(0.0, min(recording.end, _SOUGHT_S), _SAMPLE_S)
-        plan = schedule(command_between(recording.command, 0.0, recording.end), bias, samples,
-                        Longest(_STEP_S))
+        plan = schedule(recording.command, bias, samples, Longest(_STEP_S))
         plain = batch.run(record_of(drive), plan)
         noise = SensorModel.of(recording.sheet.sensors).noise(
             plain[:, :, 0], plain[:, :, 1], 0.01 * recording.period)
