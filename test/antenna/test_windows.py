@@ -18,6 +18,7 @@ from __future__ import annotations
 from typing import Any
 
 from antenna_drive.diagnosis import FloatArray
+from antenna_drive.machines.antenna.excitation import Bias
 from antenna_drive.machines.antenna.field_recording import BIAS, ENCODER, FieldRecording
 from antenna_drive.machines.antenna.field_test import FieldTest, prepared, window_of
 from antenna_drive.machines.antenna.machine import AntennaMachine, TRUNCATED_S
@@ -72,6 +73,23 @@ def test_after_a_rest_the_window_agrees_with_the_recording(signal: dict[str, Any
     test = compared(a=recording, b=recording, c=recording)[0]
     assert test.known_start
     assert misfit(test).max() < 1.5
+
+
+def test_an_offset_of_the_encoder_stays_after_a_long_rest() -> None:
+    """The drive has not moved: the reading belongs to the angle at which it started."""
+    off = changed(DRIVE, {'plant.encoder.offset': 3e-4})
+    test, = compared(rec=field_run(off, 50.0, SHEET, start_after=20.0, **SLOW_SINE))
+    shift = test.measured[:, ENCODER] - test.simulated(2.5e-3)[:, ENCODER]
+    assert np.median(shift) == pytest.approx(3e-4, abs=1e-6)
+
+
+def test_without_an_encoder_the_angle_follows_from_the_command() -> None:
+    run = field_run(DRIVE, 20.0, SHEET, waveform='step', amplitude=1e-3, start_after=5.0)
+    bare = run.select([name for name in run if name != 'plant/encoder'])
+    test = window_of(FieldRecording.of('rec', bare, lambda note: None),
+                     Window(12.0, 15.0, 18.0, known_start=False), DRIVE, Bias())
+    elevation = test.record['plant']['axis']['start_elevation'][0]
+    assert elevation - DRIVE.plant.axis.start_elevation == pytest.approx(7e-3, abs=1e-5)
 
 
 def test_a_window_in_the_middle_of_a_motion_agrees_once_it_has_settled() -> None:

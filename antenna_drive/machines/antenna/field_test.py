@@ -152,10 +152,11 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
     time = recording.thinned(window.compared, window.end)
     measured, slope = recording.measured(time)
     if window.begin > 0.0:
+        drive = changed(drive, {'torque_share.circuit.start': 'steady'})
+    if not window.known_start:
         angle = _angle(recording, window.begin)
         measured[:, ENCODER] -= angle
         drive = changed(drive, {
-            'torque_share.circuit.start': 'steady',
             'plant.axis.start_elevation': drive.plant.axis.start_elevation + angle})
     if not math.isinf(window.end):
         name = f'{name} {window.compared:.0f}-{time[-1]:.0f} s'
@@ -180,5 +181,5 @@ def _angle(recording: FieldRecording, at: float) -> float:
         if encoder.values[near].size:
             return float(np.median(encoder.values[near]))
     rates = recording.rates
-    before = rates.time_s < at
-    return float(np.trapezoid(rates.values[before], rates.time_s[before]))
+    before = np.searchsorted(rates.time_s, at)
+    return float(rates.values[:before] @ np.diff(rates.time_s[:before + 1]))
