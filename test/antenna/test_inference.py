@@ -138,3 +138,25 @@ def test_what_two_recordings_agree_on_holds_for_both() -> None:
     sheets, _ = inferred(field_run(drive, 25.0, **SLOW_SQUARE),
                          field_run(drive, 25.0, **FAST_TRIANGLE))
     assert [sheet.circuit for sheet in sheets] == ['old', 'old']
+
+
+def test_a_circuit_of_its_own_in_the_configuration_is_kept() -> None:
+    """Constants of neither column of Table 1."""
+    own = changed(drive_of('new', 'new', 'zero'), {
+        'torque_share.circuit.k_2': -2.6, 'torque_share.circuit.s_2': 1.1,
+        'torque_share.circuit.g_4': 2.2, 'torque_share.circuit.k_3': 2.9,
+        'torque_share.filter_1.gain': 20.0, 'torque_share.filter_1.pole': 3.5})
+    notes: list[str] = []
+    run = FieldRecording.of('rec', field_run(own, 25.0, **FAST_TRIANGLE), notes.append)
+    found, = completed([run], own, notes.append)
+    assert found.sheet.circuit is None
+    assert found.sheet.filter_1 is None
+    assert isinstance(found.sheet.bias, CircuitBias)
+    assert found.sheet.bias.start == 'zero'
+    assert {'circuit: the configured constants fit as well: as configured',
+            'filter_1: the configured constants fit as well: as configured'} <= set(notes)
+    # constants of its own are given up where a column of the table fits clearly better
+    run = FieldRecording.of('rec', field_run(
+        drive_of('old', 'old', 'zero'), 25.0, **FAST_TRIANGLE), notes.append)
+    found, = completed([run], own, notes.append)
+    assert (found.sheet.circuit, found.sheet.filter_1) == ('old', 'old')

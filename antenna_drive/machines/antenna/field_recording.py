@@ -139,10 +139,10 @@ class FieldRecording:
 
     @property
     def onset(self) -> float:
-        """Return when the motion begins [s]; the last time if nothing is commanded."""
+        """Return when the motion begins [s]; the first time if nothing is commanded."""
         moving = np.abs(self.rates.values) > _AT_REST * float(np.abs(self.rates.values).max())
         moving &= self.rates.time_s >= 0.0
-        return float(self.rates.time_s[np.argmax(moving)]) if moving.any() else self.end
+        return float(self.rates.time_s[np.argmax(moving)] if moving.any() else self.time[0])
 
     def command_between(self, begin: float, compared: float, end: float) -> CommandedRate:
         """

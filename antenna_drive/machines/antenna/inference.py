@@ -103,6 +103,11 @@ def _told(recording: FieldRecording, **entries: Any) -> FieldRecording:
     return replace(recording, sheet=replace(recording.sheet, **entries))
 
 
+def _of_table(entry: str, drive: Drive) -> bool:
+    """Return whether the configured constants are those of either column of Table 1."""
+    return any(changed(drive, constants(entry, name)) == drive for name in CIRCUITS)
+
+
 # -- the source of the bias --------------------------------------------------------------------
 
 def _with_sources(recordings: list[FieldRecording], drive: Drive,
@@ -245,12 +250,18 @@ def _with_circuit(recordings: list[FieldRecording], drive: Drive,
     else:
         note(f'circuit {best}: inferred, {other} fits {worse:.1f} times worse')
     fit = fits[told or best]
+    own = _fit([recordings[k] for k in fed], None, drive)
+    if not given and own.misfit <= _CLEAR * fit.misfit and not _of_table('circuit', drive):
+        told, fit = None, own
+        note('circuit: the configured constants fit as well: as configured')
     for k, start in zip(fed, fit.starts, strict=True):
         bias = recordings[k].sheet.bias
         assert isinstance(bias, CircuitBias)
         added: dict[str, Any] = {}
+        known = ''
         if bias.bias_pot is None:
             added['bias_pot'] = fit.pot
+            known = f' (configured {drive.torque_share.circuit.bias_pot:g})'
         elif abs(fit.pot / bias.bias_pot - 1.0) > _OTHER_POT:
             note(f'{recordings[k].name}: the sheet gives bias_pot {bias.bias_pot:g}, the bias '
                  f'voltage looks like {fit.pot:.2f}; the sheet is believed')
@@ -258,13 +269,13 @@ def _with_circuit(recordings: list[FieldRecording], drive: Drive,
             added['start'] = start
         if added:
             note(f'{recordings[k].name}: ' + ', '.join(
-                f'{name} {value}' for name, value in added.items()) + ': inferred')
+                f'{name} {value}' for name, value in added.items()) + f': inferred{known}')
         found[k] = _told(recordings[k], bias=replace(bias, **added))
     # what one recording tells holds for the whole machine
     return [_told(recording, circuit=recording.sheet.circuit or told) for recording in found]
 
 
-def _fit(recordings: Sequence[FieldRecording], circuit: str, drive: Drive) -> _Fit:
+def _fit(recordings: Sequence[FieldRecording], circuit: str | None, drive: Drive) -> _Fit:
     """Feed a circuit with the recorded currents, and compare its voltage with the recorded one."""
     fed = [_fed(recording) for recording in recordings]
     whole = np.concatenate([voltage for voltage, _ in fed])
@@ -290,8 +301,11 @@ def _fit(recordings: Sequence[FieldRecording], circuit: str, drive: Drive) -> _F
     return min(fits, key=lambda fit: fit.misfit)
 
 
-def _share(circuit: str, drive: Drive) -> TorqueShare:
-    return changed(drive, constants('circuit', circuit)).torque_share.circuit
+def _share(circuit: str | None, drive: Drive) -> TorqueShare:
+    """Return the constants of Table 1, or without a name those of the configuration."""
+    if circuit is not None:
+        drive = changed(drive, constants('circuit', circuit))
+    return drive.torque_share.circuit
 
 
 def _fed(recording: FieldRecording) -> tuple[FloatArray, FloatArray]:
@@ -344,6 +358,11 @@ def _with_filter_1(recordings: list[FieldRecording], drive: Drive,
     best, other = sorted(CIRCUITS, key=lambda name: misfits[name])
     worse = misfits[other] / misfits[best]
     given = {recording.sheet.filter_1 for recording in recordings} - {None}
+    if not given and not _of_table('filter_1', drive) and _NOISE_A + float(np.mean([
+            _misfit_of_currents(recording, drive) for recording in compared])) <= (
+                _CLEAR * misfits[best]):
+        note('filter_1: the configured constants fit as well: as configured')
+        return recordings
     if given:
         if given == {other} and worse > _DOUBT:
             note(f'the sheets give filter_1 {other}, the currents look like {best} ({other} fits '
@@ -361,7 +380,9 @@ def _with_filter_1(recordings: list[FieldRecording], drive: Drive,
         note(f'filter_1 {best}: inferred, {other} fits {worse:.1f} times worse')
     # both are of Table 1, and were changed together
     return [_told(recording, filter_1=recording.sheet.filter_1 or best,
-                  circuit=recording.sheet.circuit or best) for recording in recordings]
+                  circuit=recording.sheet.circuit or (
+                      best if _of_table('circuit', drive) else None))
+            for recording in recordings]
 
 
 def _misfit_of_currents(recording: FieldRecording, drive: Drive) -> float:
