@@ -37,6 +37,7 @@ RUNS = (field_run(DRIVE, 60.0, start_after=3.0, **FAST_TRIANGLE),
        spikes=st.integers(0, 50), seed=st.integers(0, 2**32 - 1))
 @example(RUNS[0], set(CHANNELS), 0.0, 60.0, 1, 0.0, 0.0, 0, 0)
 @example(RUNS[2], {'motor_2/ammeter'}, 0.0, 60.0, 1, 0.0, 0.0, 0, 0)
+@example(RUNS[0], {'motor_1/ammeter'}, 3.0, 2.0, 1, 0.0, 0.0, 0, 0)
 @example(RUNS[1], set(CHANNELS), 0.0, 21.0, 40, 0.5, 0.0, 3, 0)
 def test_it_is_ready_or_refused(run: Recording, kept: set[str], begin: float, length: float,
                                 every: int, missing: float, clock_s: float, spikes: int,

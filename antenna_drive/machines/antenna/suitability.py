@@ -25,6 +25,8 @@ import numpy as np
 
 # Rates are compared in means over this time [s], in which oscillations of the drive cancel.
 _MEAN_S = 1.0
+# Fewer means tell nothing.
+_FEWEST = 5
 # Two rates are of the same motion from this correlation on, and in other units from this factor
 # on. No effect of the catalogue changes a rate by as much.
 _ALIKE, _FACTOR = 0.7, 2.0
@@ -65,6 +67,8 @@ def check(recording: FieldRecording, drive: Drive, note: Note) -> None:
              'reversals little is told; record a test that reverses')
         return
     seen = _rates(recording, drive)
+    if seen['command'].size < _FEWEST:
+        return
     for name, rate in seen.items():
         if not rate.any():
             note(f'{recording.name}: {_COLUMN[name]} is zero all along, though the axis is '
