@@ -405,6 +405,17 @@ class Recording:
 
     # -- cutting ------------------------------------------------------------------------------
 
+    def select(self, names: Sequence[str]) -> Recording:
+        """
+        Return the recording with these signals only, in this order.
+
+        Raises
+        ------
+        RecordingError : there is no such signal
+
+        """
+        return replace(self, channels={name: self[name] for name in names})
+
     def between(self, start_s: float = -math.inf, end_s: float = math.inf) -> Recording:
         """Return the samples of start_s <= t < end_s, with their time stamps."""
         low = -2**63 if start_s < -9.2e9 else nanoseconds(start_s)

@@ -35,7 +35,8 @@ def field(test: str = 'square') -> Recording:
 def ready(recording: Recording) -> tuple[FieldTest, list[str]]:
     """Return a recording made ready, and what was noted."""
     notes: list[str] = []
-    return prepared(NAME, recording, load(), notes.append), notes
+    test, = prepared({NAME: recording}, load(), notes.append)
+    return test, notes
 
 
 @pytest.mark.parametrize('test', ['square', 'multisine'])

@@ -37,8 +37,8 @@ TOLERANCE = 0.02
 
 
 def field_tests(*names: str) -> list[FieldTest]:
-    return [prepared(name, planned(BUILT_IN[name], 2.0, 100.0), load(), lambda note: None)
-            for name in names]
+    return prepared({name: planned(BUILT_IN[name], 2.0, 100.0) for name in names}, load(),
+                    lambda note: None)
 
 
 TESTS = field_tests('square', 'triangle')

@@ -15,13 +15,15 @@
 What a test did to the drive, from the test sheet or, failing that, from the recorded command.
 
 A sheet's waveform is exact: its jumps are known to the microsecond. A recorded command is a set
-of samples; between two that differ by more than their neighbours do, a jump is assumed halfway.
+of samples. Between two that differ by more than their neighbours do, a jump is assumed: where the
+regular times of many jumps put it, or else halfway.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 import math
 from typing import Any, Protocol
 
@@ -32,11 +34,17 @@ from antenna_drive.parameters.sets import Waveform
 from antenna_drive.physics import signal_generator
 from antenna_drive.recording import sheet as sheets
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog
 
 DEGREE = np.pi / 180.0
 # Places within a step at which the command is read; jumps may be at its ends.
 _PLACES = np.array([0.1, 0.5, 0.9])
 _NO_BITS = np.ones(1)   # no test sheet has a pseudo-random sequence
+# A sample is a corner of a command if it bends there by this many times more than beside it.
+_CORNER = 4.0
+# Regular jumps repeat after one, two or four of them, at least this many times.
+_CYCLES, _FEWEST_CYCLES = (1, 2, 4), 4
 _PARABOLA = np.linalg.inv(np.vander(_PLACES, 3, increasing=True))
 
 
@@ -100,10 +108,20 @@ class SheetCommand:
 
 @dataclass(frozen=True)
 class RecordedCommand:
-    """A command that is known from its samples: straight lines with jumps between them."""
+    """
+    A command that is known from its samples: cubic between jumps, straight beside corners.
+
+    Attributes
+    ----------
+    time, value : of the samples, and of both sides of each jump, shape (n,) [s], [rad/s]
+    slope : at the two ends of each interval between them, shape (n - 1, 2) [rad/s^2]
+    jumps : times at which the command jumps, shape (k,) [s]
+
+    """
 
     time: FloatArray
     value: FloatArray
+    slope: FloatArray
     jumps: FloatArray
 
     @classmethod
@@ -114,20 +132,92 @@ class RecordedCommand:
         around = np.maximum(np.r_[change[1:], 0.0], np.r_[0.0, change[:-1]])
         large = (change > 0.05 * np.ptp(value)) & (change > 20.0 * usual) & (change > 4.0 * around)
         k = np.flatnonzero(large)
-        jumps = 0.5 * (time[k] + time[k + 1])
-        # two extra samples at each jump keep the straight lines on their own sides
+        jumps = regular_times(time[k], time[k + 1])
+        # two extra samples at each jump keep the lines on their own sides
         times = np.r_[time, jumps - 1e-9, jumps + 1e-9]
         values = np.r_[value, value[k], value[k + 1]]
         order = np.argsort(times, kind='stable')
-        return cls(times[order], values[order], jumps)
+        slopes = np.tile((np.diff(value) / np.diff(time))[:, np.newaxis], 2)
+        smooth = _smooth(time, value)
+        slopes[smooth] = np.stack([np.gradient(value, time)[:-1], np.gradient(value, time)[1:]],
+                                  axis=1)[smooth]
+        # the three pieces of an interval with a jump: the middle one is the jump
+        return cls(times[order], values[order], np.insert(
+            np.where(large[:, np.newaxis], 0.0, slopes), np.repeat(k, 2), 0.0, axis=0), jumps)
 
     def __call__(self, time: FloatArray) -> FloatArray:
         """Return the rate command [rad/s] at these times [s]."""
-        return np.asarray(np.interp(time, self.time, self.value, left=0.0))
+        i = np.clip(np.searchsorted(self.time, time, side='right') - 1, 0, self.time.size - 2)
+        width = self.time[i + 1] - self.time[i]
+        s = np.clip((time - self.time[i]) / width, 0.0, 1.0)
+        rise = self.value[i + 1] - self.value[i]
+        first, last = (width * self.slope[i, end] - rise for end in (0, 1))
+        shape = self.value[i] + s * rise + s * (1.0 - s) * ((1.0 - s) * first - s * last)
+        return np.asarray(np.where(time < self.time[0], 0.0, shape))
 
     def knots(self, end: float) -> FloatArray:
         """Return the times up to `end` at which the command jumps [s]."""
         return self.jumps[self.jumps < end]
+
+    def part(self, begin: float, end: float) -> RecordedCommand:
+        """Return the command between two times [s], in a time that counts from the first."""
+        # one sample beyond either end keeps the lines to it
+        first = max(int(np.searchsorted(self.time, begin, side='right')) - 1, 0)
+        last = int(np.searchsorted(self.time, end)) + 1
+        inside = (self.jumps > begin) & (self.jumps < end)
+        return RecordedCommand(self.time[first:last] - begin, self.value[first:last],
+                               self.slope[first:last - 1], self.jumps[inside] - begin)
+
+
+def _smooth(time: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
+    """Return which intervals between samples are beside no jump and no corner, shape (n - 1,)."""
+    slope = np.diff(value) / np.diff(time)
+    bend = np.abs(np.r_[0.0, np.diff(slope), 0.0])
+    # a bend that stands alone is a corner: the samples two further on know nothing of it
+    padded = np.pad(bend, 2)
+    corner = bend > _CORNER * np.maximum(padded[:-4], padded[4:])
+    return ~(corner[1:] | corner[:-1])
+
+
+def regular_times(after: FloatArray, before: FloatArray) -> FloatArray:
+    """
+    Return times that lie in intervals: those of a regular sequence, if there is one in all.
+
+    A computer jumps at regular times, which many intervals tell more precisely than each its own.
+
+    Parameters
+    ----------
+    after, before
+        ends of the intervals, shape (n,) [s]
+
+    """
+    found = 0.5 * (after + before)
+    # the first jump begins the motion, and may belong to no sequence
+    for first, cycle in product((0, 1), _CYCLES):
+        if after.size - first >= _FEWEST_CYCLES * cycle:
+            fit = _periodic(after[first:], before[first:], cycle)
+            if fit is not None:
+                found[first:] = fit
+                break
+    return found
+
+
+def _periodic(after: FloatArray, before: FloatArray, cycle: int) -> FloatArray | None:
+    """Return the periodic sequence that keeps farthest from the ends of all intervals."""
+    number = np.arange(after.size)
+    # unknown: time of each jump of the first cycle, period, margin to the ends
+    lines = np.zeros((after.size, cycle + 2))
+    lines[number, number % cycle] = 1.0
+    lines[:, cycle] = number // cycle
+    lines[:, cycle + 1] = 1.0
+    other_end = lines.copy()
+    other_end[:, :-1] *= -1.0
+    start = after[0]
+    fit = linprog(np.r_[np.zeros(cycle + 1), -1.0], np.vstack([lines, other_end]),
+                  np.r_[before - start, start - after], bounds=(None, None))
+    if fit.status != 0 or fit.x[-1] <= 0.0:
+        return None
+    return np.asarray(start + lines[:, :-1] @ fit.x[:-1])
 
 
 @dataclass(frozen=True)
@@ -137,6 +227,10 @@ class Bias:
     before: float = 0.0
     after: float = 0.0
     at: float = 0.0
+
+    def later(self, begin: float) -> Bias:
+        """Return the source in a time that counts from `begin` [s]."""
+        return replace(self, at=self.at - begin)
 
 
 @dataclass(frozen=True)

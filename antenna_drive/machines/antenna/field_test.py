@@ -15,52 +15,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 import math
 from typing import Any
 
 from antenna_drive.diagnosis import FloatArray
-from antenna_drive.errors import UserError
+from antenna_drive.emulator import batch
 from antenna_drive.machines.antenna.excitation import (
-    Bias, CommandedRate, RecordedCommand, SheetCommand,
+    Bias, CommandedRate, Longest, schedule, SheetCommand,
 )
+from antenna_drive.machines.antenna.field_recording import (
+    BIAS, CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldRecording, Note, TACH_1, TACH_2, UNITS,
+)
+from antenna_drive.machines.antenna.inference import completed
 from antenna_drive.machines.antenna.sensors import jitter_of, SensorModel
-from antenna_drive.parameters.loading import load
+from antenna_drive.machines.antenna.sheet_settings import as_the_sheet_says
+from antenna_drive.machines.antenna.suitability import check
+from antenna_drive.machines.antenna.windows import Window, windows
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed, Drive
 from antenna_drive.recording import sheet as sheets
-from antenna_drive.recording.recording import Channel, NANOSECONDS, Recording
+from antenna_drive.recording.recording import Recording
 import numpy as np
 
-CHANNELS = {
-    'motor_1/ammeter': 'current_1', 'motor_2/ammeter': 'current_2',
-    'motor_1/tach_rate': 'tach_1', 'motor_2/tach_rate': 'tach_2',
-    'plant/encoder': 'encoder', 'torque_share/bias_voltage': 'bias_voltage',
-}
-UNITS = ('A', 'A', 'rad/s', 'rad/s', 'rad', 'V')
-CURRENT_1, CURRENT_2, TACH_1, TACH_2, ENCODER, BIAS = range(6)
-# Other names under which a recording may hold a reading.
-_ALIASES = {'motor_1/ammeter': ('motor_1/current',), 'motor_2/ammeter': ('motor_2/current',)}
-_RATE_COMMAND = 'test_signal/rate_command'
-# Samples are thinned to about this rate [Hz]. They are not averaged, which would hide a ripple.
-SAMPLE_RATE = 70.0
-# The time of a recording that starts later than the first number [s] counts from its first
-# sample, unless it joined the sheet's waveform within the second.
-_PROMPT_S, _JOINED_S = 1.0, 60.0
-# Least number of samples.
-_FEWEST = 10
-# The parameters that a sheet's name of a circuit sets.
-_CIRCUITS = {'circuit': ('torque_share.circuit', ('k_2', 's_2', 'k_3', 'g_4')),
-             'filter_1': ('torque_share.filter_1', ('gain', 'pole'))}
-
-Note = Callable[[str], None]
+__all__ = ('BIAS', 'CHANNELS', 'CURRENT_1', 'CURRENT_2', 'ENCODER', 'TACH_1', 'TACH_2', 'UNITS',
+           'FieldTest', 'prepared')
+# This many recordings tell different things: one window of each is enough. Of fewer, two are
+# taken.
+_MANY = 3
+# Step of the run that places the encoder's readings of a window of unknown start [s].
+_STEP_S = 5.3e-3
+# A command is a sweep if it reverses in one half of a test more often than in the other by this
+# factor, seen at this many places.
+_SWEEP, _LOOKS = 2.0, 2000
+# The angle at the beginning of a window is read in this time [s].
+_ANGLE_S = 0.1
 
 
 @dataclass(frozen=True)
 class FieldTest:
     """
-    One recording, prepared.
+    A window of a recording, prepared; its time counts from the beginning of the window.
 
     Attributes
     ----------
@@ -75,6 +71,8 @@ class FieldTest:
     jitter : of the time stamps [s]
     period : between two recorded samples [s]
     tolerances : of zeros, recorders and clocks
+    known_start : False if the simulation begins in the middle of a motion, whose state is not
+        known; the zero of the encoder then follows from the readings alone
 
     """
 
@@ -89,6 +87,7 @@ class FieldTest:
     jitter: float
     period: float
     tolerances: sheets.Tolerances
+    known_start: bool = True
 
     def until(self, end: float) -> FieldTest:
         """Return the first part of the test, of this length [s]."""
@@ -96,23 +95,29 @@ class FieldTest:
         return replace(self, time=self.time[:n], measured=self.measured[:n],
                        slope=self.slope[:n])
 
+    def simulated(self, longest_step: float) -> FloatArray:
+        """Return the readings of the drive as configured, with steps of at most this [s]."""
+        plan = schedule(self.command, self.bias, self.time, Longest(longest_step))
+        return np.asarray(batch.run(self.record, plan)[:, :, 0])
+
     @property
     def repeats(self) -> bool:
-        """Return whether a part of the test shows what the whole does; not so with a chirp."""
-        return not (isinstance(self.command, SheetCommand)
-                    and isinstance(self.command.waveform, sheets.Chirp))
+        """Return whether a part of the test shows what the whole does; not so with a sweep."""
+        if isinstance(self.command, SheetCommand):
+            return not isinstance(self.command.waveform, sheets.Chirp)
+        rate = self.command(np.linspace(self.time[0], self.time[-1], _LOOKS))
+        early, late = (np.count_nonzero(np.diff(np.sign(part))) for part in np.split(rate, 2))
+        return bool(max(early, late) <= _SWEEP * (min(early, late) + 1))
 
 
-def prepared(name: str, recording: Recording, drive: Drive, note: Note) -> FieldTest:
+def prepared(recordings: Mapping[str, Recording], drive: Drive, note: Note) -> list[FieldTest]:
     """
-    Make a recording ready.
+    Make recordings of one machine ready: the windows that tell most, each a test of its own.
 
     Parameters
     ----------
-    name
-        for people
-    recording
-        with its test sheet
+    recordings
+        with their test sheets, by name
     drive
         the configuration
     note
@@ -120,123 +125,61 @@ def prepared(name: str, recording: Recording, drive: Drive, note: Note) -> Field
 
     Raises
     ------
-    UserError : the rate command is missing, or there is no reading to compare, or nearly none
+    UserError : a recording lacks the rate command or readings, or cannot be of this drive
 
     """
-    if _RATE_COMMAND not in recording or len(recording[_RATE_COMMAND]) < _FEWEST:
-        raise UserError(f'{name}: no rate command is recorded; {_RATE_COMMAND} '
-                        '(rate_command_rad_s in a CSV) is needed')
-    if all(_channel(recording, channel) is None for channel in CHANNELS):
-        raise UserError(f'{name}: there is no reading beside the rate command, '
-                        'at least one current is needed')
-    recording = _from_its_start(name, recording, note)
-    drive, bias = _as_the_sheet_says(name, recording.sheet, drive, note)
-    given = recording[_RATE_COMMAND]
-    command = _command(name, recording.sheet.waveform, given, note)
-    time = _times(name, recording)
-    return FieldTest(name, record_of(drive), command, bias, time,
-                     *_measured(name, recording, time, note),
-                     SensorModel.of(recording.sheet.sensors),
-                     jitter_of(command, given.time_s, given.values),
-                     float(np.median(np.diff(given.time_s))),
-                     recording.sheet.tolerances or sheets.Tolerances())
+    found = [FieldRecording.of(name, recording, note) for name, recording in recordings.items()]
+    for recording in found:
+        if not recording.is_planned:
+            check(recording, drive, note)
+    found = completed(found, drive, note)
+    most = 1 if len(found) >= _MANY else 2
+    tests = []
+    for recording in found:
+        configured, bias = as_the_sheet_says(recording.sheet, drive)
+        chosen = windows(recording, configured, bias, most)
+        tests += [window_of(recording, window, configured, bias) for window in chosen]
+        if not (len(chosen) == 1 and math.isinf(chosen[0].end)):
+            note(f'{recording.name}: of {recording.end:.0f} s, ' + ' and '.join(
+                f'{window.compared:.0f} to {min(window.end, recording.end):.0f} s'
+                for window in chosen) + ' are compared')
+    return tests
 
 
-def _from_its_start(name: str, recording: Recording, note: Note) -> Recording:
-    """Return a recording whose time starts with the test."""
-    begins_s = recording.start_ns / NANOSECONDS
-    waveform = recording.sheet.waveform
-    if abs(begins_s) <= _PROMPT_S or (0.0 < begins_s < _JOINED_S and waveform is not None
-                                      and _is(SheetCommand(waveform), recording[_RATE_COMMAND])):
-        return recording
-    note(f'{name}: begins at {begins_s:.3f} s, time is counted from there')
-    return recording.shift_ns(-recording.start_ns)
+def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bias) -> FieldTest:
+    """Return one window of a recording, made ready."""
+    name = recording.name
+    time = recording.thinned(window.compared, window.end)
+    measured, slope = recording.measured(time)
+    if window.begin > 0.0:
+        drive = changed(drive, {'torque_share.circuit.start': 'steady'})
+    if not window.known_start:
+        angle = _angle(recording, window.begin)
+        measured[:, ENCODER] -= angle
+        drive = changed(drive, {
+            'plant.axis.start_elevation': drive.plant.axis.start_elevation + angle})
+    if not math.isinf(window.end):
+        name = f'{name} {window.compared:.0f}-{time[-1]:.0f} s'
+    test = FieldTest(
+        name, record_of(drive), recording.command_between(window.begin, window.compared, time[-1]),
+        bias.later(window.begin), time - window.begin, measured, slope,
+        SensorModel.of(recording.sheet.sensors),
+        jitter_of(recording.command, recording.rates.time_s, recording.rates.values),
+        recording.period, recording.sheet.tolerances or sheets.Tolerances(), window.known_start)
+    if not window.known_start:
+        off = measured[:, ENCODER] - test.simulated(_STEP_S)[:, ENCODER]
+        if np.isfinite(off).any():
+            measured[:, ENCODER] -= np.nanmedian(off)
+    return test
 
 
-def _as_the_sheet_says(name: str, sheet: sheets.TestSheet, drive: Drive,
-                       note: Note) -> tuple[Drive, Bias]:
-    for word, (part, numbers) in _CIRCUITS.items():
-        circuit = getattr(sheet, word)
-        if circuit is None:
-            note(f'{name}: the sheet does not give {word}: as configured')
-            continue
-        source: Any = load(f'{circuit}_circuit')
-        for step in part.split('.'):
-            source = getattr(source, step)
-        drive = changed(drive, {f'{part}.{key}': getattr(source, key) for key in numbers})
-    if sheet.elevation_deg is not None:
-        drive = changed(drive, {'plant.axis.start_elevation': math.radians(sheet.elevation_deg)})
-    share = 'torque_share.circuit.'
-    given = sheet.bias
-    if isinstance(given, sheets.CircuitBias):
-        changes: dict[str, Any] = {f'{share}bias_source': 'circuit'}
-        if given.bias_pot is not None:
-            changes[f'{share}bias_pot'] = given.bias_pot
-        if given.start is not None:
-            changes[f'{share}start'] = given.start
-        return changed(drive, changes), Bias()
-    if given is None:
-        note(f'{name}: the sheet does not give the bias: as configured')
-        voltage = drive.torque_share.circuit.fixed_voltage
-        return drive, Bias(voltage, voltage)
-    voltage = given.voltage_V or 0.0
-    drive = changed(drive, {f'{share}bias_source': 'fixed'})
-    if isinstance(given, sheets.FixedStepBias):
-        return drive, Bias(0.0, voltage, given.at_s or 0.0)
-    return drive, Bias(voltage, voltage)
-
-
-def _command(name: str, waveform: sheets.Waveform | None, given: Channel,
-             note: Note) -> CommandedRate:
-    if waveform is None:
-        note(f'{name}: no waveform in the sheet, the recorded command was interpolated')
-        return RecordedCommand.of(given.time_s, given.values)
-    exact = SheetCommand(waveform)
-    if _is(exact, given):
-        return exact
-    note(f"{name}: the recorded command is not the sheet's waveform, it was interpolated")
-    return RecordedCommand.of(given.time_s, given.values)
-
-
-def _is(command: CommandedRate, given: Channel) -> bool:
-    """Return whether a command is the recorded one."""
-    wrong = np.abs(command(given.time_s) - given.values) > 0.05 * np.ptp(given.values)
-    return bool(np.mean(wrong) < 0.02)
-
-
-def _channel(recording: Recording, name: str) -> Channel | None:
-    for alias in (name, *_ALIASES.get(name, ())):
-        if alias in recording and len(recording[alias]):
-            return recording[alias]
-    return None
-
-
-def _times(name: str, recording: Recording) -> FloatArray:
-    """Return the times that are compared: those of the reading with the most samples."""
-    channels = [_channel(recording, name) for name in CHANNELS]
-    time = max((c.time_s for c in channels if c is not None), key=len)
-    time = time[time >= 0.0]
-    if time.size < _FEWEST:
-        raise UserError(f'{name}: {time.size} samples to compare after the start, at least '
-                        f'{_FEWEST} are needed')
-    every = max(1, round(1.0 / float(np.median(np.diff(time))) / SAMPLE_RATE))
-    return np.asarray(time[::every])
-
-
-def _measured(name: str, recording: Recording, time: FloatArray,
-              note: Note) -> tuple[FloatArray, FloatArray]:
-    """Return the readings and their slopes at these times; NaN where there is none."""
-    measured, slope = np.full((2, time.size, len(CHANNELS)), np.nan)
-    for c, channel_name in enumerate(CHANNELS):
-        channel = _channel(recording, channel_name)
-        if channel is None:
-            note(f'{name}: {channel_name} was not recorded')
-            continue
-        times = channel.time_s
-        at = np.clip(np.searchsorted(times, time - 1e-9), 0, times.size - 1)
-        there = np.abs(times[at] - time) < 1e-6
-        measured[there, c] = channel.values[at[there]]
-        # the slope is taken before thinning, which would hide fast motion
-        if times.size > 1:
-            slope[there, c] = np.gradient(channel.values, times)[at[there]]
-    return measured, slope
+def _angle(recording: FieldRecording, at: float) -> float:
+    """Return the angle of the axis since the start of a recording [rad]."""
+    encoder = recording.readings.get('plant/encoder')
+    if encoder is not None:
+        near = slice(*np.searchsorted(encoder.time_s, [at - _ANGLE_S, at + _ANGLE_S]))
+        if encoder.values[near].size:
+            return float(np.median(encoder.values[near]))
+    rates = recording.rates
+    before = np.searchsorted(rates.time_s, at)
+    return float(rates.values[:before] @ np.diff(rates.time_s[:before + 1]))

@@ -120,8 +120,7 @@ class AntennaMachine(Machine):
         self._longest_step = LONGEST_STEP
         self._low_fidelity: AntennaMachine | None = None
         notes: list[str] = []
-        self._tests = [prepared(name, recording, drive, notes.append)
-                       for name, recording in recordings.items()]
+        self._tests = prepared(recordings, drive, notes.append)
         for test in self._tests:
             test.record['plant']['axis']['mode_frequencies'][0, EXTRA_MODE] = 1.0
         given = [recording.sheet.parameter_tolerance for recording in recordings.values()

@@ -20,7 +20,7 @@ from dataclasses import replace
 
 from antenna_drive.diagnosis import Confusability, confusability
 from antenna_drive.machines.antenna.excitation import SheetCommand
-from antenna_drive.machines.antenna.field_test import CHANNELS
+from antenna_drive.machines.antenna.field_recording import CHANNELS, PLANNED
 from antenna_drive.machines.antenna.machine import AntennaMachine
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.recording import Recording
@@ -52,7 +52,7 @@ def planned(sheet: TestSheet, duration: float, rate: float) -> Recording:
     command = SheetCommand(sheet.waveform or Square(0.05, 6.3, 0.25))
     signals = {'test_signal/rate_command': command(time)}
     signals.update({name: np.zeros(time.size) for name in CHANNELS})
-    return Recording.from_arrays(time, signals, sheet=sheet)
+    return Recording.from_arrays(time, signals, sheet=sheet, notes={PLANNED: True})
 
 
 def confusability_of(tests: Mapping[str, Recording], drive: Drive,

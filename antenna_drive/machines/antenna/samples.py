@@ -1,0 +1,62 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Samples that no drive makes: spikes of one sample, which are left out before thinning."""
+
+from __future__ import annotations
+
+from antenna_drive.diagnosis import FloatArray
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import rank_filter
+
+# A spike stands out from the median of its four neighbours by this many of the scatter that all
+# samples have about theirs ...
+_SCATTERS = 8.0
+# ... and by this many times more than any but one of the samples around it does. Nothing in the
+# drive is over within one sample: after an edge or an impact its neighbours differ, too.
+_AROUND = 3.0
+# Samples around it, on both sides together.
+_NEIGHBOURHOOD = 20
+# Below this many samples nothing can be said.
+_FEWEST = 3 * _NEIGHBOURHOOD
+
+
+def spikes(values: FloatArray) -> NDArray[np.bool_]:
+    """
+    Return which samples are spikes: alone, and far from neighbours that agree.
+
+    Parameters
+    ----------
+    values
+        of one channel in the order of time, at the rate at which they were recorded, shape (n,)
+
+    """
+    if values.size < _FEWEST:
+        return np.zeros(values.size, dtype=bool)
+    padded = np.pad(values, 2, mode='reflect')
+    neighbours = np.sort(np.stack([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]]), axis=0)
+    off = np.abs(values - 0.5 * (neighbours[1] + neighbours[2]))
+    # digits may hide all scatter of more than half of the samples
+    usual = max(1.4826 * float(np.median(off)), float(np.sqrt(np.mean(np.minimum(
+        off, np.quantile(off, 0.95)) ** 2))))
+    # the ranks around a sample are wanted of few samples only
+    found = np.zeros(values.size, dtype=bool)
+    likely = off > _SCATTERS * usual
+    likely &= off > _AROUND * (neighbours[3] - neighbours[0])
+    if likely.any():
+        footprint = np.ones(_NEIGHBOURHOOD + 1, dtype=bool)
+        footprint[_NEIGHBOURHOOD // 2] = False
+        around = rank_filter(off, -2, footprint=footprint, mode='reflect')
+        found = likely & (off > _AROUND * around)
+    return found

@@ -1,0 +1,102 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A command that is known from its samples, against the closed form that was sampled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from antenna_drive.diagnosis import FloatArray
+from antenna_drive.machines.antenna.excitation import RecordedCommand, regular_times
+from hypothesis import given, strategies as st
+import numpy as np
+import pytest
+
+PERIOD = 0.02
+
+
+def sampled(waveform: Callable[[FloatArray], FloatArray], end: float = 30.0) -> RecordedCommand:
+    time = np.arange(0.0, end, PERIOD)
+    return RecordedCommand.of(time, waveform(time))
+
+
+def square(time: FloatArray, start: float, half: float) -> FloatArray:
+    """Return a square wave that begins after a rest."""
+    turns = np.floor((time - start) / half)
+    return np.where(time < start, 0.0, np.where(turns % 2.0 == 0.0, 1e-3, -1e-3))
+
+
+@given(half=st.floats(1.0, 4.0), start=st.floats(0.1, 3.0))
+def test_jumps_stay_between_their_samples(half: float, start: float) -> None:
+    time = np.arange(0.0, 40.0, PERIOD)
+    command = RecordedCommand.of(time, square(time, start, half))
+    np.testing.assert_allclose(command(time), square(time, start, half), rtol=0.0, atol=1e-15)
+    count = np.count_nonzero(np.diff(square(time, start, half)))
+    assert command.jumps.size == count
+
+
+def test_many_jumps_tell_their_times_better_than_each_its_own() -> None:
+    """Over squares of any period, the usual error is a fraction of that of halfway."""
+    random = np.random.default_rng(5)
+    regular, halfway = [], []
+    for half, start in random.uniform([2.5, 0.0], [3.75, 3.0], (60, 2)):
+        true = start + half * np.arange(int(30.0 / half))
+        after = PERIOD * np.floor(true / PERIOD)
+        regular.append(np.mean(np.abs(regular_times(after, after + PERIOD) - true)))
+        halfway.append(np.mean(np.abs(after + 0.5 * PERIOD - true)))
+    assert np.median(regular) < 0.4 * np.median(halfway)
+
+
+def test_jumps_that_alternate_between_two_pauses_are_regular() -> None:
+    """No time is off by more than the slow beat of the period and the samples leaves open."""
+    true = np.cumsum(np.tile([4.7743, 1.5011], 12))
+    after = PERIOD * np.floor(true / PERIOD)
+    found = regular_times(after, after + PERIOD)
+    assert np.ptp(np.diff(found)[::2]) < 1e-9
+    assert np.abs(found - true).max() < 0.3 * PERIOD
+
+
+def test_irregular_jumps_are_taken_halfway() -> None:
+    after = np.array([1.0, 2.3, 2.9, 5.1, 5.6, 9.0, 9.2, 12.0])
+    np.testing.assert_allclose(regular_times(after, after + PERIOD), after + 0.5 * PERIOD)
+
+
+@pytest.mark.parametrize('hertz', [0.3, 2.0, 5.0])
+def test_a_sine_is_smooth_between_its_samples(hertz: float) -> None:
+    omega = 2.0 * np.pi * hertz
+    command = sampled(lambda t: np.asarray(np.sin(omega * t)))
+    places = np.linspace(1.0, 29.0, 20011)
+    # a straight line is off by (omega h)^2 / 8; slopes from neighbours by (omega h)^3 / 24
+    assert np.abs(command(places) - np.sin(omega * places)).max() < (omega * PERIOD) ** 3 / 20.0
+
+
+def test_straight_lines_and_corners_on_samples_are_exact() -> None:
+    def triangle(time: FloatArray) -> FloatArray:
+        return np.asarray(np.interp(time, np.arange(0.0, 31.0), np.tile([0.0, 1.0], 16)[:31]))
+
+    places = np.linspace(0.0, 29.9, 9973)
+    assert np.abs(sampled(triangle)(places) - triangle(places)).max() < 1e-9
+
+
+def test_a_part_is_the_whole_in_another_time() -> None:
+    command = sampled(lambda t: np.asarray(np.sin(t) + np.sign(np.sin(0.7 * t))))
+    part = command.part(7.013, 19.4)
+    times = np.linspace(0.0, 12.3, 997)
+    np.testing.assert_allclose(part(times), command(times + 7.013), rtol=0.0, atol=1e-6)
+    inside = command.jumps[(command.jumps > 7.013) & (command.jumps < 19.4)]
+    np.testing.assert_allclose(part.jumps, inside - 7.013)
+
+
+def test_before_its_first_sample_nothing_is_commanded() -> None:
+    assert not sampled(lambda t: np.asarray(np.cos(t)))(np.array([-1.0, -1e-6])).any()
