@@ -22,11 +22,11 @@ from typing import Any
 
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.errors import UserError
+from antenna_drive.machines.antenna.circuits import CIRCUITS, constants, nearest_circuit
 from antenna_drive.machines.antenna.excitation import (
     Bias, CommandedRate, RecordedCommand, SheetCommand,
 )
 from antenna_drive.machines.antenna.sensors import jitter_of, SensorModel
-from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed, Drive
 from antenna_drive.recording import sheet as sheets
@@ -50,9 +50,6 @@ SAMPLE_RATE = 70.0
 _PROMPT_S, _JOINED_S = 1.0, 60.0
 # Least number of samples.
 _FEWEST = 10
-# The parameters that a sheet's name of a circuit sets.
-_CIRCUITS = {'circuit': ('torque_share.circuit', ('k_2', 's_2', 'k_3', 'g_4')),
-             'filter_1': ('torque_share.filter_1', ('gain', 'pole'))}
 
 Note = Callable[[str], None]
 
@@ -103,7 +100,8 @@ class FieldTest:
                     and isinstance(self.command.waveform, sheets.Chirp))
 
 
-def prepared(name: str, recording: Recording, drive: Drive, note: Note) -> FieldTest:
+def prepared(name: str, recording: Recording, drive: Drive, note: Note,
+             rate: float = SAMPLE_RATE) -> FieldTest:
     """
     Make a recording ready.
 
@@ -117,6 +115,8 @@ def prepared(name: str, recording: Recording, drive: Drive, note: Note) -> Field
         the configuration
     note
         called with what was inferred or is missing
+    rate
+        to which samples are thinned [Hz]; infinite for all of them
 
     Raises
     ------
@@ -133,7 +133,7 @@ def prepared(name: str, recording: Recording, drive: Drive, note: Note) -> Field
     drive, bias = _as_the_sheet_says(name, recording.sheet, drive, note)
     given = recording[_RATE_COMMAND]
     command = _command(name, recording.sheet.waveform, given, note)
-    time = _times(name, recording)
+    time = _times(name, recording, rate)
     return FieldTest(name, record_of(drive), command, bias, time,
                      *_measured(name, recording, time, note),
                      SensorModel.of(recording.sheet.sensors),
@@ -155,15 +155,13 @@ def _from_its_start(name: str, recording: Recording, note: Note) -> Recording:
 
 def _as_the_sheet_says(name: str, sheet: sheets.TestSheet, drive: Drive,
                        note: Note) -> tuple[Drive, Bias]:
-    for word, (part, numbers) in _CIRCUITS.items():
+    for word in CIRCUITS:
         circuit = getattr(sheet, word)
         if circuit is None:
             note(f'{name}: the sheet does not give {word}: as configured')
-            continue
-        source: Any = load(f'{circuit}_circuit')
-        for step in part.split('.'):
-            source = getattr(source, step)
-        drive = changed(drive, {f'{part}.{key}': getattr(source, key) for key in numbers})
+        elif nearest_circuit(drive, word) != circuit:
+            # numbers near those of the circuit are its own, as they were measured
+            drive = changed(drive, constants(word, circuit))
     if sheet.elevation_deg is not None:
         drive = changed(drive, {'plant.axis.start_elevation': math.radians(sheet.elevation_deg)})
     share = 'torque_share.circuit.'
@@ -211,7 +209,7 @@ def _channel(recording: Recording, name: str) -> Channel | None:
     return None
 
 
-def _times(name: str, recording: Recording) -> FloatArray:
+def _times(name: str, recording: Recording, rate: float) -> FloatArray:
     """Return the times that are compared: those of the reading with the most samples."""
     channels = [_channel(recording, name) for name in CHANNELS]
     time = max((c.time_s for c in channels if c is not None), key=len)
@@ -219,7 +217,7 @@ def _times(name: str, recording: Recording) -> FloatArray:
     if time.size < _FEWEST:
         raise UserError(f'{name}: {time.size} samples to compare after the start, at least '
                         f'{_FEWEST} are needed')
-    every = max(1, round(1.0 / float(np.median(np.diff(time))) / SAMPLE_RATE))
+    every = max(1, round(1.0 / float(np.median(np.diff(time))) / rate))
     return np.asarray(time[::every])
 
 
