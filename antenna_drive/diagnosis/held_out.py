@@ -181,7 +181,7 @@ class _Judge:
         """Return a part's problem, and its fits without and with the effects."""
         problem = LeastSquares(part, settings=self._settings)
         found = trained(part, part.parameters(self._best.state.parameters), self._start,
-                        (self._neutral, self._with), self._best.state.point(), self._settings)
+                        (self._neutral, self._with), self._settings)
         if not self._best.effects:
             return problem, found, found
         # The fit without effects begins where the one with them ended. It is run to its end only
@@ -220,7 +220,7 @@ class _Judge:
         """Judge on test k what the other tests have taught."""
         machine, count = self._problem.machine, len(self._problem.experiments)
         testing = Part(machine, [k])
-        state = self._fitted(testing, {}, self._none.state, self._without)
+        state = self._fitted(testing, {}, self._none.state.point(), self._without)
         # the derivatives at the optimum of all tests may be far off where the effect is not
         bare = LeastSquares(testing, settings=self._settings)
         state = bare.fit(bare.refreshed(state, central=False),
@@ -237,7 +237,13 @@ class _Judge:
             return fold
         held = {**dict.fromkeys(self._effects, 0.0), **self._start,
                 **{p.name: found.value(p.name) for p in judged}}
-        state = self._fitted(testing, held, self._best.state, self._with)
+        # the nuisances begin where training has left them, too
+        own = {p.name for p in testing.parameters(self._nuisances) if p.experiment is not None}
+        begin = with_initial_conditions(
+            LeastSquares(testing, settings=self._settings), {
+                **{name: value for name, value in found.point().items() if name not in own},
+                **held})
+        state = self._fitted(testing, held, begin, self._with)
         # what a change of the effect leaves once the offsets have followed it
         slope = self._with.for_part(testing, judged)
         cross = weighted_product(state.jacobian, state.weight, slope)
@@ -283,21 +289,32 @@ class _Judge:
 
     def _with_spread(self, fold: _Fold, judged: Sequence[Parameter], found: FitState,
                      spread: FloatArray, slope: Jacobian) -> _Fold:
-        """Return a fold with the uncertainty of the numbers that are judged."""
+        """Return a fold with the uncertainty of the numbers, if the test shows their effects."""
+        reasons = dict(fold.reasons)
+        column = {p.name: j for j, p in enumerate(judged)}
+        for effect, form in zip(self._best.effects, self._best.forms, strict=True):
+            if effect not in reasons:
+                shown = sum(slope[:, column[p.name]] * found.value(p.name) for p in form.sizes)
+                if 0.5 * float(np.sum(np.square(shown))) < self._settings.penalty.parameter:
+                    reasons[effect] = 'the withheld data do not show it'
+        judged = self._judged(reasons)
+        if not judged:
+            return replace(fold, after=None, reasons=reasons)
         names = [p.name for p in found.parameters]
         places = [names.index(p.name) for p in judged]
         return replace(
-            fold, judged=tuple(e for e in self._best.effects if e not in fold.reasons),
-            spread=np.asarray(slope, np.float64), values=found.x[places],
-            low=np.array([p.low for p in judged]), high=np.array([p.high for p in judged]),
-            covariance=spread[np.ix_(places, places)])
+            fold, reasons=reasons,
+            judged=tuple(e for e in self._best.effects if e not in reasons),
+            spread=np.asarray(slope[:, [column[p.name] for p in judged]], np.float64),
+            values=found.x[places], low=np.array([p.low for p in judged]),
+            high=np.array([p.high for p in judged]), covariance=spread[np.ix_(places, places)])
 
-    def _fitted(self, testing: Part, held: Mapping[str, float], near: FitState,
+    def _fitted(self, testing: Part, held: Mapping[str, float], begin: Mapping[str, float],
                 slopes: Slopes) -> FitState:
         """Fit the nuisances to a withheld test, with some values held."""
         own = testing.parameters(self._nuisances)
         problem = Fixed(testing, held, self._settings)
-        return problem.fit(problem.start(own, near.point(), slopes.for_part(testing, own)),
+        return problem.fit(problem.start(own, dict(begin), slopes.for_part(testing, own)),
                            self._settings.held_out.iterations)
 
 

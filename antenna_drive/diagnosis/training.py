@@ -137,14 +137,13 @@ class Slopes:
 
 
 def trained(part: Part, parameters: Sequence[Parameter], point: Mapping[str, float],
-            slopes: Sequence[Slopes], enough: Mapping[str, float],
-            settings: Settings) -> FitState:
+            slopes: Sequence[Slopes], settings: Settings) -> FitState:
     """
     Fit parameters to a part of the tests, from a point far from the optimum to the end.
 
     While much is left, the misfit counts as noise, and the noise is lowered as the fit proceeds:
-    at the sensors' own noise a robust loss does not lead across a large misfit. The fit goes on
-    with fresh derivatives unless it is already better than a known point.
+    at the sensors' own noise a robust loss does not lead across a large misfit. The derivatives
+    in `slopes` only begin the fit; at its end they are taken anew as long as that gains much.
 
     Parameters
     ----------
@@ -156,8 +155,6 @@ def trained(part: Part, parameters: Sequence[Parameter], point: Mapping[str, flo
         where the fit begins
     slopes
         derivatives for the beginning, and for what follows
-    enough
-        a known point; only the cost there is used
     settings
         thresholds
 
@@ -180,8 +177,7 @@ def trained(part: Part, parameters: Sequence[Parameter], point: Mapping[str, flo
                             options.iterations)
         at = state.point()
         number += 1
-    known = problem.start(parameters, dict(enough), given)
-    return state if state.cost <= known.cost else settled(problem, state, settings)
+    return settled(problem, state, settings)
 
 
 def settled(problem: LeastSquares, state: FitState, settings: Settings) -> FitState:
