@@ -92,7 +92,7 @@ def run(arguments: argparse.Namespace) -> int:
         for channel, (rms, _) in predict(name, recording, other).rms().items():
             signals[channel]['against'] = rms
     if arguments.out is not None:
-        write_csv(prediction.as_recording(recording), arguments.out)
+        write_csv(prediction.as_recording(recording), arguments.out, field=True)
     better = other is None or _mean_ratio(signals) <= 1.0
     if arguments.json:
         write_json({'recording': name, 'signals': signals, 'notes': notes,

@@ -189,6 +189,8 @@ def test_predict_compares_two_configurations(
     assert main([*words, '--against', 'reference', '--out', str(out)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].split()[:3] == ['current_1', '0.01', 'A'] and '% less' in lines[0]
+    assert out.read_text().startswith(
+        'time_s,rate_command_rad_s,current_1_A,tach_rate_1_rad_s\n')
     read = read_csv(out)
     assert list(read) == ['test_signal/rate_command', 'motor_1/ammeter', 'motor_1/tach_rate']
     np.testing.assert_array_equal(read['motor_1/ammeter'].time_s,
