@@ -23,8 +23,10 @@ from typing import Any
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.emulator import batch
 from antenna_drive.errors import UserError
-from antenna_drive.machines.antenna.excitation import Longest, schedule
-from antenna_drive.machines.antenna.field_test import CHANNELS, FieldTest, Note, prepared, UNITS
+from antenna_drive.machines.antenna.excitation import (
+    Bias, CommandedRate, Longest, schedule,
+)
+from antenna_drive.machines.antenna.field_test import CHANNELS, Note, prepared, UNITS
 from antenna_drive.machines.antenna.machine import LONGEST_STEP, SHORTEST_STEP, WAVE_STEP
 from antenna_drive.machines.antenna.waves import fastest_wave
 from antenna_drive.parameters.sets import Drive
@@ -91,6 +93,23 @@ class Recorder:
 
 
 @dataclass(frozen=True)
+class _WholeTest:
+    """A test at all of its samples: what it does to the drive, and what was measured."""
+
+    record: np.ndarray[Any, np.dtype[Any]]
+    command: CommandedRate
+    bias: Bias
+    time: FloatArray
+    measured: FloatArray
+
+    @classmethod
+    def of(cls, name: str, recording: Recording, drive: Drive, note: Note) -> _WholeTest:
+        """Take a recording with its test sheet."""
+        test = prepared(name, recording, drive, note, math.inf)
+        return cls(test.record, test.command, test.bias, test.time, test.measured)
+
+
+@dataclass(frozen=True)
 class Prediction:
     """
     A recording and its prediction, at all of its times.
@@ -148,7 +167,7 @@ def predict(name: str, recording: Recording, drive: Drive, recorder: Recorder | 
     UserError : the recording lacks its rate command or any reading, or the run diverged
 
     """
-    test = prepared(name, recording, drive, note, math.inf)
+    test = _WholeTest.of(name, recording, drive, note)
     predicted = _readings(test, recorder or Recorder())
     if not np.isfinite(predicted).all():
         raise UserError(f'{name}: the run of this configuration diverged')
@@ -157,7 +176,7 @@ def predict(name: str, recording: Recording, drive: Drive, recorder: Recorder | 
     return Prediction(longest[-test.time.size:], test.measured, predicted)
 
 
-def _readings(test: FieldTest, recorder: Recorder) -> FloatArray:
+def _readings(test: _WholeTest, recorder: Recorder) -> FloatArray:
     """Return what the recorder says of the drive in a test, shape (n, 6)."""
     late = recorder.delay - recorder.clock
     found = np.empty((test.time.size, len(CHANNELS)))
@@ -170,7 +189,7 @@ def _readings(test: FieldTest, recorder: Recorder) -> FloatArray:
     return found * (1.0 + recorder.gain) + recorder.zero
 
 
-def _simulated(test: FieldTest, times: FloatArray) -> FloatArray:
+def _simulated(test: _WholeTest, times: FloatArray) -> FloatArray:
     longest = Longest(LONGEST_STEP, SHORTEST_STEP, WAVE_STEP, fastest_wave(test.record))
     delay = float(test.record['test_signal']['delay'][0])
     plan = schedule(test.command, test.bias, times, longest, delay)
