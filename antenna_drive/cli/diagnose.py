@@ -22,7 +22,10 @@ For example:
 
   antenna-drive diagnose field.csv
   antenna-drive diagnose rec_a.csv rec_b.csv rec_c.csv --config my_drive.yaml \
-      --json verdict.json --report verdict.html
+      --json verdict.json --report verdict.html --corrected corrected.yaml
+
+--corrected writes a configuration with the effects and the tolerances in it, as fitted;
+`antenna-drive predict` shows how well it predicts a recording that was not used here.
 """
 
 from __future__ import annotations
@@ -53,6 +56,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              'config/; may be given several times (default: reference)')
     add_json_option(parser)
     parser.add_argument('--report', metavar='FILE', help='write a self-contained page to FILE')
+    parser.add_argument('--corrected', type=Path, metavar='FILE',
+                        help='write the configuration with what was found to FILE (.yaml)')
     parser.add_argument('--jobs', type=int, default=2, metavar='N',
                         help='simulations at once (default: 2)')
     parser.add_argument('--threshold', action='append', default=[], metavar='NAME=VALUE',
@@ -62,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose, and write what was asked for; 0 whatever the verdict."""
     # the compiled physics takes a while to load: not before it is needed
-    from antenna_drive.machines.antenna.diagnose import diagnose_recordings
+    from antenna_drive.machines.antenna.diagnose import corrected, diagnose_recordings
     from antenna_drive.parameters.loading import load
 
     check_options(arguments, jobs=Entry('', 1, whole=True))
@@ -79,12 +84,23 @@ def run(arguments: argparse.Namespace) -> int:
         diagnosis = diagnose_recordings(
             recordings, drive, lambda share, doing: progress.update(share), arguments.jobs,
             settings)
+    correction = corrected(drive, diagnosis)
     if arguments.report:
         from antenna_drive.diagnosis.page import contents
         from antenna_drive.pages import render
         with replaced(Path(arguments.report)) as stream:
             stream.write(render('verdict.html', **vars(contents(diagnosis))).encode())
-    give(diagnosis.result, arguments.json, diagnosis.summary())
+    lines = [diagnosis.summary()]
+    if arguments.corrected:
+        with replaced(arguments.corrected) as stream:
+            stream.write(correction.text.encode())
+        lines.append(f'{arguments.corrected}: ' + (
+            f'cannot hold {", ".join(correction.unwritten)}' if correction.unwritten else
+            'holds all that was found about the machine')
+            + (f'; {len(correction.recorder)} errors of the recorder are in the JSON'
+               if correction.recorder else ''))
+    give({**diagnosis.result, 'recorder': list(correction.recorder)}, arguments.json,
+         '\n'.join(lines))
     return 0
 
 

@@ -97,6 +97,9 @@ class Diagnosis:
         if fraction['value'] is not None:
             lines.append(f'  explains {share_text(fraction)}, judged on '
                          f'{result["how_far"]["held_out"]}')
+        elif result['verdict'] != 'no_gap' and fraction.get('reason'):
+            lines.append('  how much of the gap that explains cannot be judged on withheld data: '
+                         f'{fraction["reason"]}')
         lines += [f'  note: {note}' for note in result['notes']]
         return '\n'.join(lines)
 
@@ -156,7 +159,7 @@ def _diagnose(machine: Machine, progress: Progress, threads: int,
     problem = search.whole
     none = hypotheses[0]
     progress(0.9, 'withheld data')
-    reach = held_out(problem, none, best)
+    reach = held_out(problem, none, best, threads)
     evidence = _evidence(problem, hypotheses, best, reach['explained_fraction']['ci95'][1])
     decision = evidence.decide(settings)
     lack = decision.lack

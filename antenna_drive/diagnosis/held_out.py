@@ -11,131 +11,397 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""How far the gap shrinks once an effect is added, judged on data that were withheld."""
+"""
+How far the gap shrinks once an effect is added, judged on data whose effect is withheld.
+
+The effect's numbers come from the other tests alone: their fit begins at the model as configured.
+The offsets within the tolerance are no part of the effect. They are fitted to the withheld test,
+with the effect and without.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
 import math
 from typing import Any
 
 from antenna_drive.diagnosis.hypothesis import Hypothesis
-from antenna_drive.diagnosis.least_squares import LeastSquares
-from antenna_drive.diagnosis.machine import FloatArray
+from antenna_drive.diagnosis.least_squares import (
+    FitState, Jacobian, LeastSquares, prior_precision, weighted_product,
+)
+from antenna_drive.diagnosis.machine import FloatArray, Form, Parameter
+from antenna_drive.diagnosis.settings import Settings
+from antenna_drive.diagnosis.training import (
+    covariance, Fixed, Part, settled, Slopes, trained, with_initial_conditions,
+)
 import numpy as np
 
 _TURNS = ('each recording in turn, with the effect as the others have it; offsets within the '
           'tolerance were fitted to it, with the effect and without')
 _HALVES = 'the second half of the recording, predicted from the first'
+_INTERVAL = ("a bootstrap over blocks of time, each with a draw of the effect's numbers from "
+             'their Gaussian posterior in the training data, carried over linearly')
+BOUNDS = (-1.0, 1.0)
 
 
-def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis) -> dict[str, Any]:
+@dataclass(frozen=True)
+class _Fold:
     """
-    Return the gap before and after, on data that the fits have not seen, for the JSON.
+    A test that was withheld.
+
+    Attributes
+    ----------
+    name : of the test
+    time : shape (n,) [s]
+    noise : of its readings, shape (n, c)
+    before : residuals without the effects, shape (n, c); NaN where nothing is judged
+    after : with those effects that can be judged; None if none can
+    judged : ids of these
+    reasons : why the others cannot be judged, by id
+    spread : change of `after` with each of the judged effects' numbers, shape (n c, m)
+    values, low, high : of these numbers, and their bounds, shape (m,)
+    covariance : of these numbers, shape (m, m)
+
+    """
+
+    name: str
+    time: FloatArray
+    noise: FloatArray
+    before: FloatArray
+    after: FloatArray | None = None
+    judged: tuple[str, ...] = ()
+    reasons: Mapping[str, str] = field(default_factory=dict)
+    spread: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    values: FloatArray = field(default_factory=lambda: np.zeros(0))
+    low: FloatArray = field(default_factory=lambda: np.zeros(0))
+    high: FloatArray = field(default_factory=lambda: np.zeros(0))
+    covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+
+
+def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis,
+             threads: int = 1) -> dict[str, Any]:
+    """
+    Return the gap before and after, on data whose effect is withheld, for the JSON.
 
     Parameters
     ----------
     problem
         the whole tests
     none, best
-        the hypotheses without and with the likeliest effects
+        the hypotheses without and with the likeliest effects, as fitted to the whole tests
+    threads
+        how many tests are withheld at once
 
     """
-    count = len(problem.experiments)
-    channels = problem.experiments[0].channels
-    none, best = (replace(h, state=problem.start(h.state.parameters, h.state.point()))
-                  if h.state.jacobian.size == 0 else h for h in (none, best))
-    before, after = [], []
-    for k in range(count):
-        unseen = [_withheld_residuals(problem, h, k) for h in (none, best)]
-        before.append(unseen[0])
-        after.append(unseen[1] if best.effects else unseen[0])
-    samples = sum(np.isfinite(z).sum() for z in before)
-    energy = [float(np.nansum(np.concatenate([np.ravel(z) for z in part]) ** 2) / samples)
-              for part in (before, after)]
+    single = len(problem.experiments) == 1
+    judge = _Judge(problem, none, best)
+    with ThreadPoolExecutor(threads) as pool:
+        folds = list(pool.map(judge.second_half if single else judge.withheld,
+                              range(len(problem.experiments))))
+    counted = [fold for fold in folds if fold.after is not None] or folds
+    known = counted[0].after is not None
+    before = [fold.before for fold in counted]
+    after = [fold.before if fold.after is None else fold.after for fold in counted]
     fraction: float | None = None
     interval: list[float | None] = [None, None]
-    if best.effects:
-        block_s = problem.machine.time_scales.block_s
-        blocks = np.concatenate([
-            block_sums(problem.experiments[k].time, before[k], after[k], block_s)
-            for k in range(count)])
-        fraction, interval = _bootstrapped(blocks, problem)
-    per_signal = {}
-    for c, channel in enumerate(channels):
-        pair = [np.concatenate([z[:, c] for z in part]) for part in (before, after)]
-        if np.isfinite(pair[0]).any():
-            per_signal[channel] = {'before': float(np.sqrt(np.nanmean(pair[0] ** 2))),
-                                   'after': float(np.sqrt(np.nanmean(pair[1] ** 2)))}
-    return {'before': math.sqrt(energy[0]), 'after': math.sqrt(energy[1]), 'noise_floor': 1.0,
-            'explained_fraction': {'value': fraction, 'ci95': interval},
-            'per_signal': per_signal,
-            'held_out': _TURNS if count > 1 else _HALVES}
+    if known:
+        fraction, interval = _bootstrapped(counted, problem)
+    return {
+        'before': _rms(before), 'noise_floor': 1.0,
+        'after': _rms(after) if known or not best.effects else None,
+        'explained_fraction': {
+            'value': fraction, 'ci95': interval, 'bounds': list(BOUNDS),
+            'reason': None if known else _reason(folds), 'interval': _INTERVAL},
+        'per_signal': _per_signal(problem, counted, after, known or not best.effects),
+        'held_out': _HALVES if single else _TURNS,
+        'folds': [{'withheld': fold.name, 'judged': list(fold.judged),
+                   'cannot_be_judged': dict(fold.reasons)} for fold in folds],
+        'training_began_at': [
+            {'effect': effect, 'form': form.name, 'values': form.start}
+            for effect, form in zip(best.effects, best.forms, strict=True)
+            if not form.is_course]}
 
 
-def _withheld_residuals(problem: LeastSquares, hypothesis: Hypothesis, k: int) -> FloatArray:
-    """Return the residuals of an experiment that the effects were not fitted to, shape (n, c)."""
-    settings, machine = problem.settings, problem.machine
-    experiments = problem.experiments
-    used = [np.full(e.time.size, i != k) for i, e in enumerate(experiments)]
-    if len(experiments) == 1:
-        used[0] = experiments[0].time < experiments[0].time[-1] / 2.0
-    training = LeastSquares(machine, used, settings=settings)
+def _reason(folds: Sequence[_Fold]) -> str:
+    """Return why nothing could be judged."""
+    reasons = dict.fromkeys(f'{effect}: {reason}' for fold in folds
+                            for effect, reason in fold.reasons.items())
+    return '; '.join(reasons) or 'no effect was found'
+
+
+def _rms(residuals: Iterable[FloatArray]) -> float:
+    return float(np.sqrt(np.nanmean(np.concatenate([np.ravel(z) for z in residuals]) ** 2)))
+
+
+def _per_signal(problem: LeastSquares, folds: Sequence[_Fold], after: Sequence[FloatArray],
+                known: bool) -> dict[str, Any]:
+    """Return the rms of each signal, in standard deviations and in its own unit."""
+    found = {}
+    first = problem.experiments[0]
+    for c, (channel, unit) in enumerate(zip(first.channels, first.units, strict=True)):
+        if not any(np.isfinite(fold.before[:, c]).any() for fold in folds):
+            continue
+
+        def rms(parts: Sequence[FloatArray], own_unit: bool, c: int = c) -> float:
+            return _rms(z[:, c] * (fold.noise[:, c] if own_unit else 1.0)
+                        for z, fold in zip(parts, folds, strict=True))
+
+        before = [fold.before for fold in folds]
+        found[channel] = {
+            'before': rms(before, False), 'after': rms(after, False) if known else None,
+            'unit': unit, 'before_in_unit': rms(before, True),
+            'after_in_unit': rms(after, True) if known else None}
+    return found
+
+
+class _Judge:
+    """Judges a hypothesis on each test in turn."""
+
+    def __init__(self, problem: LeastSquares, none: Hypothesis, best: Hypothesis) -> None:
+        """Take the derivatives at the model as configured and at both optima."""
+        self._problem = problem
+        self._settings: Settings = problem.settings
+        none, best = (_with_jacobian(problem, h) for h in (none, best))
+        self._none, self._best = none, best
+        self._without, self._with = (Slopes.of(problem, h.state) for h in (none, best))
+        self._start: dict[str, float] = {}
+        for form in best.forms:
+            self._start.update(form.start)
+        self._effects = {p.name for form in best.forms for p in form.parameters}
+        self._nuisances = [p for p in best.state.parameters if p.name not in self._effects]
+        if best.effects or len(problem.experiments) == 1:
+            at = with_initial_conditions(problem, self._start)
+            self._neutral = Slopes.of(problem, problem.start(best.state.parameters, at))
+
+    # -- training ------------------------------------------------------------------------------
+
+    def _trained(self, part: Part) -> tuple[LeastSquares, FitState, FitState]:
+        """Return a part's problem, and its fits without and with the effects."""
+        problem = LeastSquares(part, settings=self._settings)
+        found = trained(part, part.parameters(self._best.state.parameters), self._start,
+                        (self._neutral, self._with), self._settings)
+        if not self._best.effects:
+            return problem, found, found
+        # The fit without effects begins where the one with them ended. It is run to its end only
+        # where that could matter.
+        own = part.parameters(self._nuisances)
+        columns = [j for j, p in enumerate(found.parameters) if p.name not in self._effects]
+        unaided = problem.fit(problem.start(own, found.point(), found.jacobian[:, columns]),
+                              self._settings.held_out.iterations)
+        if unaided.cost < (1.0 + self._settings.search.doubtful) * found.cost:
+            unaided = settled(problem, unaided, self._settings)
+        return problem, unaided, found
+
+    def _undetermined(self, problem: LeastSquares, unaided: FitState, found: FitState,
+                      ) -> tuple[dict[str, str], FloatArray]:
+        """Return the reasons why effects cannot be judged, by id, and the fit's covariance."""
+        spread = covariance(problem, found)
+        price = self._settings.penalty.parameter
+        gain = unaided.cost - found.cost
+        reasons = {}
+        for effect, form in zip(self._best.effects, self._best.forms, strict=True):
+            if form.is_course or any(p.experiment is not None for p in form.parameters):
+                reasons[effect] = 'its numbers belong to one test alone'
+            elif gain < price:
+                reasons[effect] = (f'the training data gain {max(gain, 0.0):.1f} by the effects, '
+                                   f'less than the price of a parameter, {price:g}')
+            else:
+                ratio = _deviations(form, found, spread)
+                if ratio < 1.0:
+                    reasons[effect] = ('the training data do not determine it: its value is '
+                                       f'{ratio:.1f} standard deviations')
+        return reasons, spread
+
+    # -- judging -------------------------------------------------------------------------------
+
+    def withheld(self, k: int) -> _Fold:
+        """Judge on test k what the other tests have taught."""
+        machine, count = self._problem.machine, len(self._problem.experiments)
+        testing = Part(machine, [k])
+        state = self._fitted(testing, {}, self._none.state.point(), self._without)
+        # the derivatives at the optimum of all tests may be far off where the effect is not
+        bare = LeastSquares(testing, settings=self._settings)
+        state = bare.fit(bare.refreshed(state, central=False),
+                         self._settings.held_out.iterations)
+        fold = self._fold(k, bare.residuals_of(state, 0))
+        if not self._best.effects:
+            return fold
+        part = Part(machine, [i for i in range(count) if i != k])
+        problem, unaided, found = self._trained(part)
+        reasons, spread = self._undetermined(problem, unaided, found)
+        fold = replace(fold, reasons=reasons)
+        judged = self._judged(reasons)
+        if not judged:
+            return fold
+        held = {**dict.fromkeys(self._effects, 0.0), **self._start,
+                **{p.name: found.value(p.name) for p in judged}}
+        # the nuisances begin where training has left them, too
+        own = {p.name for p in testing.parameters(self._nuisances) if p.experiment is not None}
+        begin = with_initial_conditions(
+            LeastSquares(testing, settings=self._settings), {
+                **{name: value for name, value in found.point().items() if name not in own},
+                **held})
+        state = self._fitted(testing, held, begin, self._with)
+        # what a change of the effect leaves once the offsets have followed it
+        slope = self._with.for_part(testing, judged)
+        cross = weighted_product(state.jacobian, state.weight, slope)
+        follow = np.linalg.lstsq(state.hessian + np.diag(prior_precision(state.parameters)),
+                                 cross, rcond=None)[0]
+        after = LeastSquares(testing, settings=self._settings).residuals_of(state, 0)
+        return self._with_spread(replace(fold, after=after), judged, found, spread,
+                                 slope - state.jacobian @ follow.astype(np.float32))
+
+    def second_half(self, k: int) -> _Fold:
+        """Judge on the second half of a test what the first half has taught."""
+        machine, whole = self._problem.machine, self._problem.experiments[k]
+        first = (whole.time < whole.time[-1] / 2.0)[:, np.newaxis]
+        part, testing = (
+            Part(machine, [k], [replace(whole, measured=np.where(used, whole.measured, np.nan))])
+            for used in (first, ~first))
+        problem, unaided, found = self._trained(part)
+        own = LeastSquares(testing, settings=self._settings)
+        fold = self._fold(k, _shaped(own, own.residuals(unaided.point())))
+        if not self._best.effects:
+            return fold
+        reasons, spread = self._undetermined(problem, unaided, found)
+        fold = replace(fold, reasons=reasons)
+        judged = self._judged(reasons)
+        if not judged:
+            return fold
+        left_out = {p.name for effect, form in zip(self._best.effects, self._best.forms,
+                                                   strict=True)
+                    if effect in reasons for p in form.sizes}
+        point = {**found.point(), **dict.fromkeys(left_out, 0.0)}
+        residual = own.residuals(point)
+        return self._with_spread(replace(fold, after=_shaped(own, residual)), judged, found,
+                                 spread, own.jacobian(point, judged, residual, False))
+
+    def _judged(self, reasons: Mapping[str, str]) -> list[Parameter]:
+        """Return the numbers of the effects that can be judged."""
+        return [p for effect, form in zip(self._best.effects, self._best.forms, strict=True)
+                if effect not in reasons for p in form.parameters]
+
+    def _fold(self, k: int, before: FloatArray) -> _Fold:
+        experiment = self._problem.experiments[k]
+        return _Fold(experiment.name, experiment.time, experiment.noise, before)
+
+    def _with_spread(self, fold: _Fold, judged: Sequence[Parameter], found: FitState,
+                     spread: FloatArray, slope: Jacobian) -> _Fold:
+        """Return a fold with the uncertainty of the numbers, if the test shows their effects."""
+        reasons = dict(fold.reasons)
+        column = {p.name: j for j, p in enumerate(judged)}
+        for effect, form in zip(self._best.effects, self._best.forms, strict=True):
+            if effect not in reasons:
+                shown = sum(slope[:, column[p.name]] * found.value(p.name) for p in form.sizes)
+                if 0.5 * float(np.sum(np.square(shown))) < self._settings.penalty.parameter:
+                    reasons[effect] = 'the withheld data do not show it'
+        judged = self._judged(reasons)
+        if not judged:
+            return replace(fold, after=None, reasons=reasons)
+        names = [p.name for p in found.parameters]
+        places = [names.index(p.name) for p in judged]
+        return replace(
+            fold, reasons=reasons,
+            judged=tuple(e for e in self._best.effects if e not in reasons),
+            spread=np.asarray(slope[:, [column[p.name] for p in judged]], np.float64),
+            values=found.x[places], low=np.array([p.low for p in judged]),
+            high=np.array([p.high for p in judged]), covariance=spread[np.ix_(places, places)])
+
+    def _fitted(self, testing: Part, held: Mapping[str, float], begin: Mapping[str, float],
+                slopes: Slopes) -> FitState:
+        """Fit the nuisances to a withheld test, with some values held."""
+        own = testing.parameters(self._nuisances)
+        problem = Fixed(testing, held, self._settings)
+        return problem.fit(problem.start(own, dict(begin), slopes.for_part(testing, own)),
+                           self._settings.held_out.iterations)
+
+
+def _with_jacobian(problem: LeastSquares, hypothesis: Hypothesis) -> Hypothesis:
     state = hypothesis.state
-    fitted = training.fit(training.start(state.parameters, state.point(), state.jacobian),
-                          settings.held_out.iterations)
-    if len(experiments) == 1:
-        whole = problem.residuals_of(
-            problem.start(state.parameters, fitted.point(), state.jacobian), k)
-        whole[used[0]] = np.nan
-        return whole
-    # The effect is as the other tests have it. The nuisances are no part of it: they are fitted
-    # to the withheld test, with the effect and without.
-    effects = {p.name for form in hypothesis.forms for p in form.parameters if p.experiment != k}
-    own = [j for j, p in enumerate(fitted.parameters) if p.name not in effects]
-    values = fitted.point()
-    testing = _WithFixed(problem, k, {name: values[name] for name in effects})
-    start = testing.start([fitted.parameters[j] for j in own], values, state.jacobian[:, own])
-    return testing.residuals_of(testing.fit(start, settings.held_out.iterations), k)
+    if state.jacobian.size:
+        return hypothesis
+    return replace(hypothesis, state=problem.start(state.parameters, state.point()))
 
 
-class _WithFixed(LeastSquares):
-    """The residuals of one experiment, with some parameters fixed."""
+def _shaped(problem: LeastSquares, residual: FloatArray) -> FloatArray:
+    """Return the residuals of a single test, NaN where nothing is judged, shape (n, c)."""
+    shape = problem.experiments[0].measured.shape
+    return np.where(problem.valid, residual, np.nan).reshape(shape)
 
-    def __init__(self, problem: LeastSquares, experiment: int, fixed: dict[str, float]) -> None:
-        super().__init__(problem.machine, [np.full(e.time.size, i == experiment)
-                                           for i, e in enumerate(problem.experiments)],
-                         settings=problem.settings)
-        self._fixed = fixed
 
-    def residuals(self, point: dict[str, float], alone: int | None = None) -> FloatArray:
-        return super().residuals({**self._fixed, **point}, alone)
+def _deviations(form: Form, found: FitState, spread: FloatArray) -> float:
+    """Return how far the sizes of an effect are from zero, in standard deviations."""
+    names = [p.name for p in found.parameters]
+    places = [names.index(p.name) for p in form.sizes]
+    sizes = found.x[places]
+    square = float(sizes @ np.linalg.pinv(spread[np.ix_(places, places)]) @ sizes)
+    return math.sqrt(max(square, 0.0) / len(places))
 
+
+# -- the interval --------------------------------------------------------------------------------
 
 def block_sums(time_s: FloatArray, before: FloatArray, after: FloatArray,
                block_s: float) -> FloatArray:
     """Return the energy before, after and of the noise in each block, shape (blocks, 3)."""
+    return _in_blocks(time_s, block_s)(np.column_stack([
+        np.nansum(before ** 2, axis=1), np.nansum(after ** 2, axis=1),
+        np.isfinite(before).sum(axis=1)]))
+
+
+def _in_blocks(time_s: FloatArray, block_s: float) -> Callable[[FloatArray], FloatArray]:
+    """Return what sums the rows of each block, from shape (n, m) to (blocks, m)."""
     block = (time_s / block_s).astype(int)
     count = int(block[-1]) + 1
-    columns = [np.nansum(before ** 2, axis=1), np.nansum(after ** 2, axis=1),
-               np.isfinite(before).sum(axis=1)]
-    return np.column_stack([np.bincount(block, column, minlength=count) for column in columns])
+    return lambda columns: np.column_stack([
+        np.bincount(block, column, minlength=count) for column in columns.T])
 
 
-def _bootstrapped(blocks: FloatArray,
+def _bootstrapped(folds: Sequence[_Fold],
                   problem: LeastSquares) -> tuple[float, list[float | None]]:
-    """Return the explained fraction with its 95 percent interval by a block bootstrap."""
-    settings = problem.settings.held_out
+    """Return the explained fraction with its 95 percent interval, see `_INTERVAL`."""
+    settings, block_s = problem.settings.held_out, problem.machine.time_scales.block_s
     random = np.random.default_rng(0)
-    draws = [explained_fraction(blocks[random.integers(0, len(blocks), len(blocks))].sum(axis=0),
-                                settings.no_gap) for _ in range(settings.resamples)]
+    blocks = np.concatenate([block_sums(fold.time, fold.before, _after(fold), block_s)
+                             for fold in folds])
+    changes = np.concatenate([_changes(fold, block_s, random, settings.resamples)
+                              for fold in folds])
+    draws = []
+    for number in range(settings.resamples):
+        chosen = random.integers(0, len(blocks), len(blocks))
+        sums = blocks[chosen].sum(axis=0)
+        sums[1] += changes[chosen, number].sum()
+        draws.append(explained_fraction(sums, settings.no_gap))
     return (explained_fraction(blocks.sum(axis=0), settings.no_gap),
             [float(np.quantile(draws, 0.025)), float(np.quantile(draws, 0.975))])
 
 
+def _after(fold: _Fold) -> FloatArray:
+    assert fold.after is not None
+    return fold.after
+
+
+def _changes(fold: _Fold, block_s: float, random: np.random.Generator,
+             count: int) -> FloatArray:
+    """Return how the energy of each block changes with draws of the effect's numbers."""
+    residual = np.nan_to_num(_after(fold))
+    rows, channels = residual.shape
+    slope = fold.spread.reshape(rows, channels, -1)
+    summed = _in_blocks(fold.time, block_s)
+    first = summed(np.einsum('nc,ncm->nm', residual, slope))
+    number = slope.shape[2]
+    second = summed(np.einsum('nci,ncj->nij', slope, slope).reshape(rows, -1))
+    draws = random.multivariate_normal(fold.values, fold.covariance, count, method='eigh')
+    steps = np.clip(draws, fold.low, fold.high) - fold.values
+    squares = np.einsum('di,dj->dij', steps, steps).reshape(count, number ** 2)
+    # the slope is that of the prediction: a residual falls as the prediction rises
+    return np.asarray(-2.0 * first @ steps.T + second @ squares.T)
+
+
 def explained_fraction(sums: FloatArray, no_gap: float) -> float:
     """
-    Return the explained share of the energy above the noise, at most 1; 0 if there is no gap.
+    Return the explained share of the energy above the noise, from -1 to 1; 0 if there is no gap.
 
     Parameters
     ----------
@@ -148,4 +414,5 @@ def explained_fraction(sums: FloatArray, no_gap: float) -> float:
     before, after, noise = sums
     # with a floor above the energy that is left, more than all would be explained
     gap = before - min(noise, after)
-    return float((before - after) / gap) if gap > no_gap * before else 0.0
+    share = float((before - after) / gap) if gap > no_gap * before else 0.0
+    return min(max(share, BOUNDS[0]), BOUNDS[1])

@@ -20,6 +20,7 @@ it, and a verdict only once the diagnosis has succeeded.
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed, Future, ProcessPoolExecutor, ThreadPoolExecutor
 import json
@@ -44,6 +45,10 @@ import yaml
 VERDICT = 'verdict.json'
 FAILURE = 'failure.txt'
 KEPT = 'kept'               # folder of the recordings that no diagnosis gets
+CORRECTED = 'corrected.yaml'
+PREDICTIONS = {'before': 'before.csv', 'after': 'after.csv'}
+PREDICTION_FAILURE = 'prediction_failure.txt'
+PREDICTION_LIMIT_S = 300.0
 DURATION_S = 30.0
 # Formats that keep every digit of the sensors.
 FORMATS = {'time_s': '%.6f', 'rate_command_rad_s': '%.12g', 'encoder_rad': '%.12g'}
@@ -194,7 +199,8 @@ def _finished(futures: Sequence[Future[Any]]) -> Iterator[Any]:
             future.cancel()
 
 
-def diagnose_case(case: Path, options: Sequence[str], limit: float) -> bool:
+def diagnose_case(case: Path, options: Sequence[str], limit: float,
+                  kept: Path | None = None) -> bool:
     """
     Diagnose one case in a process of its own, which gets only the recordings.
 
@@ -206,6 +212,8 @@ def diagnose_case(case: Path, options: Sequence[str], limit: float) -> bool:
         further options for the diagnosis
     limit
         time limit, after which the case counts as failed [s]
+    kept
+        recording that is kept from the diagnosis; it is predicted after the verdict
 
     Returns
     -------
@@ -213,27 +221,81 @@ def diagnose_case(case: Path, options: Sequence[str], limit: float) -> bool:
 
     """
     draft = case / f'.{VERDICT}'
-    command = [sys.executable, '-m', 'antenna_drive', 'diagnose',
-               *(str(case / f'{name}.csv') for name in RECORDINGS),
-               '--json', str(draft), *options]
-    try:
-        result = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                                stderr=subprocess.PIPE, timeout=limit, check=False)
-        reason = f'exit code {result.returncode}\n' + result.stderr.decode(errors='replace')
-    except subprocess.TimeoutExpired:
-        reason = f'no verdict after {limit:g} s'
+    correction = [] if kept is None else ['--corrected', str(case / CORRECTED)]
+    failure = _run(['diagnose', *(str(case / f'{name}.csv') for name in RECORDINGS),
+                    '--json', str(draft), *correction, *options], limit, 'verdict')
     (case / FAILURE).unlink(missing_ok=True)
     if draft.exists():
         try:
             json.loads(draft.read_text(encoding='utf-8'))
         except ValueError as error:
-            reason = f'verdict is not JSON: {error}\n{reason}'
+            failure = f'verdict is not JSON: {error}\n{failure}'
         else:
             os.replace(draft, case / VERDICT)
+            if kept is not None:
+                predict_kept(case, options, kept)
             return True
     draft.unlink(missing_ok=True)
-    sealing.write_whole(case / FAILURE, reason[-20000:] + '\n')
+    sealing.write_whole(case / FAILURE, failure[-20000:] + '\n')
     return False
+
+
+def predict_kept(case: Path, options: Sequence[str], kept: Path) -> bool:
+    """
+    Predict the recording that was kept back, before and after, and name it in the verdict.
+
+    Parameters
+    ----------
+    case
+        folder of a case with its verdict and its corrected configuration
+    options
+        further options that the diagnosis was given
+    kept
+        the recording
+
+    Returns
+    -------
+    True if both predictions are there; otherwise PREDICTION_FAILURE holds the reason
+
+    """
+    parser = argparse.ArgumentParser(add_help=False)
+    parser.add_argument('--config', action='append')
+    given = parser.parse_known_args(list(options))[0].config or ['reference']
+    (case / PREDICTION_FAILURE).unlink(missing_ok=True)
+    for key, words in (
+            ('before', [word for name in given for word in ('--config', name)]),
+            ('after', ['--config', str(case / CORRECTED), '--recorder', str(case / VERDICT)])):
+        out = case / PREDICTIONS[key]
+        for old in (out, out.with_suffix('.meta.json')):
+            old.unlink(missing_ok=True)
+        failure = _run(['predict', str(kept), *words, '--out', str(out)], PREDICTION_LIMIT_S,
+                       'prediction')
+        if not out.exists():
+            sealing.write_whole(case / PREDICTION_FAILURE, f'{key}: {failure[-20000:]}\n')
+            return False
+    verdict = json.loads((case / VERDICT).read_text(encoding='utf-8'))
+    sealing.write_whole(case / VERDICT, json.dumps(
+        {**verdict, 'held_back': PREDICTIONS}, indent=2, ensure_ascii=False) + '\n')
+    return True
+
+
+def _run(words: Sequence[str], limit: float, wanted: str) -> str:
+    """Run a command of this installation; return what it said, should its result be missing."""
+    try:
+        result = subprocess.run(
+            [sys.executable, '-m', 'antenna_drive', *words], stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, timeout=limit, check=False)
+    except subprocess.TimeoutExpired:
+        return f'no {wanted} after {limit:g} s'
+    return f'exit code {result.returncode}\n' + result.stderr.decode(errors='replace')
+
+
+def _unpredicted(case: Path) -> bool:
+    """Return whether a case has a verdict that still lacks its predictions."""
+    if not (case / VERDICT).exists() or not (case / CORRECTED).exists():
+        return False
+    verdict = json.loads((case / VERDICT).read_text(encoding='utf-8'))
+    return isinstance(verdict, dict) and 'held_back' not in verdict
 
 
 def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
@@ -241,6 +303,8 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
                    done: Done = lambda part, total: None) -> int:
     """
     Diagnose all cases that have no verdict yet, including those that failed before.
+
+    Where a recording was kept back, it is predicted then.
 
     Parameters
     ----------
@@ -264,12 +328,20 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
     """
     names = list(manifest['seals'])
     wanted = [name for name in names if not (folder / name / VERDICT).exists()]
+    kept = {name: path if path.exists() else None for name in names
+            for path in [folder / KEPT / name / f'{KEPT_BACK}.csv']}
     complete, failures = len(names) - len(wanted), 0
     done(complete, len(names))
     with ThreadPoolExecutor(jobs) as pool:
-        futures = [pool.submit(diagnose_case, folder / name, options, limit) for name in wanted]
+        late = [pool.submit(predict_kept, folder / name, options, path)
+                for name, path in kept.items()
+                if path is not None and _unpredicted(folder / name)]
+        futures = [pool.submit(diagnose_case, folder / name, options, limit, kept[name])
+                   for name in wanted]
         for success in _finished(futures):
             complete += 1
             failures += not success
             done(complete, len(names))
+        for prediction in late:
+            prediction.result()
     return failures

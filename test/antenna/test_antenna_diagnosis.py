@@ -90,7 +90,11 @@ def check_schema(result: Any) -> Any:
     for item in result['where']:
         assert 0.0 <= item['share'] <= 1.0
     far = result['how_far']
-    assert far['before'] >= 0.0 and far['after'] >= 0.0 and far['noise_floor'] > 0.0
+    assert far['before'] >= 0.0 and far['noise_floor'] > 0.0
+    fraction = far['explained_fraction']
+    assert (fraction['value'] is None) == (fraction['reason'] is not None)
+    if fraction['value'] is not None:
+        assert -1.0 <= fraction['ci95'][0] <= fraction['ci95'][1] <= 1.0 and far['after'] >= 0.0
 
 
 @pytest.mark.trial
@@ -144,11 +148,15 @@ def test_one_current_alone_still_gives_an_answer(tmp_path: Any) -> None:
     recordings = made({'motor_1.torque_constant.change': -0.3}, 8.0, ('square',),
                       ('motor_1/ammeter',))
     write_csv(recordings['square'], tmp_path / 'field.csv')
-    out, report = tmp_path / 'out.json', tmp_path / 'out.html'
+    out, report, corrected = (tmp_path / name for name in ('out.json', 'out.html', 'out.yaml'))
     assert main(['diagnose', str(tmp_path / 'field.csv'), '--json', str(out),
-                 '--report', str(report)]) == 0
+                 '--report', str(report), '--corrected', str(corrected)]) == 0
     result = json.loads(out.read_text())
     check_schema(result)
+    assert all(set(item) == {'name', 'value', 'unit'} for item in result['recorder'])
+    # the corrected configuration is much closer to the recording that it was made from
+    assert main(['predict', str(tmp_path / 'field.csv'), '--config', str(corrected),
+                 '--recorder', str(out), '--against', 'reference']) == 0
     assert any('not recorded' in note for note in result['notes'])
     assert '</html>' in report.read_text()
 

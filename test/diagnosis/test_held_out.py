@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from antenna_drive.diagnosis import (
     Effect, Experiment, FloatArray, Form, Hypothesis, LeastSquares, Machine, Parameter, Point,
@@ -33,27 +34,37 @@ EFFECT = Effect('spring.rate', 'spring', '', '', (Form('', (SIZE,)),))
 
 
 class Ramp(Machine):
-    """A machine whose reading is size * t + zero, with another true size in each test."""
+    """
+    A machine whose reading is size * shown(t) + zero, with another true size in each test.
 
-    def __init__(self, truths: Sequence[float], noise: float = 0.1) -> None:
+    `shown` is t, times a number for each test that says how well it shows the effect.
+    """
+
+    def __init__(self, truths: Sequence[float], noise: float = 0.1,
+                 shows: Sequence[FloatArray | float] = (1.0, 1.0, 1.0)) -> None:
         random = np.random.default_rng(3)
+        self._shown = [np.asarray(show * TIME) for show in shows]
         super().__init__([Experiment(
             f'test {k}', TIME, ('y',), ('m',),
-            (truth * TIME + noise * random.normal(size=TIME.size))[:, np.newaxis],
+            (truth * self._shown[k] + noise * random.normal(size=TIME.size))[:, np.newaxis],
             np.full((TIME.size, 1), noise)) for k, truth in enumerate(truths)], [ZERO], [EFFECT])
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
         """Return the ramp."""
-        return np.asarray(point.get(SIZE.name, 0.0) * TIME + point.get('zero', 0.0))[:, None]
+        return np.asarray(point.get(SIZE.name, 0.0) * self._shown[experiment]
+                          + point.get('zero', 0.0))[:, None]
 
 
-def judged(machine: Machine) -> dict[str, object]:
-    """Return the judgement of the one effect, fitted to all tests."""
+def judged(machine: Machine, found: float | None = None,
+           parameters: Sequence[Parameter] = (SIZE,)) -> dict[str, Any]:
+    """Return the judgement of the one effect, fitted to all tests, or with this size."""
     problem = LeastSquares(machine)
-    none, best = (Hypothesis(effects, forms, problem.fit(problem.start(parameters, {}), 20))
-                  for effects, forms, parameters in (
-                      ((), (), [ZERO]), (('spring.rate',), EFFECT.forms, [ZERO, SIZE])))
-    return held_out(problem, none, best)
+    effect = replace(EFFECT, forms=(Form('', tuple(parameters)),))
+    none = Hypothesis((), (), problem.fit(problem.start([ZERO], {}), 20))
+    state = problem.start([ZERO, *parameters], {} if found is None else {SIZE.name: found})
+    if found is None:
+        state = problem.fit(state, 20)
+    return held_out(problem, none, Hypothesis((effect.id,), effect.forms, state))
 
 
 def test_an_effect_that_is_the_same_in_every_test_explains_all() -> None:
@@ -70,8 +81,85 @@ def test_an_effect_that_is_the_same_in_every_test_explains_all() -> None:
 def test_an_effect_that_turns_its_sign_explains_less_than_nothing_elsewhere() -> None:
     """Each test is predicted with the sign that the other has."""
     fraction = judged(Ramp([0.5, -0.5]))['explained_fraction']
-    assert isinstance(fraction, dict)
-    assert fraction['value'] < -1.0 and fraction['ci95'][1] < 0.0
+    assert isinstance(fraction, dict) and fraction['bounds'] == [-1.0, 1.0]
+    assert fraction['value'] == -1.0 and fraction['ci95'][1] < 0.0
+
+
+def test_an_exact_correction_explains_all_within_its_interval() -> None:
+    """Here a fit without noise ends at the truth; with it, the interval reaches one."""
+    fraction = judged(Ramp([0.5, 0.5, 0.5]))['explained_fraction']
+    low, high = fraction['ci95']
+    assert 0.99 < low <= fraction['value'] <= high <= 1.0 and high > 0.9999
+    assert fraction['reason'] is None
+
+
+@pytest.mark.parametrize('found', [-8.0, 0.0, 3.0])
+def test_what_the_whole_data_gave_is_not_used(found: float) -> None:
+    """A test that is withheld decided the size of the whole fit; the others do not know it."""
+    machine = Ramp([0.5, 0.5, -0.2])
+    usual, other = judged(machine), judged(machine, found)
+    assert other['after'] == pytest.approx(usual['after'], rel=1e-6)
+    assert other['training_began_at'] == [
+        {'effect': 'spring.rate', 'form': '', 'values': {'spring.rate.size': 0.0}}]
+
+
+def test_what_training_does_not_see_is_not_judged_there() -> None:
+    """The one test that shows the effect cannot be predicted from the others, nor they by it."""
+    found = judged(Ramp([0.5, 0.5, 0.5], shows=(1.0, 0.0, 0.0)))
+    fraction = found['explained_fraction']
+    assert fraction['value'] is None and fraction['ci95'] == [None, None]
+    assert 'less than the price of a parameter' in fraction['reason']
+    assert 'the withheld data do not show it' in fraction['reason']
+    assert found['after'] is None and found['per_signal']['y']['after'] is None
+    assert [fold['judged'] for fold in found['folds']] == [[], [], []]
+
+
+def test_a_test_that_cannot_be_judged_does_not_count() -> None:
+    """Two tests teach each other. The third shows nothing, and its noise is no gap."""
+    found = judged(Ramp([0.5, 0.5, 0.5], shows=(1.0, 1.0, 0.0)))
+    assert [fold['judged'] for fold in found['folds']] == [
+        ['spring.rate'], ['spring.rate'], []]
+    assert found['explained_fraction']['value'] == pytest.approx(1.0, abs=1e-3)
+    alone = judged(Ramp([0.5, 0.5]))
+    assert found['before'] == pytest.approx(alone['before'], rel=1e-2)
+
+
+def test_numbers_of_one_test_alone_are_not_judged() -> None:
+    own = [replace(SIZE, experiment=0)]
+    fraction = judged(Ramp([0.5, 0.5]), parameters=own)['explained_fraction']
+    assert fraction['value'] is None
+    assert fraction['reason'] == 'spring.rate: its numbers belong to one test alone'
+
+
+def test_the_interval_holds_what_training_leaves_open() -> None:
+    """
+    A test that hardly shows the effect teaches its size within a fifth.
+
+    All of the withheld ramp is then off by that, and a bootstrap over time alone sees no spread.
+    """
+    machine = Ramp([0.5, 0.5], shows=(0.004, 1.0))
+    found = judged(machine)
+    assert [fold['judged'] for fold in found['folds']] == [['spring.rate'], ['spring.rate']]
+    # the deviation of a slope that is fitted with a zero; the prior of the zero is wide
+    deviation = 0.1 / 0.004 / np.sqrt(np.sum((TIME - TIME.mean()) ** 2))
+    low, high = found['explained_fraction']['ci95']
+    assert 0.1 < deviation / 0.5 < 0.3
+    assert high > 0.99 and 1.0 - (4.0 * deviation / 0.5) ** 2 < low < 1.0 - (
+        deviation / 0.5) ** 2
+
+
+def test_each_signal_is_told_in_its_own_unit() -> None:
+    signal = judged(Ramp([0.5, 0.5]))['per_signal']['y']
+    assert signal['unit'] == 'm'
+    assert signal['after_in_unit'] == pytest.approx(0.1 * signal['after'])
+    assert signal['before_in_unit'] == pytest.approx(0.1 * signal['before'])
+
+
+def test_a_half_that_does_not_show_the_effect_teaches_nothing() -> None:
+    late = np.where(TIME > 12.0, 1.0, 0.0)
+    found = judged(Ramp([0.5], shows=(late,)))
+    assert found['explained_fraction']['value'] is None
+    assert 'price of a parameter' in found['explained_fraction']['reason']
 
 
 def test_one_recording_is_predicted_from_its_first_half() -> None:

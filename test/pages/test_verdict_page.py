@@ -46,7 +46,9 @@ FULL: dict[str, Any] = {
     'confusable': [['motors.friction', 'dial.gain']],
     'how_far': {'before': 9.0, 'after': 1.25, 'held_out': HOSTILE,
                 'explained_fraction': {'value': 0.9, 'ci95': [0.8, 0.95]},
-                'per_signal': {HOSTILE: {'before': 9.0, 'after': 1.25}}},
+                'per_signal': {HOSTILE: {
+                    'before': 9.0, 'after': 1.25, 'unit': HOSTILE, 'before_in_unit': 0.0432,
+                    'after_in_unit': None}}},
     'where': [{'component': HOSTILE, 'signal': 'dial', 'regime': 'reversal', 'share': 0.4}],
     'may_enter_at': [{'name': HOSTILE, 'component': 'dial', 'explained': 0.3}],
     'residual_tests': {
@@ -57,7 +59,8 @@ FULL: dict[str, Any] = {
 BARE: dict[str, Any] = {
     **FULL, 'verdict': 'no_gap', 'confusable': [], 'where': [], 'may_enter_at': [],
     'which': [{'effects': ['none'], 'probability': 1.0, 'parameters': {}}],
-    'how_far': {**FULL['how_far'], 'explained_fraction': {'value': None, 'ci95': None}}}
+    'how_far': {**FULL['how_far'], 'explained_fraction': {
+        'value': None, 'ci95': None, 'reason': 'no effect was found'}}}
 TIME = np.linspace(0.0, 1.99, 200)
 
 

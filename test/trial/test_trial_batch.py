@@ -210,6 +210,13 @@ def stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
         'arguments = sys.argv[3:]\n'
         f'with open({str(tmp_path / "told.txt")!r}, "a") as stream:\n'
         '    stream.write(json.dumps(arguments) + "\\n")\n'
+        'if arguments[0] == "predict":\n'
+        '    if "broken.yaml" in arguments:\n'
+        '        sys.exit("no prediction")\n'
+        '    pathlib.Path(arguments[arguments.index("--out") + 1]).write_text("time_s")\n'
+        '    sys.exit()\n'
+        'if "--corrected" in arguments:\n'
+        '    pathlib.Path(arguments[arguments.index("--corrected") + 1]).write_text("")\n'
         'case = pathlib.Path(arguments[1]).parent.name\n'
         'target = arguments[arguments.index("--json") + 1]\n'
         'if case == "case_0002" and "--stumble" in arguments:\n'
@@ -249,10 +256,46 @@ def test_diagnosis_never_gets_what_is_kept_back(tmp_path: Path, stand_in: Path) 
     batch.make_cases(folder, manifest, jobs=1)
     assert (folder / 'kept' / 'case_0001' / 'rec_d.csv').exists()
     assert not list(folder.glob('case_*/rec_d*'))
-    assert batch.diagnose_cases(folder, manifest, 1, [], 60.0) == 0
-    told = json.loads(stand_in.read_text())
+    assert batch.diagnose_cases(folder, manifest, 1, ['--config', 'mine.yaml'], 60.0) == 0
+    told, *others = [json.loads(line) for line in stand_in.read_text().splitlines()]
     assert [Path(a).name for a in told[1:4]] == ['rec_a.csv', 'rec_b.csv', 'rec_c.csv']
     assert not any('kept' in argument or 'rec_d' in argument for argument in told)
+    case, recording = folder / 'case_0001', str(folder / 'kept' / 'case_0001' / 'rec_d.csv')
+    assert told[told.index('--corrected') + 1] == str(case / 'corrected.yaml')
+    # other processes predict it, with the configuration as it was and with the corrected one
+    assert others == [
+        ['predict', recording, '--config', 'mine.yaml', '--out', str(case / 'before.csv')],
+        ['predict', recording, '--config', str(case / 'corrected.yaml'), '--recorder',
+         str(case / 'verdict.json'), '--out', str(case / 'after.csv')]]
+    verdict = json.loads((case / 'verdict.json').read_text())
+    assert verdict == {'held_back': {'before': 'before.csv', 'after': 'after.csv'}}
+    # nothing is done twice
+    assert batch.diagnose_cases(folder, manifest, 1, [], 60.0) == 0
+    assert len(stand_in.read_text().splitlines()) == 3
+
+
+def test_a_failed_prediction_does_not_lose_the_verdict(
+        tmp_path: Path, stand_in: Path) -> None:
+    folder = tmp_path / 'trial'
+    manifest = prepare(folder, count=1, wild=True)
+    batch.make_cases(folder, manifest, jobs=1)
+    assert batch.diagnose_cases(folder, manifest, 1, ['--config', 'broken.yaml'], 60.0) == 0
+    case = folder / 'case_0001'
+    assert json.loads((case / 'verdict.json').read_text()) == {}
+    assert 'before: exit code 1\nno prediction' in (case / 'prediction_failure.txt').read_text()
+    # once more: the prediction alone is tried again
+    assert batch.diagnose_cases(folder, manifest, 1, ['--config=mine.yaml'], 60.0) == 0
+    told = [json.loads(line)[0] for line in stand_in.read_text().splitlines()]
+    assert told == ['diagnose', 'predict', 'predict', 'predict']
+    assert not (case / 'prediction_failure.txt').exists()
+    assert 'held_back' in json.loads((case / 'verdict.json').read_text())
+
+
+def test_a_tame_case_has_no_correction(made: Path, tmp_path: Path, stand_in: Path) -> None:
+    folder = tmp_path / 'trial'
+    shutil.copytree(made, folder)
+    assert batch.diagnose_cases(folder, sealing.read_manifest(folder), 1, [], 60.0) == 0
+    assert '--corrected' not in stand_in.read_text()
 
 
 def test_a_wild_trial_is_not_resumed_as_a_tame_one(tmp_path: Path) -> None:

@@ -27,8 +27,8 @@ from antenna_drive.diagnosis import Effect, Form
 from antenna_drive.machines.antenna import gust
 from antenna_drive.machines.antenna.field_test import BIAS, CURRENT_1, ENCODER
 from antenna_drive.machines.antenna.modifiers import (
-    add, AntennaParameter, CommandDelay, Digit, DigitTurn, Modifier, ReadingGain, ReadingModifier,
-    ReadingZero, scale, set_to,
+    add, AntennaParameter, Digit, DigitTurn, Modifier, ReadingGain, ReadingModifier, ReadingZero,
+    scale, set_to,
 )
 from antenna_drive.machines.antenna.wave_shape import WaveShape
 from antenna_drive.machines.antenna.waves import wave
@@ -333,7 +333,8 @@ def catalogue(durations_s: Sequence[float] = (), encoder_digit: float = 0.0) -> 
              'both currents vary with time, by no angle or rate', gust.gust_form(durations_s))
     into.add('loop', 'delay', 'a computer or a network in the command or in the rate loop',
              'everything comes late, or the rate loop rings',
-             _form(_number('time', 's', 0.0, 0.2, 5e-4, CommandDelay()), name='of the command'),
+             _form(_number('time', 's', 0.0, 0.2, 5e-4, add('test_signal.delay')),
+                   name='of the command'),
              _form(_number('error_time', 's', 0.0, 0.05, 2e-4, add(
                  'motor_1.amplifier.delay', 'motor_2.amplifier.delay')),
                  name='of the rate error'))

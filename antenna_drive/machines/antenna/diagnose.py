@@ -29,6 +29,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from antenna_drive.diagnosis import DEFAULT, diagnose, Diagnosis, Progress, Settings
+from antenna_drive.machines.antenna.corrected import correct, Corrected
 from antenna_drive.machines.antenna.machine import AntennaMachine
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.recording import Recording
@@ -59,3 +60,10 @@ def diagnose_recordings(recordings: Mapping[str, Recording], drive: Drive,
 
     """
     return diagnose(AntennaMachine(recordings, drive, threads), progress, threads, settings)
+
+
+def corrected(drive: Drive, diagnosis: Diagnosis) -> Corrected:
+    """Return the configuration of a diagnosis of recordings, with what was found in it."""
+    machine = diagnosis.machine
+    assert isinstance(machine, AntennaMachine)
+    return correct(drive, machine.records, diagnosis.best)

@@ -29,11 +29,12 @@ from typing import Any
 
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.emulator import batch
+from antenna_drive.machines.antenna.circuits import constants
 from antenna_drive.machines.antenna.excitation import Longest, schedule
 from antenna_drive.machines.antenna.field_recording import (
     CURRENT_1, CURRENT_2, FieldRecording, Note,
 )
-from antenna_drive.machines.antenna.sheet_settings import as_the_sheet_says, constants
+from antenna_drive.machines.antenna.sheet_settings import as_the_sheet_says
 from antenna_drive.machines.antenna.windows import first_window
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed, Drive, TorqueShare

@@ -22,6 +22,7 @@ import copy
 from dataclasses import dataclass, replace
 import math
 from threading import Lock
+from typing import Any
 
 from antenna_drive.diagnosis import (
     Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Motion, Parameter,
@@ -46,7 +47,7 @@ from antenna_drive.machines.antenna.modifiers import (
 from antenna_drive.machines.antenna.sensors import digit_of
 from antenna_drive.machines.antenna.tolerances import nuisances, starting_places
 from antenna_drive.machines.antenna.wave_orders import likely_orders
-from antenna_drive.machines.antenna.waves import Wave
+from antenna_drive.machines.antenna.waves import fastest_wave, Wave
 from antenna_drive.parameters.records import place_of
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.recording import Recording
@@ -122,7 +123,9 @@ class AntennaMachine(Machine):
         notes: list[str] = []
         self._tests = prepared(recordings, drive, notes.append)
         for test in self._tests:
-            test.record['plant']['axis']['mode_frequencies'][0, EXTRA_MODE] = 1.0
+            frequencies = test.record['plant']['axis']['mode_frequencies']
+            if frequencies[0, EXTRA_MODE] == 0.0:
+                frequencies[0, EXTRA_MODE] = 1.0
         given = [recording.sheet.parameter_tolerance for recording in recordings.values()
                  if recording.sheet.parameter_tolerance is not None]
         if not given:
@@ -144,6 +147,11 @@ class AntennaMachine(Machine):
                                     for form in effect.forms for p in form.parameters)):
             self._register(item)
         self.experiments = self._experiments({})
+
+    @property
+    def records(self) -> Sequence[np.ndarray[Any, np.dtype[Any]]]:
+        """Return the drive's record in each test: as configured and as the sheet says."""
+        return [test.record for test in self._tests]
 
     def _register(self, item: Parameter) -> None:
         assert isinstance(item, AntennaParameter)
@@ -335,7 +343,7 @@ class AntennaMachine(Machine):
             modifier.apply(run, value)
         record = run.numbers.view(kind)
         run.write_waves()
-        turns = 0.0
+        turns = fastest_wave(test.record)
         for shape, parts in run.waves.items():
             if shape.angle != 'axis' and any(parts):
                 turns = max(turns, shape.order * float(record[shape.angle]['gear_ratio'][0]))

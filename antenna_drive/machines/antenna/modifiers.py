@@ -45,7 +45,6 @@ class RunSetup:
     kind : type of the record
     duration_s : of the test
     bias : source of the bias voltage, where the share circuit is not connected
-    delay : of the rate command [s]
     gust : torque on the axis at its knots [N m]; None for none
     waves : parts of each wave
 
@@ -55,13 +54,17 @@ class RunSetup:
     kind: np.dtype[Any]
     duration_s: float
     bias: Bias
-    delay: float = 0.0
     gust: FloatArray | None = None
     waves: dict[WaveShape, list[float]] = field(default_factory=dict)
 
     def change(self, path: str, how: str, value: float) -> None:
         """Scale a number of the record by 1 + value, add the value to it, or set it."""
         change(self.numbers, place_of(self.kind, path), how, value)
+
+    @property
+    def delay(self) -> float:
+        """Return the delay of the rate command [s]."""
+        return float(self.numbers[place_of(self.kind, 'test_signal.delay')])
 
     def write_waves(self) -> None:
         """Write the waves into the record."""
@@ -127,6 +130,12 @@ class ReadingModifier(Modifier):
     def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
         """Modify the readings."""
 
+    def write(self, run: RunSetup, value: float) -> bool:
+        """Write the error into the drive's record; return False if it has no number for it."""
+        for path in self.fields:
+            run.change(path, self.how, value)
+        return bool(self.fields)
+
 
 @dataclass(frozen=True)
 class FieldChange(RunModifier):
@@ -162,14 +171,6 @@ class SupplyGain(RunModifier):
     def apply(self, run: RunSetup, value: float) -> None:
         run.bias = Bias(run.bias.before * (1.0 + value), run.bias.after * (1.0 + value),
                         run.bias.at)
-
-
-@dataclass(frozen=True)
-class CommandDelay(RunModifier):
-    """Delays the rate command."""
-
-    def apply(self, run: RunSetup, value: float) -> None:
-        run.delay = value
 
 
 @dataclass(frozen=True)

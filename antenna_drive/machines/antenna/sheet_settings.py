@@ -15,35 +15,23 @@
 
 from __future__ import annotations
 
-from functools import cache
 import math
 from typing import Any
 
+from antenna_drive.machines.antenna.circuits import CIRCUITS, constants, nearest_circuit
 from antenna_drive.machines.antenna.excitation import Bias
-from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.sets import changed, Drive
 from antenna_drive.recording import sheet as sheets
 
 # The parameters that a sheet's name of a circuit sets.
-_CIRCUITS = {'circuit': ('torque_share.circuit', ('k_2', 's_2', 'k_3', 'g_4')),
-             'filter_1': ('torque_share.filter_1', ('gain', 'pole'))}
-
-
-@cache
-def constants(entry: str, value: str) -> dict[str, float]:
-    """Return the numbers of the configuration that 'circuit' or 'filter_1' of a sheet sets."""
-    part, numbers = _CIRCUITS[entry]
-    source: Any = load(f'{value}_circuit')
-    for step in part.split('.'):
-        source = getattr(source, step)
-    return {f'{part}.{key}': getattr(source, key) for key in numbers}
 
 
 def as_the_sheet_says(sheet: sheets.TestSheet, drive: Drive) -> tuple[Drive, Bias]:
     """Return the drive and the source of bias of a test; as configured where a sheet is silent."""
-    for word in _CIRCUITS:
+    for word in CIRCUITS:
         circuit = getattr(sheet, word)
-        if circuit is not None:
+        # a corrected configuration has numbers of its own near those of the circuit
+        if circuit is not None and nearest_circuit(drive, word) != circuit:
             drive = changed(drive, constants(word, circuit))
     if sheet.elevation_deg is not None:
         drive = changed(drive, {'plant.axis.start_elevation': math.radians(sheet.elevation_deg)})

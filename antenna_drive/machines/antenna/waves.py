@@ -16,15 +16,33 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 from antenna_drive.diagnosis import Form
 from antenna_drive.machines.antenna.modifiers import (
     AntennaParameter, ReadingModifier, RunModifier, RunSetup, SensorReadings,
 )
 from antenna_drive.machines.antenna.wave_shape import WaveShape
+import numpy as np
 
 _PARTS = ('sine', 'cosine', 'cycles_change', 'second_sine', 'second_cosine', 'third_sine',
           'third_cosine')
+
+
+# The waves of the drive that follow a motor's angle: unit, part and name.
+_OF_MOTORS = tuple((motor, part, stem) for motor in ('motor_1', 'motor_2') for part, stem in (
+    ('motor', 'torque_ripple'), ('gearbox', 'transmission_error'), ('tachometer', 'ripple')))
+
+
+def fastest_wave(record: np.ndarray[Any, np.dtype[Any]]) -> float:
+    """Return the cycles per turn of the axis of the fastest wave in a drive's record; 0: none."""
+    turns = 0.0
+    for motor, part, stem in _OF_MOTORS:
+        numbers = record[motor][part]
+        if any(numbers[stem + end][0] != 0.0 for end in ('', '_second', '_third')):
+            turns = max(turns, float(numbers[f'{stem}_cycles'][0])
+                        * float(record[motor]['gear_ratio'][0]))
+    return turns
 
 
 @dataclass(frozen=True)
@@ -47,6 +65,10 @@ class _ReadingWavePart(ReadingModifier):
 
     def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
         readings.waves.setdefault(self.shape, [0.0] * len(_PARTS))[self.index] = value
+
+    def write(self, run: RunSetup, value: float) -> bool:
+        run.waves.setdefault(self.shape, [0.0] * len(_PARTS))[self.index] = value
+        return True
 
 
 @dataclass(frozen=True)

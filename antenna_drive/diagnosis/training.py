@@ -1,0 +1,215 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Fits to a part of the tests, which begin at the model as configured and see nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+import math
+
+from antenna_drive.diagnosis.least_squares import (
+    FitState, Jacobian, least_cost, LeastSquares, prior_precision,
+)
+from antenna_drive.diagnosis.machine import (
+    Experiment, FloatArray, Machine, Parameter, Point, TimeScales,
+)
+from antenna_drive.diagnosis.settings import Settings
+import numpy as np
+
+
+class Part(Machine):
+    """
+    A machine in some of its experiments. What is not among them cannot reach a fit.
+
+    Parameters
+    ----------
+    machine
+        in all experiments
+    chosen
+        indices of those that count
+    experiments
+        what was measured in them; None for all that the machine has
+
+    """
+
+    def __init__(self, machine: Machine, chosen: Sequence[int],
+                 experiments: Sequence[Experiment] | None = None) -> None:
+        """Take a part of the experiments."""
+        super().__init__(experiments or [machine.experiments[k] for k in chosen])
+        self.chosen = tuple(chosen)
+        self._machine = machine
+
+    @property
+    def time_scales(self) -> TimeScales:
+        """Return the time scales of the whole machine."""
+        return self._machine.time_scales
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return the readings of one experiment."""
+        return self._machine.predict(point, self.chosen[experiment])
+
+    def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
+                 until: float = math.inf) -> list[list[FloatArray | None]]:
+        """Return the readings of several variants; see `Machine.simulate`."""
+        wanted = [(i, k) for i, one in enumerate(only or [None] * len(points))
+                  for k in (range(len(self.chosen)) if one is None else (one,))]
+        found = self._machine.simulate([points[i] for i, _ in wanted],
+                                       [self.chosen[k] for _, k in wanted], until)
+        rows: list[list[FloatArray | None]] = [[None] * len(self.chosen) for _ in points]
+        for (i, k), row in zip(wanted, found, strict=True):
+            rows[i][k] = row[self.chosen[k]]
+        return rows
+
+    def low_fidelity(self) -> Machine:
+        """Return the part of the faster machine."""
+        faster = self._machine.low_fidelity()
+        return self if faster is self._machine else Part(faster, self.chosen, self.experiments)
+
+    def initial_conditions(self, experiment: int) -> Sequence[Point]:
+        """Return initial conditions of one experiment that are tried out before a fit."""
+        return self._machine.initial_conditions(self.chosen[experiment])
+
+    def parameters(self, of: Sequence[Parameter]) -> tuple[Parameter, ...]:
+        """Return the parameters that act on these experiments, with the indices of this part."""
+        return tuple(p if p.experiment is None else
+                     replace(p, experiment=self.chosen.index(p.experiment))
+                     for p in of if p.experiment is None or p.experiment in self.chosen)
+
+
+class Fixed(LeastSquares):
+    """The residuals of a machine with some parameters held at a value."""
+
+    def __init__(self, machine: Machine, values: Mapping[str, float], settings: Settings) -> None:
+        """Hold these values, by name."""
+        super().__init__(machine, settings=settings)
+        self._values = dict(values)
+
+    def residuals(self, point: dict[str, float], alone: int | None = None) -> FloatArray:
+        """Return the residuals at a point of the free parameters, shape (n,)."""
+        return super().residuals({**self._values, **point}, alone)
+
+    def jacobian(self, point: dict[str, float], parameters: Sequence[Parameter],
+                 residual: FloatArray, central: bool) -> Jacobian:
+        """Return the derivative of the prediction by difference quotients."""
+        return super().jacobian({**self._values, **point}, parameters, residual, central)
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """
+    Derivatives that were taken once for all experiments, to begin fits with.
+
+    Attributes
+    ----------
+    parameters : what the columns belong to
+    rows : of each experiment
+    jacobian : at the sensors' own noise, shape (n, m)
+
+    """
+
+    parameters: tuple[Parameter, ...]
+    rows: tuple[slice, ...]
+    jacobian: Jacobian
+
+    @classmethod
+    def of(cls, problem: LeastSquares, state: FitState) -> Slopes:
+        """Take the derivatives of a fit to all experiments."""
+        return cls(state.parameters, tuple(map(problem.rows, range(len(problem.experiments)))),
+                   state.jacobian)
+
+    def for_part(self, part: Part, parameters: Sequence[Parameter]) -> Jacobian:
+        """Return the rows of a part and the columns of some parameters, in their order."""
+        column = {p.name: j for j, p in enumerate(self.parameters)}
+        return np.concatenate([self.jacobian[self.rows[k]] for k in part.chosen])[
+            :, [column[p.name] for p in parameters]]
+
+
+def trained(part: Part, parameters: Sequence[Parameter], point: Mapping[str, float],
+            slopes: Sequence[Slopes], settings: Settings) -> FitState:
+    """
+    Fit parameters to a part of the tests, from a point far from the optimum to the end.
+
+    While much is left, the misfit counts as noise, and the noise is lowered as the fit proceeds:
+    at the sensors' own noise a robust loss does not lead across a large misfit. The derivatives
+    in `slopes` only begin the fit; at its end they are taken anew as long as that gains much.
+
+    Parameters
+    ----------
+    part
+        the tests
+    parameters
+        what is fitted
+    point
+        where the fit begins
+    slopes
+        derivatives for the beginning, and for what follows
+    settings
+        thresholds
+
+    """
+    options, search = settings.held_out, settings.search
+    at = with_initial_conditions(LeastSquares(part, settings=settings), dict(point))
+    scale = math.inf
+    number = 0
+    while scale > 1.0:
+        level = LeastSquares(part, settings=settings)
+        lower = level.noise_level(level.residuals(at))
+        lowered = lower < search.sharper * scale
+        scale = lower if lower > search.strong and lowered else 1.0
+        problem = LeastSquares(part, scale=scale, settings=settings)
+        if number == 1:
+            # what was taken for the place in a gap may have been the effect
+            at = with_initial_conditions(problem, at)
+        given = slopes[min(number, len(slopes) - 1)].for_part(part, parameters)
+        state = problem.fit(problem.start(parameters, at, given / np.float32(scale)),
+                            options.iterations)
+        at = state.point()
+        number += 1
+    return settled(problem, state, settings)
+
+
+def settled(problem: LeastSquares, state: FitState, settings: Settings) -> FitState:
+    """Go on with a fit, with fresh derivatives, as long as that gains much."""
+    options, search = settings.held_out, settings.search
+    for _ in range(options.passes):
+        before = state.cost
+        state = problem.fit(problem.refreshed(state, central=False), options.iterations)
+        if before - state.cost < max(search.settled, search.final_gain * before):
+            break
+    return state
+
+
+def with_initial_conditions(problem: LeastSquares, point: dict[str, float]) -> dict[str, float]:
+    """Return a point with the initial conditions that fit the first moments best."""
+    until = problem.machine.time_scales.start_s
+    for k in range(len(problem.experiments)):
+        trials = problem.machine.initial_conditions(k)
+        if trials:
+            _, point = least_cost(
+                problem, [point, *({**point, **trial} for trial in trials)], k, until)
+    return point
+
+
+def covariance(problem: LeastSquares, state: FitState) -> FloatArray:
+    """
+    Return the covariance of a fit's parameters (Laplace), shape (m, m).
+
+    Where more is left than the sensors' noise, it counts as noise.
+    """
+    hessian = state.hessian + np.diag(prior_precision(state.parameters))
+    scale = np.sqrt(np.maximum(np.diag(hessian), 1e-30))
+    level = max(1.0, problem.noise_level(state.residual))
+    return np.asarray(level ** 2 * np.linalg.pinv(hessian / np.outer(scale, scale))
+                      / np.outer(scale, scale))
