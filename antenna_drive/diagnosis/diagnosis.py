@@ -31,12 +31,12 @@ from antenna_drive.diagnosis.elimination import backward_elimination
 from antenna_drive.diagnosis.evidence import Evidence
 from antenna_drive.diagnosis.held_out import held_out
 from antenna_drive.diagnosis.hypothesis import Hypothesis
+from antenna_drive.diagnosis.intervals import values_with_intervals
 from antenna_drive.diagnosis.lack_of_fit import lack_of_fit, residual_tests
-from antenna_drive.diagnosis.least_squares import LeastSquares, prior_precision
+from antenna_drive.diagnosis.least_squares import LeastSquares
 from antenna_drive.diagnosis.machine import Machine
 from antenna_drive.diagnosis.search import Search
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
-import numpy as np
 try:
     from threadpoolctl import threadpool_limits
 except ImportError:  # no ROS distribution names it: the results are the same, only slower
@@ -166,10 +166,13 @@ def _diagnose(machine: Machine, progress: Progress, threads: int,
         located, places = localisation.of_the_unknown(problem, none.state, lack)
     if decision.word != 'unknown_effect':
         located = localisation.of_effects(problem, decision.answers, none.state, best.state)
+    left = problem.noise_level(best.state.residual) ** 2
     result = {
         'verdict': decision.word,
         'where': located,
-        'which': verdict.which(decision, settings.verdict, _values),
+        'which': verdict.which(decision, settings.verdict, lambda answer: values_with_intervals(
+            answer, left, settings.interval)),
+        'also_seen': verdict.also_seen(hypotheses, settings),
         'confusable': decision.confusable,
         'how_far': reach,
         'residual_tests': residual_tests(problem, best.state, lack),
@@ -190,21 +193,3 @@ def _evidence(problem: LeastSquares, hypotheses: Sequence[Hypothesis], best: Hyp
     return Evidence(hypotheses, [
         lack_of_fit(problem, raw, best if h is top else h, explained if h.effects else None)
         for h in hypotheses])
-
-
-def _values(hypothesis: Hypothesis) -> dict[str, Any]:
-    """Return the values of a hypothesis' effects with 95 percent intervals (Laplace)."""
-    state = hypothesis.state
-    hessian = state.hessian + np.diag(prior_precision(state.parameters))
-    scale = np.sqrt(np.maximum(np.diag(hessian), 1e-30))
-    covariance = np.linalg.pinv(hessian / np.outer(scale, scale)) / np.outer(scale, scale)
-    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    names = [p.name for p in state.parameters]
-    found = {}
-    for parameter, value in hypothesis.values:
-        half_width = 1.96 * float(sigma[names.index(parameter.name)])
-        found[parameter.name] = {
-            'value': value, 'ci95': [max(value - half_width, parameter.low),
-                                     min(value + half_width, parameter.high)],
-            'unit': parameter.unit}
-    return found

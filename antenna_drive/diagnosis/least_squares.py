@@ -28,6 +28,7 @@ from functools import cached_property
 
 from antenna_drive.diagnosis.box_qp import box_constrained_step
 from antenna_drive.diagnosis.machine import FloatArray, Machine, Parameter
+from antenna_drive.diagnosis.noise import whitened
 from antenna_drive.diagnosis.settings import DEFAULT, FitSettings, Settings
 import numpy as np
 from numpy.typing import NDArray
@@ -149,7 +150,10 @@ class LeastSquares:
         experiment = self.experiments[k]
         if predicted is None:
             return np.zeros(self.sizes[k])
-        z = ((experiment.measured - predicted) / (self.scale * experiment.noise)).ravel()
+        z = (experiment.measured - predicted) / (self.scale * experiment.noise)
+        for c, colour in enumerate(experiment.colours):
+            z[:, c] = whitened(z[:, c], colour)
+        z = z.ravel()
         z[~self.valid[self.rows(k)]] = 0.0
         # a prediction that diverged is a bad one, not an error
         bound = self.settings.fit.runaway

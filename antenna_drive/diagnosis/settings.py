@@ -30,6 +30,7 @@ DESIGN = 'design'
 PRACTICE = 'practice cases'
 TRIAL_0 = 'trial 0'
 TRIAL_2 = 'trial 2'
+WILD = 'wild practice cases'
 
 
 def _setting(default: Any, unit: str, decides: str, set_by: str = DESIGN) -> Any:
@@ -143,9 +144,6 @@ class VerdictSettings:
 
     temperature: float = _setting(
         8.0, 'half chi-square', 'cost that makes a hypothesis e times less probable', PRACTICE)
-    form_error: float = _setting(
-        0.02, '1', "gain, as a share of the noise's cost, that an error of the model's form may "
-        'have', TRIAL_0)
     second_effect: float = _setting(
         60.0, 'half chi-square', 'price of a second effect', PRACTICE)
     second_share: float = _setting(
@@ -208,6 +206,34 @@ class LackOfFitSettings:
 
 
 @dataclass(frozen=True)
+class NoiseSettings:
+    """The noise that a recording shows, and the error that every model has."""
+
+    model_error: float = _setting(
+        3e-3, '1', "slow error of a model, as a share of a signal's standard deviation", WILD)
+    least_level: float = _setting(
+        1.0 / 3.0, 'stated noise', 'lower bound of the level of white noise')
+    greatest_level: float = _setting(
+        3.0, 'stated noise', 'upper bound of the levels of white and of slow noise')
+    same_level: float = _setting(
+        0.05, '1', 'change of a level up to which it is the same')
+    worth_a_colour: float = _setting(
+        8.0, 'log evidence', 'evidence below which noise is white')
+    clip: float = _setting(5.0, 'residual level', 'residual beyond which a sample is an outlier')
+    least_samples: int = _setting(50, '1', 'samples below which an experiment tells no noise')
+
+
+@dataclass(frozen=True)
+class IntervalSettings:
+    """Intervals of fitted values."""
+
+    derivative_error: float = _setting(
+        0.01, '1', 'share of a derivative that may be wrong', WILD)
+    model_error: float = _setting(
+        3e-3, '1', 'standard deviation that every value has, as a share of itself', WILD)
+
+
+@dataclass(frozen=True)
 class LocalisationSettings:
     """Where the gap lies, and where an unknown input acts."""
 
@@ -250,7 +276,9 @@ class Settings:
     search: SearchSettings = SearchSettings()
     penalty: PenaltySettings = PenaltySettings()
     verdict: VerdictSettings = VerdictSettings()
+    noise: NoiseSettings = NoiseSettings()
     lack_of_fit: LackOfFitSettings = LackOfFitSettings()
+    interval: IntervalSettings = IntervalSettings()
     localisation: LocalisationSettings = LocalisationSettings()
     held_out: HeldOutSettings = HeldOutSettings()
     confusability: ConfusabilitySettings = ConfusabilitySettings()

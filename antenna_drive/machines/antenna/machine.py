@@ -414,8 +414,9 @@ def _tolerated(effect: Effect, tolerances: Sequence[AntennaParameter]) -> Effect
     def tolerated(item: Parameter) -> Parameter:
         assert isinstance(item, AntennaParameter)
         modifier: Modifier = item.modifier
-        return replace(item, tolerance=min(
-            (allowed.get((path, modifier.how), 0.0) for path in modifier.fields), default=0.0))
+        same_number = min(
+            (allowed.get((path, modifier.how), 0.0) for path in modifier.fields), default=0.0)
+        return replace(item, tolerance=max(item.tolerance, same_number))
 
     return replace(effect, forms=tuple(
         replace(form, parameters=tuple(tolerated(p) for p in form.parameters))
