@@ -15,6 +15,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from antenna_drive.diagnosis import residual_statistics as statistics
@@ -112,6 +113,47 @@ def _fast(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> tuple[str
                 signal, loudest = channel, float(now)
                 share = float(np.clip((now - 1.0) / max(before - 1.0, 1e-3), 0.0, 1.0))
     return signal, loudest, share
+
+
+def remains(problem: LeastSquares, state: FitState,
+            limits: Mapping[str, float]) -> dict[str, dict[str, Any]]:
+    """
+    Return what a hypothesis leaves of each signal, in its own unit, for the JSON.
+
+    Parameters
+    ----------
+    problem
+        the whole tests
+    state
+        of the hypothesis
+    limits
+        for some signals, the remainder beyond noise from which it matters
+
+    """
+    predicted = problem.machine.simulate([state.point()])[0]
+    found: dict[str, dict[str, Any]] = {}
+    first = problem.experiments[0]
+    for c, (channel, unit) in enumerate(zip(first.channels, first.units, strict=True)):
+        gaps, noises = [], []
+        for experiment, values in zip(problem.experiments, predicted, strict=True):
+            assert values is not None
+            there = np.isfinite(experiment.measured[:, c]) & np.isfinite(values[:, c])
+            gaps.append((experiment.measured[:, c] - values[:, c])[there])
+            level = experiment.colours[c].level if experiment.colours else 1.0
+            noises.append(level * experiment.noise[there, c])
+        gap, noise = np.concatenate(gaps), np.concatenate(noises)
+        if gap.size < problem.settings.lack_of_fit.least_samples:
+            found[channel] = {'unit': unit, 'too_few_to_judge': int(gap.size)}
+            continue
+        # a spike is no part of what a model leaves
+        bound = problem.settings.lack_of_fit.clip_fast * max(
+            1.4826 * float(np.median(np.abs(gap))), float(np.median(noise)))
+        rms = float(np.sqrt(np.mean(np.clip(gap, -bound, bound) ** 2)))
+        usual = float(np.sqrt(np.mean(noise ** 2)))
+        beyond = float(np.sqrt(max(rms ** 2 - usual ** 2, 0.0)))
+        found[channel] = {'unit': unit, 'rms': rms, 'noise': usual, 'beyond_noise': beyond,
+                          'matters': (beyond > limits[channel] if channel in limits else None)}
+    return found
 
 
 def residual_tests(problem: LeastSquares, state: FitState, lack: LackOfFit) -> dict[str, Any]:

@@ -146,11 +146,32 @@ def with_estimated_noise(experiments: Sequence[Experiment], residuals: Sequence[
             colours.append(Colour())
             continue
         limit = settings.greatest_level ** 2 + max(
-            (e.model_error_of(c, settings.model_error) / float(np.median(e.noise[known, c]))) ** 2
-            for e, known in zip(experiments, there, strict=True) if known.any())
+            _model_error(e, c, settings) for e in experiments)
         interval = float(np.median(np.diff(experiments[0].time)))
         colours.append(estimated(zs, interval, limit, settings).colour)
     return tuple(replace(e, colours=tuple(colours)) for e in experiments)
+
+
+def with_model_error(experiments: Sequence[Experiment],
+                     settings: NoiseSettings) -> tuple[Experiment, ...]:
+    """Return planned experiments with the stated noise and the error that every model has."""
+    pole = math.exp(-2.0 * math.pi * settings.model_error_hz
+                    * float(np.median(np.diff(experiments[0].time))))
+    slow = [max(_model_error(e, c, settings) for e in experiments)
+            for c, channel in enumerate(experiments[0].channels)]
+    colours = tuple(
+        Colour() if channel in experiments[0].quantised else Process(1.0, error, pole).colour
+        for channel, error in zip(experiments[0].channels, slow, strict=True))
+    return tuple(replace(e, colours=colours) for e in experiments)
+
+
+def _model_error(experiment: Experiment, channel: int, settings: NoiseSettings) -> float:
+    """Return the variance of the model's error in a signal, in variances of the stated noise."""
+    there = np.isfinite(experiment.measured[:, channel])
+    if not there.any():
+        return 0.0
+    noise = float(np.median(experiment.noise[there, channel]))
+    return (experiment.model_error_of(channel, settings.model_error) / noise) ** 2
 
 
 def same_noise(one: Experiment, other: Experiment, settings: NoiseSettings) -> bool:

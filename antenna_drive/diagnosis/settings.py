@@ -213,6 +213,7 @@ class NoiseSettings:
         3e-3, '1', "slow error of a model, as a share of a signal's standard deviation", WILD)
     least_level: float = _setting(
         1.0 / 3.0, 'stated noise', 'lower bound of the level of white noise')
+    model_error_hz: float = _setting(0.3, 'Hz', "corner of a model's error in planned tests")
     greatest_level: float = _setting(
         3.0, 'stated noise', 'upper bound of the levels of white and of slow noise')
     same_level: float = _setting(
@@ -262,8 +263,6 @@ class HeldOutSettings:
 class ConfusabilitySettings:
     """Which effects a planned test can tell apart, from derivatives alone."""
 
-    detectable: float = _setting(
-        12.0, 'half chi-square', 'cost without the effect from which an effect shows')
     alike: float = _setting(
         0.95, '1', 'share of what an effect does that another must imitate to pass for it')
 

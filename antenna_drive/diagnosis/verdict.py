@@ -165,6 +165,18 @@ def which(decision: Decision, settings: VerdictSettings,
     return sorted(entries, key=lambda entry: -entry['probability'])
 
 
+def statements(decision: Decision, best_hypothesis: Hypothesis) -> dict[str, Any]:
+    """Return what is named beside its runner-up, for the JSON."""
+    known = [(list(answer.effects) or ['none'], answer.probability)
+             for answer in decision.answers]
+    first, second, *_ = [*sorted([*known, (['unknown'], decision.unknown)],
+                                 key=lambda item: -item[1]), ([], 0.0)]
+    return {'named': {
+        'effects': first[0], 'probability': first[1],
+        'runner_up': {'effects': second[0], 'probability': second[1]},
+        'best_of_catalogue': list(best_hypothesis.named)}}
+
+
 class _Scores:
     """The scores of hypotheses, which depend on what the others gain."""
 
