@@ -28,7 +28,7 @@ For example:
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 import sys
 from typing import TYPE_CHECKING
@@ -55,6 +55,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--report', metavar='FILE', help='write a self-contained page to FILE')
     parser.add_argument('--jobs', type=int, default=2, metavar='N',
                         help='simulations at once (default: 2)')
+    parser.add_argument('--without', action='append', default=[], metavar='EFFECT',
+                        help='leave an effect out of the catalogue, to see what is then said')
+    parser.add_argument('--matters', action='append', default=[], metavar='SIGNAL=VALUE',
+                        help="say of a signal's remainder beyond noise whether it is larger than "
+                             'VALUE, in the unit of the signal, e.g. current_1=0.05')
     parser.add_argument('--threshold', action='append', default=[], metavar='NAME=VALUE',
                         help='change a threshold; antenna-drive thresholds lists them')
 
@@ -69,6 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise UserError(f'--jobs: {arguments.jobs} given, allowed is 1 or more')
     drive = load(*arguments.config)
     settings = _settings(arguments.threshold)
+    limits = dict(_numbers('--matters', arguments.matters))
     recordings = {}
     with warnings_in_one_line():
         for path in arguments.recordings:
@@ -79,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
     with Progress('diagnosis', 1.0) as progress:
         diagnosis = diagnose_recordings(
             recordings, drive, lambda share, doing: progress.update(share), arguments.jobs,
-            settings)
+            settings, arguments.without, limits)
     if arguments.json:
         write_json(diagnosis.result, arguments.json)
     if arguments.report:
@@ -92,18 +98,24 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _numbers(option: str, texts: Sequence[str]) -> Iterator[tuple[str, float]]:
+    """Yield name and value of each NAME=VALUE."""
+    for text in texts:
+        name, _, value = text.partition('=')
+        try:
+            yield name, float(value)
+        except ValueError as error:
+            raise UserError(f'{option} {text}: {value!r} given, allowed is a number') from error
+
+
 def _settings(changes: Sequence[str]) -> Settings:
     """Return the thresholds with what was given changed."""
     from antenna_drive.diagnosis.settings import DEFAULT
     settings = DEFAULT
     known = {name: value for name, _, value in DEFAULT.entries()}
-    for text in changes:
-        name, equals, value = text.partition('=')
+    for name, value in _numbers('--threshold', changes):
         if name not in known:
-            raise UserError(f'--threshold {text}: {name}: no such threshold; '
-                            'antenna-drive thresholds lists them')
-        try:
-            settings = settings.changed(name, type(known[name])(value))
-        except ValueError as error:
-            raise UserError(f'--threshold {text}: {value!r} given, allowed is a number') from error
+            raise UserError(f'--threshold {name}: no such threshold; antenna-drive thresholds '
+                            'lists them')
+        settings = settings.changed(name, type(known[name])(value))
     return settings

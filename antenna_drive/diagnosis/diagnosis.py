@@ -49,6 +49,7 @@ _LISTED = 12
 
 _HEADLINES = {
     'no_gap': 'no gap: machine and model agree within tolerance and noise',
+    'too_few_to_judge': 'too few samples to judge: no gap shows, and none could',
     'explained': 'explained: one of the known effects closes the gap',
     'partly_explained': 'partly explained: a known effect closes some of the gap',
     'unknown_effect': 'unknown effect: nothing in the catalogue closes the gap',

@@ -47,7 +47,7 @@ def lack_of_fit(problem: LeastSquares, raw: FloatArray, best: Hypothesis,
     point = best.state.point()
     implausibility = max((form.implausibility(point) for form in best.forms), default=0.0)
     return LackOfFit(_slow_excess(problem, best.state), _left(problem, raw, best), fast,
-                     fast_left, implausibility, explained, loudest)
+                     fast_left, implausibility, explained, loudest, _enough(problem))
 
 
 def _slow_excess(problem: LeastSquares, state: FitState) -> float:
@@ -61,12 +61,22 @@ def _slow_excess(problem: LeastSquares, state: FitState) -> float:
     found = []
     for k, experiment in enumerate(problem.experiments):
         z = np.clip(problem.residuals_of(state, k), -settings.clip, settings.clip)
-        # at rest the residual of a quantised reading is a fraction of a digit, and not noise
-        found += [statistics.slow_excess(z[:, c], settings)
-                  for c, channel in enumerate(experiment.channels)
-                  if channel not in experiment.quantised
-                  and np.isfinite(z[:, c]).sum() > settings.least_samples]
+        for c, channel in enumerate(experiment.channels):
+            count = np.isfinite(z[:, c]).sum()
+            # at rest the residual of a quantised reading is a fraction of a digit, and not noise
+            if channel in experiment.quantised or not count:
+                continue
+            # few samples have no slow part: their size alone speaks
+            found.append(statistics.slow_excess(z[:, c], settings)
+                         if count > settings.least_samples
+                         else statistics.power(z[:, c], settings) - 1.0)
     return float(np.mean(np.maximum(found, settings.least_excess))) if found else 0.0
+
+
+def _enough(problem: LeastSquares) -> bool:
+    """Return whether a signal has so many samples that its residual can be judged."""
+    least = problem.settings.lack_of_fit.least_samples
+    return any((np.isfinite(e.measured).sum(axis=0) > least).any() for e in problem.experiments)
 
 
 def _left(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> float:

@@ -22,7 +22,7 @@ override, for speed or because you know your machine better.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 import math
@@ -350,6 +350,21 @@ class Machine(ABC):
         """Return the machine with the same experiments, of which more is known."""
         other = copy(self)
         other.experiments = tuple(experiments)
+        return other
+
+    def without(self, effects: Collection[str]) -> Machine:
+        """
+        Return the machine with a catalogue that lacks some effects, and what they are parts of.
+
+        Raises
+        ------
+        KeyError : there is no effect of a name
+
+        """
+        gone = {name for effect in effects for name in (effect, *self.effects[effect].parts)}
+        other = copy(self)
+        other.effects = {name: effect for name, effect in self.effects.items()
+                         if name not in gone and not gone.intersection(effect.parts)}
         return other
 
     def with_noise_at(self, point: Point) -> Machine:

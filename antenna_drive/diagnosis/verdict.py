@@ -48,6 +48,7 @@ class LackOfFit:
     explained : upper end of the interval of what its effects explain of withheld data; None
         without effects
     loudest : signal whose fast part is the loudest
+    enough : False if no signal has samples enough to be judged
 
     """
 
@@ -58,6 +59,7 @@ class LackOfFit:
     implausibility: float = 0.0
     explained: float | None = None
     loudest: str = ''
+    enough: bool = True
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,7 @@ class Decision:
 
     Attributes
     ----------
-    word : no_gap, explained, partly_explained or unknown_effect
+    word : no_gap, too_few_to_judge, explained, partly_explained or unknown_effect
     answers : the hypotheses by score, with probabilities that leave room for `unknown`
     unknown : probability of something outside the catalogue
     lack : what the best hypothesis leaves
@@ -123,7 +125,7 @@ def decide(hypotheses: Sequence[Hypothesis], lack: LackOfFit, settings: Settings
     if unknown > top.probability:
         word = 'unknown_effect'
     elif not top.effects:
-        word = 'no_gap'
+        word = 'no_gap' if lack.enough else 'too_few_to_judge'
     else:
         word = 'explained' if unknown < settings.verdict.partly else 'partly_explained'
     return Decision(word, answers, unknown, lack,

@@ -19,14 +19,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
 import math
 
+from antenna_drive.machines.antenna.excitation import RecordedCommand
 from antenna_drive.machines.antenna.field_test import (
     BIAS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, TACH_1, TACH_2,
 )
 from antenna_drive.machines.antenna.modifiers import (
-    add, AntennaParameter, ChannelDelay, ClockRate, ClockShift, Modifier, ReadingGain,
+    add, AntennaParameter, ChannelDelay, ClockRate, ClockShift, JumpTime, Modifier, ReadingGain,
     ReadingModifier, ReadingZero, scale, SupplyGain,
 )
 from antenna_drive.recording.sheet import Tolerances
+import numpy as np
 
 # The numbers that the configuration knows only within the tolerance of the test sheet.
 TOLERANT_MOTOR = (
@@ -146,6 +148,13 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
         yield _within(f'supply:{test.name}', '1', tolerance, SupplyGain(), k)
     yield AntennaParameter(f'clock:{test.name}', 's', -0.01, 0.01, 1e-4, 1e-3, experiment=k,
                            on_readings=True, modifier=ClockShift())
+
+    if isinstance(test.command, RecordedCommand):
+        jumps = test.command.jumps[test.command.jumps < test.time[-1]]
+        for begin, end in zip(jumps, np.r_[jumps[1:], np.inf], strict=True):
+            half = 0.5 * test.period
+            yield _within(f'jump:{test.name}:{begin:.3f}', 's', half,
+                          JumpTime(float(begin) - half, float(end) - half), k)
 
     given = allowed([test])
     if given.clock_ppm:
