@@ -28,7 +28,7 @@ from typing import Any
 from antenna_drive.diagnosis import localisation, unknown_input, verdict
 from antenna_drive.diagnosis.check import check_machine
 from antenna_drive.diagnosis.confusability import could_hide
-from antenna_drive.diagnosis.elimination import backward_elimination
+from antenna_drive.diagnosis.elimination import backward_elimination, forward_selection
 from antenna_drive.diagnosis.evidence import Evidence
 from antenna_drive.diagnosis.held_out import held_out
 from antenna_drive.diagnosis.hypothesis import Hypothesis
@@ -180,7 +180,8 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
     began = time.monotonic()
     search = Search(LeastSquares(machine, settings=settings),
                     lambda share, doing: progress(0.9 * share, doing), threads)
-    hypotheses, best = backward_elimination(search, search.run(), settings)
+    hypotheses, best = forward_selection(
+        search, *backward_elimination(search, search.run(), settings), settings)
     # the noise is that of the motion that was found
     problem = search.whole
     none = hypotheses[0]

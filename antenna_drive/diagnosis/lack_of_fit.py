@@ -88,9 +88,10 @@ def _left(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> float:
         z = problem.residuals_of(best.state, k)
         first = raw[problem.rows(k)].reshape(experiment.measured.shape)
         for c, channel in enumerate(experiment.channels):
-            if channel in experiment.quantised or not np.isfinite(z[:, c]).any():
+            there = np.isfinite(z[:, c])
+            if channel in experiment.quantised or there.sum() < 2:
                 continue
-            white = 0.5 * float(np.nanmean(np.diff(z[:, c]) ** 2))
+            white = 0.5 * float(np.mean(np.diff(z[there, c]) ** 2))
             greatest = settings.greatest_energy
             energy += [min(float(np.nanmean(z[:, c] ** 2)), greatest) - white,
                        min(float(np.mean(first[:, c] ** 2)), greatest) - white]

@@ -175,6 +175,12 @@ class LeastSquares:
         return replace(state.without_jacobian(), residual=residual,
                        cost=self._cost(residual, state.x, prior_precision(state.parameters)))
 
+    def judged(self, state: FitState) -> FitState:
+        """Return a state of a problem with other noise as it is in this one, not fitted."""
+        residual = self.residuals(state.point())
+        return replace(state, residual=residual, weight=self.weights(residual),
+                       cost=self._cost(residual, state.x, prior_precision(state.parameters)))
+
     def noise_level(self, residual: FloatArray) -> float:
         """Return the size of residuals in standard deviations of the noise, outliers clipped."""
         z = np.abs(residual[self.valid]) * self.scale

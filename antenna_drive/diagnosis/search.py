@@ -351,6 +351,34 @@ class Search:
                 break
         return replace(hypothesis, state=state)
 
+    def with_another(self, hypothesis: Hypothesis) -> list[Hypothesis]:
+        """Return a hypothesis whose fit has converged with each of a few more effects."""
+        state = hypothesis.state
+        known = sensitivities(self.whole, state, self._pool.map)
+        promising = [item for gain, item in screened(
+            self.whole, state, known, hypothesis.effects)[:self.settings.partners]
+            if gain > self.settings.partner_gain]
+
+        def added(item: Sensitivity) -> Hypothesis:
+            more = self.whole.extended(state, item.form.parameters, [
+                p.start for p in item.form.parameters], item.jacobian)
+            return Hypothesis(
+                (*hypothesis.effects, item.effect), (*hypothesis.forms, item.form),
+                self.whole.fit(more, self.settings.full_iterations)).without_jacobian(True)
+
+        return list(self._pool.map(added, promising))
+
+    def judged_by(self, best: Hypothesis,
+                  hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """
+        Return hypotheses with their costs at the noise that one of them leaves.
+
+        Slow noise may be what an effect does that the others lack.
+        """
+        if not self._noise_taken(best):
+            return list(hypotheses)
+        return [replace(h, state=self.whole.judged(h.state)) for h in hypotheses]
+
     def without(self, hypothesis: Hypothesis, effect: str) -> Hypothesis:
         """Return a hypothesis without one of its effects, fitted until it has converged."""
         rest = self._dropped(hypothesis, effect)

@@ -118,6 +118,7 @@ class SearchSettings:
     pair_iterations: int = _setting(6, '1', "iterations of a pair's further fit")
     settling_iterations: int = _setting(10, '1', 'iterations of a fit with fresh derivatives')
     full_iterations: int = _setting(6, '1', 'iterations of a fit to the whole tests')
+    most_effects: int = _setting(4, '1', 'greatest number of effects of a hypothesis')
     doubtful: float = _setting(
         0.25, '1', 'gain, as a share of the cost, below which an effect is fitted without and '
         'judged anew', TRIAL_2)

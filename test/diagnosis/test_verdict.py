@@ -15,9 +15,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
-from antenna_drive.diagnosis.elimination import backward_elimination
+from antenna_drive.diagnosis.elimination import backward_elimination, forward_selection
 from antenna_drive.diagnosis.hypothesis import Hypothesis, penalty
 from antenna_drive.diagnosis.least_squares import FitState
 from antenna_drive.diagnosis.machine import FloatArray, Form, Parameter
@@ -173,6 +174,14 @@ class Ends:
         self.asked.append(rest)
         return fitted(rest, self.ends[rest])
 
+    def with_another(self, hypothesis: Hypothesis) -> list[Hypothesis]:
+        return [fitted(more, cost) for more, cost in self.ends.items()
+                if set(hypothesis.effects) < set(more)]
+
+    def judged_by(self, best: Hypothesis,
+                  hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        return list(hypotheses)
+
 
 def test_a_fit_of_the_offsets_that_got_stuck_raises_no_alarm() -> None:
     fits = Ends({(): 15990.0, ('a',): 16000.0})
@@ -203,3 +212,11 @@ def test_a_strong_effect_is_not_doubted() -> None:
     fits = Ends({('a',): 16000.0})
     backward_elimination(fits, [fitted((), 160000.0), fitted(('a',), 16000.0)], DEFAULT)
     assert not fits.asked
+
+
+def test_effects_are_added_until_none_is_worth_its_price() -> None:
+    fits = Ends({('a', 'b', 'c'): 9000.0, ('a', 'b', 'c', 'd'): 8990.0, ('a', 'b', 'e'): 19990.0})
+    found, end = forward_selection(
+        fits, [fitted((), 90000.0), fitted(('a', 'b'), 20000.0)], fitted(('a', 'b'), 20000.0),
+        DEFAULT)
+    assert end.effects == best(found, DEFAULT).effects == ('a', 'b', 'c')

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
+from itertools import pairwise
 import math
 
 from antenna_drive.machines.antenna.excitation import RecordedCommand
@@ -28,7 +29,6 @@ from antenna_drive.machines.antenna.modifiers import (
     ReadingModifier, ReadingZero, scale, SupplyGain,
 )
 from antenna_drive.recording.sheet import Tolerances
-import numpy as np
 
 # The numbers that the configuration knows only within the tolerance of the test sheet.
 TOLERANT_MOTOR = (
@@ -151,8 +151,8 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
 
     if isinstance(test.command, RecordedCommand):
         jumps = test.command.jumps[test.command.jumps < test.time[-1]]
-        for begin, end in zip(jumps, np.r_[jumps[1:], np.inf], strict=True):
-            half = 0.5 * test.period
+        half = 0.5 * test.period
+        for begin, end in pairwise([*jumps, math.inf]):
             yield _within(f'jump:{test.name}:{begin:.3f}', 's', half,
                           JumpTime(float(begin) - half, float(end) - half), k)
 
