@@ -93,7 +93,8 @@ def test_too_few_samples_tell_no_noise() -> None:
 
 def experiment(measured: FloatArray) -> Experiment:
     shape = (measured.size, 2)
-    return Experiment('test', INTERVAL_S * np.arange(measured.size), ('rate', 'angle'),
+    time = np.asarray(INTERVAL_S * np.arange(measured.size), np.float64)
+    return Experiment('test', time, ('rate', 'angle'),
                       ('rad/s', 'rad'), np.stack([measured, measured], axis=1),
                       np.full(shape, 0.5), quantised=('angle',))
 
