@@ -72,7 +72,7 @@ _STIFF = ('hysteresis', 'hysteresis_share')
 # Places inside the gap, as shares of half the gap, at which each motor may start.
 _STARTS = np.linspace(-0.95, 0.95, 13)
 # Runs that are kept, and tables of steps: a test has one for each bias voltage and each wave.
-_KEPT_RUNS = 120
+_KEPT_RUNS = 60
 _KEPT_PLANS = 24
 
 
