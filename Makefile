@@ -5,6 +5,8 @@ VENV := .venv$(ROS)
 READY := $(VENV)/ready
 PY := $(VENV)/bin/python
 PYTEST_ARGS ?=
+# One process for the tests that start nodes, one for the others.
+WORKERS := -n 2 --dist loadgroup --no-loadscope-reorder
 
 .PHONY: help set-up demo test trials quick lint bench clean
 
@@ -33,13 +35,13 @@ demo: $(READY)
 	$(VENV)/bin/antenna-drive demo
 
 test: $(READY)
-	$(PY) -m pytest -m 'not trial' $(PYTEST_ARGS)
+	$(PY) -m pytest $(WORKERS) -m 'not trial' $(PYTEST_ARGS)
 
 trials: $(READY)
 	$(PY) -m pytest -m trial $(PYTEST_ARGS)
 
 quick: $(READY)
-	$(PY) -m pytest -m 'not slow and not trial' $(PYTEST_ARGS)
+	$(PY) -m pytest $(WORKERS) -m 'not slow and not trial' $(PYTEST_ARGS)
 
 lint: $(READY)
 	$(PY) -m pytest test/lint $(PYTEST_ARGS)

@@ -95,6 +95,7 @@ setup(
         'test': [
             'cma >= 3.2',
             'pytest >= 7.4',
+            'pytest-xdist >= 3.7',
             'hypothesis >= 6.80',
             'mypy >= 1.8',
             'types-PyYAML',

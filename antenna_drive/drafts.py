@@ -26,16 +26,16 @@ from typing import IO
 @contextmanager
 def drafted(path: Path, check: Callable[[Path], object] | None = None) -> Iterator[IO[bytes]]:
     """
-    Give a stream whose content takes the place of `path` at the end, if all went well.
+    Yield a stream whose content replaces `path` at the end if all went well.
 
-    Whoever looks at `path` sees what was there before or all that is new, never a part of it.
+    A reader of `path` sees the old content or all of the new, never a part of it.
 
     Parameters
     ----------
     path
         the file
     check
-        called with `path` just before it is put there; what it raises leaves all as it was
+        called with `path` just before the replacement; if it raises, nothing changes
 
     Raises
     ------
@@ -48,7 +48,7 @@ def drafted(path: Path, check: Callable[[Path], object] | None = None) -> Iterat
             yield stream
             stream.flush()
             os.fsync(stream.fileno())
-            # a draft is for its owner's eyes, a result is not
+            # a draft is readable by its owner only, a result by others too
             os.fchmod(stream.fileno(), 0o666 & ~umask())
         if check is not None:
             check(path)
@@ -58,7 +58,7 @@ def drafted(path: Path, check: Callable[[Path], object] | None = None) -> Iterat
 
 
 def umask() -> int:
-    """Return what new files and folders are not allowed to be."""
+    """Return the permissions that new files and folders lack."""
     mask = os.umask(0)
     os.umask(mask)
     return mask

@@ -11,16 +11,16 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""What a person did wrong, told to that person in one line."""
+"""Errors that the user can correct, each one line long."""
 
 
 class UserError(Exception):
     """
-    Something asked for cannot be had: a file, a name, a value, an installation.
+    Something is missing or wrong: a file, a name, a value, an installation.
 
     The message is one line that names the thing and the remedy. The antenna-drive command
-    prints it without a traceback; every error of the project that is the user's to mend,
-    and not a fault of the program, is one of these.
+    prints it without a traceback. Every error that the user can correct is one of these; a
+    fault of the program is not.
     """
 
     def __init__(self, message: str) -> None:

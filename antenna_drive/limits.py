@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-How large what comes from outside may be: files, and messages of other programs.
+Limits on the size of input: files, and messages of other programs.
 
-A file of a few kilobytes can unpack into gigabytes, and a message be of any length. Each limit
-is far above what a drive needs, and a variable of the environment sets another.
+A file of a few kilobytes can unpack into gigabytes, and a message can have any length. Each limit
+is far above what a drive needs. An environment variable sets another limit.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ class Limit(NamedTuple):
 
     Attributes
     ----------
-    variable : the variable of the environment that sets another
+    variable : the environment variable that sets another limit
     default : the limit if it is not set
-    what : what there may be so many of
+    what : the things that are counted, for the error message
 
     """
 
@@ -60,7 +60,7 @@ class Limit(NamedTuple):
         return int(text)
 
     def exceeded(self) -> str:
-        """Return what to say where there is more."""
+        """Return the message for input that exceeds the limit."""
         return (f'more than {self.value()} {self.what}; if that is meant, set '
                 f'{self.variable} to a greater number')
 

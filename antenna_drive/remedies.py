@@ -31,6 +31,6 @@ REMEDIES = {
 
 
 def remedy(error: ModuleNotFoundError) -> str | None:
-    """Return in one line what is missing and how to get it, None if that is a fault of ours."""
+    """Return in one line what is missing and how to get it; None if the program is at fault."""
     missing = (error.name or '').partition('.')[0]
     return f'needs {missing}: {REMEDIES[missing]}' if missing in REMEDIES else None

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Work that is done side by side, and that ends with whoever asked for it.
+Parallel work that ends with the process that asked for it.
 
 An executor of the standard library finishes everything in its queue before it lets an error or
 Ctrl-C through, and its processes outlive a parent that is killed. These do neither.
@@ -21,33 +21,22 @@ Ctrl-C through, and its processes outlive a parent that is killed. These do neit
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 import os
 import signal
-import sys
 import warnings
 
-
-@contextmanager
-def worker_threads(count: int) -> Iterator[ThreadPoolExecutor]:
-    """Give a pool of threads; after an error nothing that waits in it is begun."""
-    pool = ThreadPoolExecutor(count)
-    try:
-        yield pool
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        raise
-    pool.shutdown()
+from antenna_drive.programs import end_with_parent
 
 
 @contextmanager
 def worker_processes(count: int) -> Iterator[ProcessPoolExecutor]:
     """
-    Give a pool of processes; after an error they are ended, whatever they are at.
+    Yield a pool of processes; end them at once after an error.
 
-    Ctrl-C in a terminal goes to all of them: only the process that asked answers it. Should that
-    one be killed, the kernel ends them (on Linux).
+    Ctrl-C in a terminal goes to all of them, but only the parent answers it. If the parent is
+    killed, the kernel ends them (on Linux).
     """
     pool = ProcessPoolExecutor(count, initializer=_become_worker, initargs=(os.getpid(),))
     try:
@@ -63,27 +52,19 @@ def worker_processes(count: int) -> Iterator[ProcessPoolExecutor]:
 
 def expect_overflow() -> None:
     """
-    Say nothing where a number overflows or is none.
+    Silence the warnings of numbers that overflow or are undefined.
 
-    A search tries values with which a model runs away. It gives the trial up; the warnings of
-    the arithmetic tell the user nothing.
+    A search tries values with which a model diverges, and gives these up. The warnings tell the
+    user nothing.
     """
     warnings.filterwarnings('ignore', '(overflow|underflow|invalid value|divide by zero) '
                                       'encountered', RuntimeWarning)
 
 
-def end_with(parent: int) -> None:
-    """Let the kernel end this process when its parent ends (on Linux); at once if it has."""
-    if sys.platform.startswith('linux'):
-        import ctypes
-        pr_set_pdeathsig = 1  # linux/prctl.h
-        ctypes.CDLL(None).prctl(pr_set_pdeathsig, int(signal.SIGTERM))
-        if os.getppid() != parent:
-            os._exit(0)
-
-
 def _become_worker(parent: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    end_with(parent)
+    end_with_parent()
+    if os.getppid() != parent:
+        os._exit(0)
     expect_overflow()

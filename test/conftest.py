@@ -15,7 +15,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 import fcntl
 import os
 from pathlib import Path
@@ -32,6 +32,10 @@ settings.load_profile('antenna_drive')
 
 # Domains 0 to 101 use ports that no operating system hands out; 0 is where people work.
 DOMAINS = range(1, 102)
+
+# Fixtures of tests that no two workers run at the same time.
+ONE_AT_A_TIME = {'session_domain', 'module_domain', 'fresh_domain', 'colcon_installation',
+                 'pip_installation'}
 
 
 class DomainClaim:
@@ -73,6 +77,23 @@ def pytest_configure(config: pytest.Config) -> None:
     config.add_cleanup(claim.release)
     os.environ['ROS_DOMAIN_ID'] = str(claim.number)
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+
+@pytest.hookimpl(tryfirst=True, hookwrapper=True)
+def pytest_collection_modifyitems(
+        config: pytest.Config, items: list[pytest.Item]) -> Generator[None, None, None]:
+    """
+    Say which tests a single worker of pytest-xdist runs, where there are several.
+
+    What starts nodes or installs is one group, and the first: two drives at once would share the
+    cores. Of the rest each file is a group, as its tests may share what is slow to make.
+    """
+    for item in items:
+        alone = ONE_AT_A_TIME & set(getattr(item, 'fixturenames', ()))
+        item.add_marker(pytest.mark.xdist_group('processes' if alone else item.path.name))
+    yield
+    if hasattr(config, 'workerinput'):
+        items.sort(key=lambda item: not ONE_AT_A_TIME & set(getattr(item, 'fixturenames', ())))
 
 
 @pytest.fixture(scope='session')

@@ -21,7 +21,7 @@ exchange between units on the stability limit of the torque bias.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -29,10 +29,9 @@ from antenna_drive.article.experiments import DriveExperiment, experiments
 from antenna_drive.emulator.run import FINE_STEP, Run, simulate
 import numpy as np
 
-STEPS = (5e-4, 1e-3, 2e-3, 4e-3)
 # Signals that are not compared; a missed impulse is a correction of one scheme, not a signal.
 _LEFT_OUT = ('test_signal/external_torque', 'missed_impulse')
-# Both runs are compared at these times [s]: a multiple of every macro-step above.
+# Both runs are compared at these times [s]: a multiple of every macro-step.
 _GRID = 4e-3
 
 
@@ -55,8 +54,7 @@ def _sampled(experiment: DriveExperiment, step_s: float) -> Run:
                     every=round(_GRID / step_s))
 
 
-def distances(step_s: float, names: Iterable[str] | None = None,
-              progress: Callable[[str], None] | None = None) -> list[Distance]:
+def distances(step_s: float, names: Iterable[str] | None = None) -> list[Distance]:
     """
     Return the error of every signal of the experiments at a macro-step.
 
@@ -66,14 +64,10 @@ def distances(step_s: float, names: Iterable[str] | None = None,
         macro-step [s]; must divide 4 ms
     names
         of the experiments; all of T1 to T4 if None
-    progress
-        called with the name of each experiment before it runs
 
     """
     found = []
     for name in names or experiments():
-        if progress:
-            progress(name)
         reference = _reference(name)
         run = _sampled(experiments()[name], step_s)
         for signal in run.names:

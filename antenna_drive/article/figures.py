@@ -25,6 +25,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 import io
 import math
+from pathlib import Path
 from typing import Any
 
 from antenna_drive.article import loaded_axis, static_profile
@@ -33,6 +34,7 @@ from antenna_drive.article.measures import NEW_CIRCUIT, OLD_CIRCUIT, Results
 from antenna_drive.article.profile_measures import loaded_axis as loop_of_load
 from antenna_drive.article.static_profile import as_in_the_text, bias_voltage, NEW_GAIN
 from antenna_drive.pages import render
+from antenna_drive.parameters.plain_yaml import read_yaml
 from antenna_drive.parameters.sets import changed, TorqueShare
 from antenna_drive.physics.backlash import dead_zone
 from antenna_drive.physics.friction import friction_torque
@@ -116,7 +118,7 @@ def _loaded(results: Results, circuit: str) -> Figure:
 
 
 def _square_wave(results: Results, name: str, signals: Sequence[tuple[str, str, str]],
-                 scale: float, label: str, command: bool = False) -> Figure:
+                 scale: float, label: str) -> Figure:
     figure, axes = _one()
     run = results.run(name)
     for signal, text, style in signals:
@@ -249,37 +251,27 @@ def lags(results: Results) -> Figure:
                                 for letter, lag in zip('abcde', LAGS)], 4.0)
 
 
-# Number, caption and drawing function.
-FIGURES: tuple[tuple[int, str, Callable[[Results], Figure]], ...] = (
-    (1, 'The backlash function, Eq. (1), b = 1 deg, k = 20 N m/deg.', backlash),
-    (2, 'Motor torque versus axial torque for a 10, 20 and 30 percent torque bias, existing '
-        'circuit: the dynamic model while the load rises and falls, and Eq. (14) alone.',
-     partial(_loaded, circuit=OLD_CIRCUIT)),
-    (3, 'Friction torque versus relative velocity, Eq. (2).', friction),
-    (8, 'Tachometer rates for zero torque bias, simulated.', partial(_tachs, name='T1')),
-    (9, 'Motor currents for zero torque bias, simulated.', partial(_currents, name='T1')),
-    (10, 'Encoder readings for zero torque bias, simulated.', partial(_encoder, name='T1')),
-    (11, 'Tachometer rates for 15 percent torque bias, simulated.', partial(_tachs, name='T2')),
-    (12, 'Motor currents for 15 percent torque bias, simulated.', partial(_currents, name='T2')),
-    (13, 'Encoder readings for 15 percent torque bias, simulated.', partial(_encoder, name='T2')),
-    (15, 'Bias voltage versus current, Eq. (14): (a) fade-out voltages, (b) bias pots, (c) gains '
-         'g_2, (d) gains k_2.', bias_fade_out),
-    (16, 'Bias voltage versus current with the modified gains (solid) and the existing ones '
-         '(dashed).', bias_slopes),
-    (17, 'Motor torque versus axial torque for a 10, 20 and 30 percent torque bias, modified '
-         'circuit: the dynamic model while the load rises and falls, and Eq. (14) alone.',
-     partial(_loaded, circuit=NEW_CIRCUIT)),
-    (18, 'The test signal.', saw_tooth),
-    (19, 'Bias voltage under the test signal, old circuit. Grey: the period left out of the '
-         'figures; dotted: the greatest value of the analysis in the article.',
-     partial(_bias, name='T3a', low=None, high=10.4)),
-    (20, 'Bias voltage under the test signal, new circuit. Dotted: least and greatest value of '
-         'the analysis in the article.', partial(_bias, name='T3b', low=7.2, high=11.6)),
-    (21, 'Counter-torque dynamics for tau_6 = 0.73 s and five gains.', gains),
-    (22, 'Counter-torque dynamics for k_ctfr = 3.3 and five time constants.', lags),
-    (23, 'Counter-torque dynamics with the new filter and the new circuit.',
-     partial(_responses, names=[('T4e', '')], end=4.0)),
-)
+# Drawing functions by number of the figure.
+FIGURES: dict[int, Callable[[Results], Figure]] = {
+    1: backlash,
+    2: partial(_loaded, circuit=OLD_CIRCUIT),
+    3: friction,
+    8: partial(_tachs, name='T1'),
+    9: partial(_currents, name='T1'),
+    10: partial(_encoder, name='T1'),
+    11: partial(_tachs, name='T2'),
+    12: partial(_currents, name='T2'),
+    13: partial(_encoder, name='T2'),
+    15: bias_fade_out,
+    16: bias_slopes,
+    17: partial(_loaded, circuit=NEW_CIRCUIT),
+    18: saw_tooth,
+    19: partial(_bias, name='T3a', low=None, high=10.4),
+    20: partial(_bias, name='T3b', low=7.2, high=11.6),
+    21: gains,
+    22: lags,
+    23: partial(_responses, names=[('T4e', '')], end=4.0),
+}
 
 
 def draw_all(results: Results, progress: Callable[[int, int], None] | None = None,
@@ -300,14 +292,15 @@ def draw_all(results: Results, progress: Callable[[int, int], None] | None = Non
 
     """
     files, parts = {}, []
+    captions = read_yaml(Path(__file__).with_suffix('.yaml'))
     with rc_context(_STYLE):
-        for done, (number, caption, draw) in enumerate(FIGURES):
+        for done, (number, draw) in enumerate(FIGURES.items()):
             if progress:
                 progress(done, len(FIGURES))
             drawing = io.BytesIO()
             draw(results).savefig(drawing, format='svg', metadata={'Date': None})
             files[f'fig_{number:02d}.svg'] = drawing.getvalue()
-            parts.append((number, caption, b64encode(drawing.getvalue()).decode()))
+            parts.append((number, captions[number], b64encode(drawing.getvalue()).decode()))
     files['figures.html'] = render(
         'figures.html', title="The article's figures, redrawn",
         lead='Each figure is also a file of its own.', figures=parts).encode()

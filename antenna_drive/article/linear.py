@@ -24,7 +24,6 @@ from __future__ import annotations
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.parameters import Drive
 import numpy as np
-from scipy.linalg import expm
 from scipy.optimize import brentq
 
 # Gains k' of Filter 1 between which the stability limit is searched for [1/s].
@@ -70,49 +69,6 @@ def bias_loop(drive: Drive, gain: float, pole: float, *, rotors_held: bool) -> F
     return matrix[:4, :4] if rotors_held else matrix
 
 
-def rate_loop(drive: Drive) -> tuple[FloatArray, FloatArray]:
-    """
-    Return matrix and input of the rate loop, in which both motors move together; no friction.
-
-    The states are: command voltage [V], integral and lagged demand of amplifier 1 [article A],
-    current [article A], motor rate [rad/s] and angle [rad], then rate and angle of the hub and
-    of each mode of the structure [rad/s], [rad]. The input is the rate command [rad/s].
-
-    Returns
-    -------
-    matrix of shape (n, n), and vector of shape (n,), n = 8 + 2 modes
-
-    """
-    axis, motor, amplifier = drive.plant.axis, drive.motor_2, drive.motor_2.amplifier
-    modes = len(axis.mode_inertias)
-    voltage, integral, demand, current, rate, angle, hub_rate, hub, *rest = np.eye(8 + 2 * modes)
-    error = amplifier.rate_gain * (voltage - amplifier.tach_gain * rate)
-    gear_torque = (motor.gearbox.stiffness * (angle - axis.gear_ratio * hub)
-                   + motor.gearbox.contact_damping * (rate - axis.gear_ratio * hub_rate))
-    on_hub = 2.0 * axis.gear_ratio * gear_torque
-    appendages = []
-    for j in range(modes):
-        mode_rate, mode = rest[2 * j], rest[2 * j + 1]
-        omega = 2.0 * np.pi * axis.mode_frequencies[j]
-        pull = (omega ** 2 * (mode - hub)
-                + 2.0 * axis.mode_damping_ratios[j] * omega * (mode_rate - hub_rate))
-        on_hub = on_hub + axis.mode_inertias[j] * pull
-        appendages += [-pull, mode_rate]
-    command = motor.rate_command
-    matrix = np.array([
-        -voltage / command.tau_1,
-        error / amplifier.integral_time,
-        (error + integral - demand) / amplifier.lag,
-        _current_slope(drive, demand, current, rate),
-        (motor.motor.torque_constant * current - gear_torque) / motor.motor.rotor_inertia,
-        rate,
-        on_hub / axis.inertia_hub,
-        hub_rate,
-        *appendages,
-    ])
-    return matrix, voltage * command.k_s * command.k_1 / command.tau_1
-
-
 def _current_slope(drive: Drive, demand: FloatArray, current: FloatArray, rate: FloatArray,
                    ) -> FloatArray:
     armature, gain = drive.motor_2.armature, drive.motor_2.amplifier.current_feedback_gain
@@ -150,33 +106,3 @@ def stability_limit(drive: Drive, pole: float, *, rotors_held: bool = True) -> f
     if rightmost(_GAINS[0]) > 0.0 or rightmost(_GAINS[1]) < 0.0:
         return float('nan')
     return float(brentq(rightmost, *_GAINS, rtol=1e-10))
-
-
-def step_response(drive: Drive, time: FloatArray) -> FloatArray:
-    """
-    Return the motor rate after a step of the rate command, as a share of the command [1].
-
-    Parameters
-    ----------
-    drive
-        parameters
-    time
-        evenly spaced from 0 [s], shape (n,)
-
-    Returns
-    -------
-    array of shape (n,)
-
-    """
-    matrix, gain = rate_loop(drive)
-    size = gain.size
-    extended = np.zeros((size + 1, size + 1))
-    extended[:size, :size] = matrix
-    extended[:size, size] = gain
-    advance = expm(extended * (time[1] - time[0]))
-    state = np.append(np.zeros(size), 1.0)
-    rates = np.empty(time.size)
-    for k in range(time.size):
-        rates[k] = state[4]
-        state = advance @ state
-    return rates / drive.plant.axis.gear_ratio

@@ -25,9 +25,7 @@ from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-import json
 import os
-import subprocess
 import sys
 from typing import Any
 
@@ -178,19 +176,8 @@ def _dask(work: list[Task], threads: Executor, cores: int, repetitions: int) -> 
 
 def peak_memory(duration_s: float) -> float:
     """Return the peak memory of a process that runs one variant [MB]."""
-    done = subprocess.run([sys.executable, '-m', __name__, repr(duration_s)],
-                          capture_output=True, text=True, check=True)
-    return float(json.loads(done.stdout)['peak_MB'])
-
-
-def main() -> None:
-    """Run one variant for the given duration and print the peak memory as JSON."""
-    import resource
-
-    statistics(Task([[1.0] * len(_VARIED)], float(sys.argv[1])))
-    kilobytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    print(json.dumps({'peak_MB': kilobytes / 1024.0}))
+    return measuring.process(__name__, repr(duration_s))[2]
 
 
 if __name__ == '__main__':
-    main()
+    statistics(Task([[1.0] * len(_VARIED)], float(sys.argv[1])))

@@ -16,16 +16,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import os
 from pathlib import Path
-import subprocess
-import sys
 import tempfile
-import time
 from typing import Any
 
 from antenna_drive.bench import measuring
-from antenna_drive.errors import UserError
 
 _SEED = 20261
 
@@ -46,29 +41,14 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
     took = []
     with tempfile.TemporaryDirectory() as folder:
         progress('recordings')
-        _command('trial', '--cases', '1', '--seed', str(_SEED), '--out', folder, '--quiet')
+        measuring.process('antenna_drive', 'trial', '--cases', '1', '--seed', str(_SEED),
+                          '--out', folder, '--quiet')
         case = Path(folder, 'case_0001')
         recordings = [str(path) for path in sorted(case.glob('rec_*.csv'))]
         for turn in range(1 if quick else repetitions):
             progress(f'turn {turn + 1}')
-            took.append(_command('diagnose', *recordings, '--json',
-                                 str(Path(folder, 'verdict.json'))))
+            took.append(measuring.process('antenna_drive', 'diagnose', *recordings, '--json',
+                                          str(Path(folder, 'verdict.json'))))
     return {'took_s': measuring.figure([item[0] for item in took], 's'),
             'processor_s': measuring.figure([item[1] for item in took], 's'),
             'peak_memory_MB': measuring.figure([item[2] for item in took], 'MB')}
-
-
-def _command(*arguments: str) -> tuple[float, float, float]:
-    """Run a command; return wall time [s], processor time [s] and peak memory [MB]."""
-    began = time.monotonic()
-    with tempfile.TemporaryFile() as log:
-        process = subprocess.Popen([sys.executable, '-m', 'antenna_drive', *arguments],
-                                   stdout=log, stderr=log, stdin=subprocess.DEVNULL)
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-        wall_s = time.monotonic() - began
-        if process.returncode:
-            log.seek(0)
-            said = log.read().decode(errors='replace').strip().splitlines() or ['nothing said']
-            raise UserError(f'antenna-drive {arguments[0]}: {said[-1]}')
-    return wall_s, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024.0

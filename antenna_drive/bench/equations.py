@@ -104,8 +104,12 @@ def initial_state(drive: Drive) -> FloatArray:
     return x
 
 
-def equations(compiler: Callable[[Any], Any] = lambda function: function,
-              ) -> tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]:
+_Equation = Callable[..., Any]
+_Compiler = Callable[[Any], Any]
+
+
+def equations(compiler: _Compiler = lambda function: function,
+              ) -> tuple[_Equation, _Equation, _Equation]:
     """
     Return the functions of the model.
 
@@ -127,6 +131,13 @@ def equations(compiler: Callable[[Any], Any] = lambda function: function,
         jumps beyond stiction and x is the state before the jump
 
     """
+    mode_torque, applied = _torques(compiler)
+    guards, settle = _events(compiler, applied)
+    return _rates(compiler, mode_torque, applied), guards, settle
+
+
+def _torques(compiler: _Compiler) -> tuple[_Equation, _Equation]:
+    """Return the torque of a mode on the hub, and that on a body but for its friction."""
     @compiler
     def contact(x, m, p):  # type: ignore[no-untyped-def]
         """Return twist, pressing torque of the upper and pulling torque of the lower flank."""
@@ -163,6 +174,11 @@ def equations(compiler: Callable[[Any], Any] = lambda function: function,
             torque += mode_torque(x, j, p)
         return torque
 
+    return mode_torque, applied
+
+
+def _rates(compiler: _Compiler, mode_torque: _Equation, applied: _Equation) -> _Equation:
+    """Return the function that writes the time derivative of the state."""
     @compiler
     def acceleration(x, body, slip, threshold, p):  # type: ignore[no-untyped-def]
         """Return a body's acceleration [rad/s^2], Eq. (2)-(8)."""
@@ -237,6 +253,11 @@ def equations(compiler: Callable[[Any], Any] = lambda function: function,
             dx[k] = x[k + 1]
             dx[k + 1] = -mode_torque(x, j, p) / p[MODE_1 + 3 * j]
 
+    return rates
+
+
+def _events(compiler: _Compiler, applied: _Equation) -> tuple[_Equation, _Equation]:
+    """Return the guards of stopping and breaking away, and what a body does then."""
     @compiler
     def guards(x, slip, p, g):  # type: ignore[no-untyped-def]
         for body in range(3):
@@ -269,7 +290,7 @@ def equations(compiler: Callable[[Any], Any] = lambda function: function,
         elif torque <= -(1.0 - _ALMOST) * stiction:
             slip[body] = -1
 
-    return rates, guards, settle
+    return guards, settle
 
 
 def pieces(experiment: DriveExperiment) -> list[tuple[float, float, float, float]]:

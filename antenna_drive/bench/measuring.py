@@ -20,9 +20,13 @@ import gc
 import os
 from pathlib import Path
 import platform
+import subprocess
+import sys
+import tempfile
 import time
 from typing import Any
 
+from antenna_drive.errors import UserError
 import numpy as np
 
 Figure = dict[str, Any]
@@ -65,6 +69,29 @@ def in_turn(work: Mapping[str, Callable[[], object]], repetitions: int) -> dict[
             piece()
             times[name].append(time.perf_counter() - began)
     return times
+
+
+def process(module: str, *arguments: str) -> tuple[float, float, float]:
+    """
+    Run a module; return its wall time [s], processor time [s] and peak memory [MB].
+
+    Raises
+    ------
+    UserError : it fails; the message is its last line
+
+    """
+    began = time.monotonic()
+    with tempfile.TemporaryFile() as log:
+        child = subprocess.Popen([sys.executable, '-m', module, *arguments],
+                                 stdout=log, stderr=log, stdin=subprocess.DEVNULL)
+        _, status, usage = os.wait4(child.pid, 0)
+        child.returncode = os.waitstatus_to_exitcode(status)
+        wall_s = time.monotonic() - began
+        if child.returncode:
+            log.seek(0)
+            said = log.read().decode(errors='replace').strip().splitlines() or ['nothing said']
+            raise UserError(f'{module} {" ".join(arguments[:1])}: {said[-1]}')
+    return wall_s, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024.0
 
 
 def machine() -> dict[str, Any]:

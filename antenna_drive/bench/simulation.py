@@ -46,7 +46,7 @@ EXPERIMENTS = ('T1', 'T3a', 'T4a')
 LEVELS = (1e-3, 1e-2, 1e-1)
 # A setting that takes longer than this is given up [s].
 PATIENCE_S = 30.0
-# Of each run that takes milliseconds, so many in a row are timed as one.
+# This many runs of a few milliseconds are timed together as one.
 _IN_A_ROW = 5
 # A setting is tried until it has taken this long [s], or so often.
 _LEAST_S = 0.3
@@ -91,7 +91,7 @@ class Candidate:
     error: float
     wall_s: float
 
-    def told(self) -> dict[str, Any]:
+    def plain(self) -> dict[str, Any]:
         """Return all but the function."""
         return {'setting': self.name, 'error': self.error, 'wall_s': self.wall_s}
 
@@ -152,7 +152,7 @@ def _one(problem: Problem, repetitions: int, quick: bool, progress: Callable[[st
            for scheme, step_s in _OWN]
     result: dict[str, Any] = {
         'duration_s': problem.experiment.duration, 'reference_step_s': FINE_STEP,
-        'own': [candidate.told() for candidate in own], 'peers': {}, 'equal_accuracy': {}}
+        'own': [candidate.plain() for candidate in own], 'peers': {}, 'equal_accuracy': {}}
     chosen: dict[str, tuple[float, Candidate, Candidate]] = {}
     for peer, (function, settings) in (QUICK_PEERS if quick else PEERS).items():
         tried: list[Candidate] = []
@@ -169,7 +169,7 @@ def _one(problem: Problem, repetitions: int, quick: bool, progress: Callable[[st
                 break
             except (TimeoutError, RuntimeError, ValueError, ArithmeticError) as error:
                 tried.append(Candidate(f'{setting}: {error}', _nothing, np.nan, np.nan))
-        result['peers'][peer] = [candidate.told() for candidate in tried]
+        result['peers'][peer] = [candidate.plain() for candidate in tried]
         for level in LEVELS:
             fit, ours = _fastest(tried, level), _fastest(own, level)
             if fit and ours:
@@ -204,7 +204,7 @@ def _time_in_turn(chosen: dict[str, tuple[float, Candidate, Candidate]], repetit
     for peer, (level, theirs, ours) in chosen.items():
         own_s = [value / _IN_A_ROW for value in times[f'{peer} own']]
         result['equal_accuracy'][peer] = {
-            'level': level, 'peer': theirs.told(), 'own': ours.told(),
+            'level': level, 'peer': theirs.plain(), 'own': ours.plain(),
             'peer_s': measuring.figure(times[peer], 's'), 'own_s': measuring.figure(own_s, 's'),
             'speedup': measuring.ratio(times[peer], own_s)}
 

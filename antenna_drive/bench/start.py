@@ -25,6 +25,7 @@ import time
 from typing import Any
 
 from antenna_drive.bench import measuring
+from antenna_drive.errors import UserError
 
 _FIRST_STEP = ('from antenna_drive.emulator.run import Emulator; '
                'from antenna_drive.parameters import load; Emulator(load()).advance(1)')
@@ -85,8 +86,8 @@ def _start_time(code: str, cache: str | None = None) -> float:
 
 
 def _demo() -> float | None:
-    with tempfile.TemporaryDirectory() as folder:
-        began = time.monotonic()
-        done = subprocess.run([sys.executable, '-m', 'antenna_drive', 'demo', '--out', folder],
-                              capture_output=True, check=False)
-        return time.monotonic() - began if done.returncode == 0 else None
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            return measuring.process('antenna_drive', 'demo', '--out', folder)[0]
+    except UserError:
+        return None

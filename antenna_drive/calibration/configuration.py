@@ -15,8 +15,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-import io
+from collections.abc import Sequence
 from typing import Any
 
 from antenna_drive.calibration.problem import CalibrationProblem
@@ -53,22 +52,9 @@ def configuration(problem: CalibrationProblem, shares: Sequence[float], start: s
         body = dict(content.get(section) or {})
         body[entry] = {'value': numbers, 'unit': units[key], 'source': 'fitted'}
         content[section] = body
-    return as_yaml(content)
+    text: str = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=10_000)
+    return text
 
 
 def _rounded(value: float) -> float:
     return float(f'{value:.{_DIGITS}g}')
-
-
-def as_yaml(content: Mapping[str, Any]) -> str:
-    """Return a configuration as YAML, one entry per line, with exponents that YAML 1.1 reads."""
-    text = io.StringIO()
-    for section, body in content.items():
-        if not isinstance(body, dict):
-            text.write(f'{section}: {body}\n')
-            continue
-        text.write(f'{section}:\n')
-        for entry, item in body.items():
-            line = yaml.safe_dump(item, default_flow_style=True, sort_keys=False, width=10_000)
-            text.write(f'  {entry}: {line.removesuffix(chr(10)).removesuffix("...").rstrip()}\n')
-    return text.getvalue()

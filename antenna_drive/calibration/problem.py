@@ -39,9 +39,9 @@ from antenna_drive.article.measures import (
     article_experiments, article_measures, Measure, OLD_CIRCUIT, Reading, Results,
 )
 from antenna_drive.parameters import Drive, load, ParameterError
-from antenna_drive.parameters.loading import find, MOTOR_SECTIONS, SECTIONS
+from antenna_drive.parameters.loading import find, MOTOR_SECTIONS, PLACES, SECTIONS
 from antenna_drive.parameters.plain_yaml import read_yaml
-from antenna_drive.parameters.schema import Entry, nearest
+from antenna_drive.parameters.schema import Entry, mapping_of, nearest
 from antenna_drive.parameters.sets import changed, entries, values
 
 # The circuit of an experiment that uses the configuration's own.
@@ -50,8 +50,6 @@ KINDS = ('value', 'at_least', 'at_most')
 # The miss of a figure that cannot be evaluated, in tolerances.
 _UNREADABLE = 100.0
 _LIST_ITEM = re.compile(r'(?P<key>.+)\[(?P<index>\d+)\]')
-_OWN_SECTIONS = {'axis': 'plant.axis', 'encoder': 'plant.encoder',
-                 'torque_share': 'torque_share.circuit', 'filter_1': 'torque_share.filter_1'}
 
 
 @dataclass(frozen=True)
@@ -260,7 +258,7 @@ def drive_names(key: str) -> list[str]:
     section, _, entry = key.partition('.')
     if section in MOTOR_SECTIONS:
         return [f'{motor}.{key}' for motor in ('motor_1', 'motor_2')]
-    return [f'{_OWN_SECTIONS[section]}.{entry}']
+    return [f'{PLACES[section]}.{entry}']
 
 
 def read_problem(source: str | Path, start: Sequence[str] = ()) -> CalibrationProblem:
@@ -283,14 +281,14 @@ def read_problem(source: str | Path, start: Sequence[str] = ()) -> CalibrationPr
     path = find(source)
     content = read_yaml(path)
     try:
-        content = _table('the file', content, ('free', 'targets', 'figures', 'experiments',
-                                               'search'))
+        content = mapping_of(
+            '', content, ('free', 'targets', 'figures', 'experiments', 'search'))
         experiments = {str(name): _experiment(str(name), body)
                        for name, body in (content.get('experiments') or {}).items()}
         known = {*article_experiments(), *experiments}
         figures = {str(name): _figure(str(name), body, known)
                    for name, body in (content.get('figures') or {}).items()}
-        search = _table('search', content.get('search') or {}, ('population', 'spread'))
+        search = mapping_of('search', content.get('search') or {}, ('population', 'spread'))
         return CalibrationProblem(
             [_free(str(name), body) for name, body in _filled(content, 'free')],
             [_target(str(name), body) for name, body in _filled(content, 'targets')],
@@ -308,25 +306,13 @@ def _filled(content: Mapping[str, Any], section: str) -> list[tuple[Any, Any]]:
     return list(body.items())
 
 
-def _table(key: str, body: Any, allowed: Sequence[str]) -> Mapping[str, Any]:
-    if not isinstance(body, dict):
-        raise ParameterError(f'{key}: {body!r} given, allowed is a mapping of '
-                             f'{", ".join(allowed)}')
-    for name in body:
-        if name not in allowed:
-            raise ParameterError(
-                f'{key}: {name}: no such entry{nearest(str(name), tuple(allowed))}; '
-                f'allowed are {", ".join(allowed)}')
-    return body
-
-
 def _number(key: str, value: Any, low: float = -math.inf, high: float = math.inf) -> float:
     return float(Entry('', low, high).check(key, value))  # type: ignore[arg-type]
 
 
 def _free(name: str, body: Any) -> Free:
     key = f'free.{name}'
-    table = _table(key, body, ('low', 'high', 'scale'))
+    table = mapping_of(key, body, ('low', 'high', 'scale'))
     item = _LIST_ITEM.fullmatch(name)
     section, _, entry_name = (item['key'] if item else name).partition('.')
     if section not in SECTIONS:
@@ -348,7 +334,7 @@ def _free(name: str, body: Any) -> Free:
 
 def _target(name: str, body: Any) -> Target:
     key = f'targets.{name}'
-    table = _table(key, body, (*KINDS, 'tolerance', 'weight'))
+    table = mapping_of(key, body, (*KINDS, 'tolerance', 'weight'))
     kinds = [kind for kind in KINDS if kind in table]
     if len(kinds) != 1:
         raise ParameterError(f'{key}: allowed is one of {", ".join(KINDS)}')
@@ -359,7 +345,7 @@ def _target(name: str, body: Any) -> Target:
 
 def _experiment(name: str, body: Any) -> DriveExperiment:
     key = f'experiments.{name}'
-    table = _table(key, body, ('duration', 'circuit', 'settings', 'bias_share'))
+    table = mapping_of(key, body, ('duration', 'circuit', 'settings', 'bias_share'))
     settings = {str(path): value for path, value in (table.get('settings') or {}).items()}
     known = {path: entry for path, entry, _ in values(load())}
     for path, value in settings.items():
@@ -376,8 +362,8 @@ def _experiment(name: str, body: Any) -> DriveExperiment:
 
 def _figure(name: str, body: Any, experiments: set[str]) -> Reading:
     key = f'figures.{name}'
-    table = _table(key, body, ('experiment', 'kind', 'signal', 'arguments', 'compared_with',
-                               'scale', 'unit'))
+    table = mapping_of(key, body, ('experiment', 'kind', 'signal', 'arguments', 'compared_with',
+                                   'scale', 'unit'))
     for part in ('experiment', 'compared_with'):
         if table.get(part, None if part == 'compared_with' else '') not in (*experiments, None):
             raise ParameterError(f'{key}.{part}: {table.get(part)!r} given, allowed are '

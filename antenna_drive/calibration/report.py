@@ -134,15 +134,15 @@ def report(problem: CalibrationProblem, found: SearchResult, trade_offs: Sequenc
 
 def _targets(problem: CalibrationProblem, best: FitCandidate, start: FitCandidate,
              ) -> list[dict[str, Any]]:
-    told = []
+    rows = []
     for target in problem.targets:
         obtained = best.evaluation.figures[target.figure]
-        told.append({
+        rows.append({
             'figure': target.figure, 'unit': problem.figure(target.figure).unit,
             'kind': target.kind, 'aim': target.number, 'tolerance': target.tolerance,
             'start': start.evaluation.figures[target.figure], 'obtained': obtained,
             'met': bool(abs(target.residual(obtained)) <= 1.0)})
-    return told
+    return rows
 
 
 def _misses(problem: CalibrationProblem, figures: Any) -> FloatArray:

@@ -22,6 +22,7 @@ therefore resumes where it stopped and gives the same result.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 import hashlib
 import json
@@ -63,35 +64,21 @@ class SearchResult:
     candidates: tuple[FitCandidate, ...]
 
 
-class _Log:
-    """The candidates of a search, written to disk one by one."""
-
-    def __init__(self, path: Path, problem: CalibrationProblem, seed: int) -> None:
-        self._path = path
-        self.read: list[FitCandidate] = []
-        head = {'problem': _digest(problem), 'seed': seed}
-        if path.exists():
-            self._read(head)
-            return
-        with path.open('w', encoding='utf-8') as stream:
-            stream.write(json.dumps(head) + '\n')
-
-    def _read(self, head: dict[str, Any]) -> None:
-        lines = self._path.read_text(encoding='utf-8').splitlines(keepends=True)
-        try:
-            if not lines or json.loads(lines[0]) != head:
-                raise UserError(f'{self._path}: belongs to another search (targets, start or seed '
-                                'differ), give --log another file or remove it')
-            whole = [line for line in lines[1:] if line.endswith('\n')]
-            self.read += [_candidate(line) for line in whole]
-        except (ValueError, KeyError, TypeError) as error:
-            raise UserError(f'{self._path}: is not the log of a search: {error}') from error
-        if len(whole) < len(lines) - 1:
-            # drop a line that an interruption cut short; its candidate is simulated again
-            self._path.write_text(''.join([lines[0], *whole]), encoding='utf-8')
-
-    def open(self) -> TextIO:  # noqa: A003
-        return self._path.open('a', encoding='utf-8')
+def _begin_log(path: Path, problem: CalibrationProblem, seed: int) -> list[FitCandidate]:
+    """Return the candidates that the log of this search holds; begin the log if there is none."""
+    head = {'problem': _digest(problem), 'seed': seed}
+    if not path.exists():
+        path.write_text(json.dumps(head) + '\n', encoding='utf-8')
+        return []
+    found, candidates = _read_log(path)
+    if found != head:
+        raise UserError(f'{path}: belongs to another search (targets, start or seed differ), give '
+                        '--log another file or remove it')
+    whole, _, cut = path.read_text(encoding='utf-8').rpartition('\n')
+    if cut:
+        # drop a line that an interruption cut short; its candidate is simulated again
+        path.write_text(f'{whole}\n', encoding='utf-8')
+    return candidates
 
 
 def _candidate(line: str) -> FitCandidate:
@@ -109,11 +96,17 @@ def read_log(path: Path) -> list[FitCandidate]:
     UserError : the file cannot be read, or is not such a log
 
     """
+    return _read_log(path)[1]
+
+
+def _read_log(path: Path) -> tuple[dict[str, Any], list[FitCandidate]]:
+    """Return the head of a log and its candidates, without a line that was cut short."""
     try:
         lines = path.read_text(encoding='utf-8').splitlines(keepends=True)
-        if 'problem' not in json.loads(lines[0]):
+        head = json.loads(lines[0])
+        if 'problem' not in head:
             raise KeyError('problem')
-        return [_candidate(line) for line in lines[1:] if line.endswith('\n')]
+        return head, [_candidate(line) for line in lines[1:] if line.endswith('\n')]
     except OSError as error:
         raise UserError(f'{path}: cannot be read, {error.strerror}') from error
     except (ValueError, KeyError, TypeError, IndexError) as error:
@@ -150,23 +143,22 @@ def search(problem: CalibrationProblem, count: int, *, seed: int = 1, log: Path 
     UserError : the log belongs to another search, or cannot be read or written
 
     """
-    known = _Log(log, problem, seed) if log is not None else None
+    known = [] if log is None else _begin_log(log, problem, seed)
     start = problem.start()
     candidates = [FitCandidate(tuple(start), problem.evaluate(start))]
     random = np.random.default_rng(seed)
     strategy = cma.CMAEvolutionStrategy(start, problem.spread, {
         'bounds': [0.0, 1.0], 'popsize': problem.population, 'verbose': -9, 'seed': math.nan,
         'randn': lambda *shape: random.standard_normal(shape), 'maxiter': math.inf})
-    stream = known.open() if known else None
-    try:
+    with nullcontext() if log is None else log.open('a', encoding='utf-8') as stream:
         limit = math.inf
         while len(candidates) <= count and not strategy.stop():
             asked = strategy.ask()
             generation = []
             for shares in asked:
                 number = len(candidates) - 1
-                if known and number < len(known.read):
-                    candidate = known.read[number]
+                if number < len(known):
+                    candidate = known[number]
                     if not np.allclose(candidate.shares, shares, rtol=0.0, atol=1e-9):
                         raise UserError(f'{log}: does not repeat (another version of a library?), '
                                         'remove it to start again')
@@ -181,9 +173,6 @@ def search(problem: CalibrationProblem, count: int, *, seed: int = 1, log: Path 
                     progress(len(candidates) - 1, _best(candidates))
             strategy.tell(asked, generation)
             limit = _GIVE_UP * sorted(generation)[len(generation) // 2]
-    finally:
-        if stream:
-            stream.close()
     return SearchResult(_best(candidates), tuple(candidates))
 
 

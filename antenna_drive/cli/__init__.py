@@ -24,7 +24,6 @@ import argparse
 from collections.abc import Sequence
 import difflib
 import importlib
-import importlib.util
 import os
 import sys
 from types import ModuleType
@@ -34,10 +33,9 @@ import warnings
 from antenna_drive import __version__
 from antenna_drive.cli.interruption import interruptible
 from antenna_drive.errors import UserError
-from antenna_drive.remedies import remedy
+from antenna_drive.programs import answered, BAD_INPUT, say
 from antenna_drive.workers import expect_overflow
 
-OK, NEGATIVE, BAD_INPUT, NOT_INSTALLED = 0, 1, 2, 3
 INTERRUPTED, BROKEN_PIPE = 130, 141  # 128 + the signal's number, as shells do
 
 EXIT_CODES = """\
@@ -100,12 +98,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     # No option before the command takes a value, so the first plain word is the command.
     name = next((word for word in arguments if not word.startswith('-')), '')
+    program = f'antenna-drive {name}'.rstrip()
     try:
         try:
-            with interruptible(lambda: _say(name, 'interrupted', INTERRUPTED)):
+            with interruptible(lambda: say(program, 'interrupted', INTERRUPTED)):
                 with warnings.catch_warnings():
                     expect_overflow()
-                    return _run(name, arguments)
+                    return answered(program, lambda: _run(name, arguments))
         finally:
             sys.stdout.flush()
     except BrokenPipeError:
@@ -113,31 +112,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return BROKEN_PIPE
     except KeyboardInterrupt:
-        return _say(name, 'interrupted', INTERRUPTED)
-    except UserError as error:
-        return _say(name, str(error), BAD_INPUT)
-    except ModuleNotFoundError as error:
-        needed = remedy(error)
-        if needed is None:
-            raise
-        return _say(name, needed, NOT_INSTALLED)
+        return say(program, 'interrupted', INTERRUPTED)
     except OSError as error:
         if error.strerror is None:
             raise
         place = f'{error.filename}: ' if error.filename else ''
-        return _say(name, f'{place}{error.strerror}', BAD_INPUT)
-
-
-def available() -> dict[str, Command]:
-    """Return the subcommands whose module is here, without importing any of them."""
-    return {name: command for name, command in COMMANDS.items()
-            if importlib.util.find_spec(f'{__name__}.{command.module}')}
+        return say(program, f'{place}{error.strerror}', BAD_INPUT)
 
 
 def _run(name: str, arguments: list[str]) -> int:
-    commands = available()
-    if name and name not in commands:
-        close = difflib.get_close_matches(name, commands, n=1)
+    if name and name not in COMMANDS:
+        close = difflib.get_close_matches(name, COMMANDS, n=1)
         guess = f'did you mean {close[0]}?' if close else 'antenna-drive --help lists them'
         raise UserError(f'no such command, {guess}')
     parser = argparse.ArgumentParser(
@@ -146,7 +131,7 @@ def _run(name: str, arguments: list[str]) -> int:
     parser.add_argument('--version', action='version', version=f'antenna-drive {__version__}')
     subparsers = parser.add_subparsers(metavar='COMMAND', required=True)
     module: ModuleType | None = None
-    for command_name, command in commands.items():
+    for command_name, command in COMMANDS.items():
         if command_name != name:
             subparsers.add_parser(command_name, help=command.summary)
             continue
@@ -158,9 +143,3 @@ def _run(name: str, arguments: list[str]) -> int:
     parsed = parser.parse_args(arguments)
     assert module is not None  # parse_args has left by now unless there was a command
     return int(module.run(parsed))
-
-
-def _say(name: str, message: str, status: int) -> int:
-    line = ' '.join(message.split())
-    print(f'antenna-drive {name}: {line}' if name else f'antenna-drive: {line}', file=sys.stderr)
-    return status

@@ -24,7 +24,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from antenna_drive.cli.output import add_json_option, Progress, write_json
+from antenna_drive.cli.output import add_json_option, give, Progress
 
 _DEFAULT_STEPS = (5e-4, 1e-3, 2e-3, 4e-3)
 
@@ -42,6 +42,7 @@ def run(args: argparse.Namespace) -> int:
     from antenna_drive.article.accuracy import distances
     from antenna_drive.article.experiments import experiments
     from antenna_drive.article.stability import simulated_limit
+    from antenna_drive.emulator.run import FINE_STEP
     from antenna_drive.errors import UserError
     from antenna_drive.parameters import load
 
@@ -66,18 +67,10 @@ def run(args: argparse.Namespace) -> int:
                                      if item.experiment == name)) for name in names},
                 'distances': [{'experiment': item.experiment, 'signal': item.signal,
                                'rms_share': item.share} for item in found]})
-    if args.json:
-        write_json({'reference_step_s': _reference_step(), 'steps': table}, args.json)
-        return 0
-    print("rms error of the worst signal in percent of its rms; limit of k' [1/s]")
-    print(f'{"step [ms]":>9}  ' + '  '.join(f'{name:>6}' for name in names) + '   limit')
+    lines = ["rms error of the worst signal in percent of its rms; limit of k' [1/s]",
+             f'{"step [ms]":>9}  ' + '  '.join(f'{name:>6}' for name in names) + '   limit']
     for row in table:
-        print(f'{1e3 * row["step_s"]:9.2f}  '
-              + '  '.join(f'{100 * row["worst"][name][0]:6.3f}' for name in names)
-              + f'  {row["stability_limit"]:6.1f}')
+        shares = '  '.join(f'{100 * row["worst"][name][0]:6.3f}' for name in names)
+        lines.append(f'{1e3 * row["step_s"]:9.2f}  {shares}  {row["stability_limit"]:6.1f}')
+    give({'reference_step_s': FINE_STEP, 'steps': table}, args.json, '\n'.join(lines))
     return 0
-
-
-def _reference_step() -> float:
-    from antenna_drive.emulator.run import FINE_STEP
-    return FINE_STEP

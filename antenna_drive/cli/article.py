@@ -34,20 +34,15 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
-import sys
-from typing import Any
 
-from antenna_drive import cli
 from antenna_drive.article.contradictions import Contradiction, contradictions
 from antenna_drive.article.experiments import DriveExperiment
 from antenna_drive.article.measures import Results, with_circuits
 from antenna_drive.article.rows import Row, rows
-from antenna_drive.cli.output import (
-    add_json_option, Progress, replaced, STANDARD_OUTPUT, write_json,
-)
+from antenna_drive.cli.output import add_json_option, give, Progress, replaced
 from antenna_drive.emulator.run import MACRO_STEP, Run, simulate
-from antenna_drive.emulator.units import home
 from antenna_drive.parameters import Drive
+from antenna_drive.programs import NEGATIVE, OK
 import numpy as np
 
 # The default parameter set.
@@ -82,14 +77,11 @@ def run(arguments: argparse.Namespace) -> int:
     disagreements = contradictions(results)
     if arguments.figures is not None:
         _draw(results, arguments.figures)
-    if arguments.json is not None:
-        write_json({'configuration': list(arguments.config),
-                    'rows': [asdict(row) for row in found],
-                    'contradictions': [asdict(entry) for entry in disagreements]},
-                   arguments.json)
-    if arguments.json != STANDARD_OUTPUT:
-        _write(found, disagreements)
-    return cli.OK if all(row.passed for row in found) else cli.NEGATIVE
+    give({'configuration': list(arguments.config),
+          'rows': [asdict(row) for row in found],
+          'contradictions': [asdict(entry) for entry in disagreements]},
+         arguments.json, _text(found, disagreements))
+    return OK if all(row.passed for row in found) else NEGATIVE
 
 
 def _through_nodes(configuration: list[str]) -> Callable[[DriveExperiment, Drive], Run]:
@@ -99,15 +91,11 @@ def _through_nodes(configuration: list[str]) -> Callable[[DriveExperiment, Drive
     def run_one(experiment: DriveExperiment, drive: Drive) -> Run:
         if experiment.name not in THROUGH_NODES:
             return simulate(drive, experiment.duration)
-        settings: dict[str, dict[str, Any]] = {}
-        for parameter, value in experiment.settings.items():
-            unit, name = home(parameter)
-            settings.setdefault(unit, {})[name] = value
         steps = round(experiment.duration / MACRO_STEP)
         with Progress(f'{experiment.name}, five processes', steps) as shown:
-            sampled = sample_processes(steps, MACRO_STEP, name='article', parameters=settings,
-                                       config=[*configuration, experiment.circuit],
-                                       progress=shown.update)
+            sampled = sample_processes(
+                steps, MACRO_STEP, name='article', settings=experiment.settings,
+                config=[*configuration, experiment.circuit], progress=shown.update)
         return Run(MACRO_STEP, np.arange(steps + 1), sampled.names, sampled.samples)
 
     return run_one
@@ -131,7 +119,7 @@ def _marked(row: Row) -> Row:
     return replace(row, note=f'{row.note}; through five ROS 2 processes')
 
 
-def _write(found: list[Row], disagreements: list[Contradiction]) -> None:
+def _text(found: list[Row], disagreements: list[Contradiction]) -> str:
     lines = [_LINE.format('', 'row', 'obtained', 'published', 'tolerance', 'unit', 'basis')]
     lines += [_LINE.format('' if row.passed else 'FAILS', row.id, f'{row.obtained:.4g}',
                            _published(row), f'{row.tolerance:.3g}' if row.tolerance else '',
@@ -145,7 +133,7 @@ def _write(found: list[Row], disagreements: list[Contradiction]) -> None:
                   + ', '.join(f'{name} {value:.4g}' for name, value in item.gives.items())
                   for item in entry.readings]
         lines.append(f'  {entry.conclusion}\n')
-    sys.stdout.write('\n'.join(lines) + '\n')
+    return '\n'.join(lines)
 
 
 _LINE = '{:<6}{:<22}{:>10}  {:<32}{:>10}  {:<8}{}'

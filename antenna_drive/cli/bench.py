@@ -37,7 +37,8 @@ from __future__ import annotations
 import argparse
 import sys
 
-from antenna_drive.cli.output import add_json_option, STANDARD_OUTPUT, write_json
+from antenna_drive.cli.output import add_json_option, check_options, give
+from antenna_drive.parameters.schema import Entry
 
 GROUPS = ('start', 'simulation', 'batch', 'diagnosis', 'transport')
 
@@ -56,16 +57,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Measure, and print the table or write the JSON; always 0."""
     from antenna_drive.bench import suite
-    from antenna_drive.errors import UserError
 
-    if arguments.repetitions < 1:
-        raise UserError(f'--repetitions: {arguments.repetitions} given, allowed is 1 or more')
+    check_options(arguments, repetitions=Entry('', 1, whole=True))
     result = suite.measure(arguments.only or GROUPS, arguments.repetitions, arguments.quick,
                            _say)
-    if arguments.json:
-        write_json(result, arguments.json)
-    if arguments.json != STANDARD_OUTPUT:
-        print(suite.table(result))
+    give(result, arguments.json, suite.table(result))
     return 0
 
 

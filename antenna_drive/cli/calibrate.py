@@ -27,18 +27,15 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-import sys
 from typing import Any
 
-from antenna_drive import cli
 from antenna_drive.calibration.configuration import configuration
 from antenna_drive.calibration.problem import read_problem
 from antenna_drive.calibration.report import report
 from antenna_drive.calibration.search import read_log, search
-from antenna_drive.cli.output import (
-    add_json_option, Progress, replaced, STANDARD_OUTPUT, write_json,
-)
+from antenna_drive.cli.output import add_json_option, give, Progress, replaced
 from antenna_drive.parameters.files import config_dir
+from antenna_drive.programs import NEGATIVE, OK
 
 COUNT = 2000
 
@@ -75,12 +72,9 @@ def run(arguments: argparse.Namespace) -> int:
     with replaced(arguments.out) as stream:
         stream.write(configuration(problem, found.best.shares, arguments.start).encode())
     with Progress('uncertainties', 1.0) as shown:
-        told = report(problem, found, arguments.trade_off, shown.update, also)
-    if arguments.json is not None:
-        write_json(told, arguments.json)
-    if arguments.json != STANDARD_OUTPUT:
-        _write(told)
-    return cli.OK if all(item['met'] for item in told['targets']) else cli.NEGATIVE
+        fitted = report(problem, found, arguments.trade_off, shown.update, also)
+    give(fitted, arguments.json, _text(fitted))
+    return OK if all(item['met'] for item in fitted['targets']) else NEGATIVE
 
 
 def _find(targets: str) -> str | Path:
@@ -89,29 +83,29 @@ def _find(targets: str) -> str | Path:
     return shipped if not Path(targets).exists() and shipped.is_file() else targets
 
 
-def _write(told: dict[str, Any]) -> None:
-    lines = [f'{told["candidates"]} candidates, cost {told["start_cost"]:.4g} -> '
-             f'{told["cost"]:.4g}', '',
+def _text(fitted: dict[str, Any]) -> str:
+    lines = [f'{fitted["candidates"]} candidates, cost {fitted["start_cost"]:.4g} -> '
+             f'{fitted["cost"]:.4g}', '',
              _TARGET.format('', 'target', 'start', 'obtained', 'aim', 'tolerance')]
-    for item in told['targets']:
+    for item in fitted['targets']:
         aim = f'{"" if item["kind"] == "value" else item["kind"].replace("_", " ") + " "}'
         lines.append(_TARGET.format(
             '' if item['met'] else 'MISSED', item['figure'], f'{item["start"]:.4g}',
             f'{item["obtained"]:.4g}', f'{aim}{item["aim"]:g}', f'{item["tolerance"]:g}'))
     lines += ['', _PARAMETER.format('', 'parameter', 'value', 'alone', 'with all others')]
-    for item in told['parameters']:
+    for item in fitted['parameters']:
         lines.append(_PARAMETER.format(
             '' if item['determined'] else 'OPEN', item['name'], f'{item["value"]:.5g}',
             _range(item['conditional']), _range(item['marginal'])))
     lines += ['', 'parameters that can compensate for each other, with their correlation:']
     lines += [f'  {item["first"]} and {item["second"]}: {item["correlation"]:+.2f}'
-              for item in told['correlations']] or ['  none']
-    for figure, curve in told['trade_offs'].items():
+              for item in fitted['correlations']] or ['  none']
+    for figure, curve in fitted['trade_offs'].items():
         lines += ['', f'least cost of the other targets, by {figure}:']
         lines += [f'  {point["level"]:>10.4g}  {point["cost_of_the_others"]:<10.4g}'
                   f'{"misses " + ", ".join(point["missed"]) if point["missed"] else ""}'
                   for point in curve]
-    sys.stdout.write('\n'.join(lines) + '\n')
+    return '\n'.join(lines)
 
 
 _TARGET = '{:<8}{:<24}{:>10}{:>12}  {:<16}{:>10}'

@@ -29,10 +29,10 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-import sys
 
-from antenna_drive.cli.output import add_json_option, Progress, STANDARD_OUTPUT, write_json
+from antenna_drive.cli.output import add_json_option, check_options, give, Progress
 from antenna_drive.errors import UserError
+from antenna_drive.parameters.schema import Entry
 import numpy as np
 
 
@@ -58,10 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     from antenna_drive.parameters.loading import load
     from antenna_drive.recording.sheet import load_sheet
 
-    if not 1.0 <= arguments.duration <= 3600.0:
-        raise UserError(f'--duration: {arguments.duration:g} given, allowed is 1 to 3600 s')
-    if not 50.0 <= arguments.rate <= 10000.0:
-        raise UserError(f'--rate: {arguments.rate:g} given, allowed is 50 to 10000 Hz')
+    check_options(arguments, duration=Entry('s', 1.0, 3600.0), rate=Entry('Hz', 50.0, 10000.0))
     drive = load(*arguments.config)
     tests = {}
     for name in arguments.excitation:
@@ -85,20 +82,19 @@ def run(arguments: argparse.Namespace) -> int:
                 progress.update(i + share)
 
             found[name] = confusability_of(chosen, drive, advance)
-    if arguments.json:
-        write_json({name: {
-            'effects': [{'effect': effect, 'detectable': size if np.isfinite(size) else None,
-                         'unit': unit} for effect, size, unit in zip(
-                             item.effects, item.detectable.tolist(), item.units, strict=True)],
-            'confusable': item.groups(), 'pairs_separated': item.separated(),
-            'alike': item.alike} for name, item in found.items()}, arguments.json)
-    out = sys.stderr if arguments.json == STANDARD_OUTPUT else sys.stdout
+    result = {name: {
+        'effects': [{'effect': effect, 'detectable': size if np.isfinite(size) else None,
+                     'unit': unit} for effect, size, unit in zip(
+                         item.effects, item.detectable.tolist(), item.units, strict=True)],
+        'confusable': item.groups(), 'pairs_separated': item.separated(),
+        'alike': item.alike} for name, item in found.items()}
     whole = next(iter(found.values()))
-    print('smallest detectable size, and the effects that look alike', file=out)
+    lines = ['smallest detectable size, and the effects that look alike']
     for i, effect in enumerate(whole.effects):
-        print(f'  {effect:36s} {whole.detectable[i]:10.3g} {whole.units[i]:12s} '
-              + ', '.join(whole.passing_for(i, 3)), file=out)
+        lines.append(f'  {effect:36s} {whole.detectable[i]:10.3g} {whole.units[i]:12s} '
+                     + ', '.join(whole.passing_for(i, 3)))
     for name, item in found.items():
-        print(f'{name}: {100.0 * item.separated():.1f} % of all pairs of effects are separated; '
-              f'{len(item.groups())} groups are not', file=out)
+        lines.append(f'{name}: {100.0 * item.separated():.1f} % of all pairs of effects are '
+                     f'separated; {len(item.groups())} groups are not')
+    give(result, arguments.json, '\n'.join(lines))
     return 0

@@ -81,16 +81,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _through_processes(experiment: Any, circuit: str) -> Sampled:
-    from antenna_drive.emulator.units import home
     from antenna_drive.lockstep.sampling import sample_processes
 
-    parameters: dict[str, dict[str, Any]] = {}
-    for parameter, value in experiment.settings.items():
-        unit, name = home(parameter)
-        parameters.setdefault(unit, {})[name] = value
     steps = round(experiment.duration / _STEP_S)
     with Progress('  saw-tooth', steps) as progress:
-        return sample_processes(steps, _STEP_S, name='demo', parameters=parameters,
+        return sample_processes(steps, _STEP_S, name='demo', settings=experiment.settings,
                                 config=[circuit], progress=progress.update)
 
 

@@ -30,14 +30,14 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-import sys
 from typing import TYPE_CHECKING
 
 from antenna_drive.cli.output import (
-    add_json_option, Progress, replaced, STANDARD_OUTPUT, write_json,
+    add_json_option, check_options, give, Progress, replaced,
 )
 from antenna_drive.cli.reading import warnings_in_one_line
 from antenna_drive.errors import UserError
+from antenna_drive.parameters.schema import Entry
 from antenna_drive.recording.files import read_recording
 
 if TYPE_CHECKING:
@@ -70,8 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
     from antenna_drive.machines.antenna.diagnose import diagnose_recordings
     from antenna_drive.parameters.loading import load
 
-    if arguments.jobs < 1:
-        raise UserError(f'--jobs: {arguments.jobs} given, allowed is 1 or more')
+    check_options(arguments, jobs=Entry('', 1, whole=True))
     drive = load(*arguments.config)
     settings = _settings(arguments.threshold)
     limits = dict(_numbers('--matters', arguments.matters))
@@ -86,15 +85,12 @@ def run(arguments: argparse.Namespace) -> int:
         diagnosis = diagnose_recordings(
             recordings, drive, lambda share, doing: progress.update(share), arguments.jobs,
             settings, arguments.without, limits)
-    if arguments.json:
-        write_json(diagnosis.result, arguments.json)
     if arguments.report:
         from antenna_drive.diagnosis.page import contents
         from antenna_drive.pages import render
         with replaced(Path(arguments.report)) as stream:
             stream.write(render('verdict.html', **vars(contents(diagnosis))).encode())
-    stream_out = sys.stderr if arguments.json == STANDARD_OUTPUT else sys.stdout
-    print(diagnosis.summary(), file=stream_out)
+    give(diagnosis.result, arguments.json, diagnosis.summary())
     return 0
 
 

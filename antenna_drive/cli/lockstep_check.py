@@ -24,7 +24,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from antenna_drive.cli.output import add_json_option, Progress, write_json
+from antenna_drive.cli.output import add_json_option, give, Progress
 from antenna_drive.errors import UserError
 
 _NAME = 'lockstep_check'
@@ -48,12 +48,10 @@ def run(args: argparse.Namespace) -> int:
         raise UserError(f'--duration {args.duration:g} --step {args.step:g}: '
                         'allowed is a duration of at least one step, and a step above 0 s')
     result = compare(steps, args.step, args.config)
-    if args.json:
-        write_json(result, args.json)
-    else:
-        print(f'{result["samples"]} samples of {steps} steps through {result["processes"]} '
-              f'processes: greatest difference {result["max_abs_difference"]:g}, '
-              f'{result["real_time_factor"]:.2f} x real time')
+    give(result, args.json,
+         f'{result["samples"]} samples of {steps} steps through {result["processes"]} '
+         f'processes: greatest difference {result["max_abs_difference"]:g}, '
+         f'{result["real_time_factor"]:.2f} x real time')
     return 0 if result['identical'] else 1
 
 

@@ -29,15 +29,51 @@ from typing import Any, IO, TextIO
 
 from antenna_drive.drafts import drafted
 from antenna_drive.errors import UserError
+from antenna_drive.parameters.schema import Entry
 import numpy as np
 
 STANDARD_OUTPUT = '-'
 
 
 def add_json_option(parser: argparse.ArgumentParser) -> None:
-    """Add `--json FILE|-`, to be answered with `write_json`."""
-    parser.add_argument('--json', metavar='FILE', help='write the result as JSON to FILE; '
-                                                       '- writes it to standard output')
+    """Add `--json FILE|-`, to be answered with `give`."""
+    parser.add_argument('--json', metavar='FILE',
+                        help='write the result as JSON to FILE; - writes it to standard output, '
+                             'and the text to standard error')
+
+
+def give(result: object, target: str | None, text: str) -> None:
+    """
+    Print a result as text, and write it as JSON where `--json` asks for it.
+
+    Parameters
+    ----------
+    result
+        as in `write_json`
+    target
+        a file, '-' for standard output, or None for no JSON
+    text
+        goes to standard output unless the JSON does; then it goes to standard error
+
+    """
+    if target:
+        write_json(result, target)
+    print(text, file=sys.stderr if target == STANDARD_OUTPUT else sys.stdout)
+
+
+def check_options(arguments: argparse.Namespace, **allowed: Entry) -> None:
+    """
+    Check the numbers of options that are given.
+
+    Raises
+    ------
+    UserError : an option is outside the range of its entry
+
+    """
+    for name, entry in allowed.items():
+        value = getattr(arguments, name)
+        if value is not None:
+            entry.check(f'--{name.replace("_", "-")}', value)
 
 
 def write_json(result: object, target: str | os.PathLike[str]) -> None:
@@ -74,7 +110,7 @@ def replaced(path: Path) -> Iterator[IO[bytes]]:
     """
     Give a stream whose content takes the place of `path` at the end, if all went well.
 
-    Whoever looks at `path` sees the old content or the new, never a part of it.
+    A reader of `path` sees the old content or the new, never a part of it.
 
     Raises
     ------

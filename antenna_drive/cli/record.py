@@ -30,29 +30,28 @@ from pathlib import Path
 import time
 from typing import Any
 
-from antenna_drive.cli.output import Progress
-from antenna_drive.cli.settings import parse_settings
+from antenna_drive.cli.output import check_options, Progress
+from antenna_drive.cli.settings import (
+    add_config_option, add_settings_option, parse_settings,
+)
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
-from antenna_drive.errors import UserError
+from antenna_drive.parameters.schema import Entry
 from antenna_drive.recording.recorder import RunRecorder
 from antenna_drive.recording.sheet import load_sheet
 
 _NAME = 'recorder'
-_PATIENCE_S = 60.0  # until the drive begins, and from step to step
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command understands."""
-    parser.add_argument('--duration', type=_positive, required=True, metavar='S',
+    parser.add_argument('--duration', type=float, required=True, metavar='S',
                         help='simulated time to record [s]')
     parser.add_argument('--out', type=Path, required=True, metavar='BAG',
                         help='the folder to write; it must not be there yet')
-    parser.add_argument('--config', nargs='+', default=(), metavar='FILE',
-                        help='configuration files or names of sets in config/, later over earlier')
-    parser.add_argument('--set', nargs='+', default=(), metavar='UNIT.NAME=VALUE', dest='settings',
-                        help='parameters of single nodes, such as torque_share.bias_pot=0.8')
+    add_config_option(parser)
+    add_settings_option(parser)
     parser.add_argument('--sheet', type=Path, metavar='FILE', help='a test sheet for the bag')
-    parser.add_argument('--step', type=_positive, default=0.001, metavar='S',
+    parser.add_argument('--step', type=float, default=0.001, metavar='S',
                         help='macro-step [s]; 0.001 if not given')
     parser.add_argument('--pace', type=float, default=0.0, metavar='K',
                         help='times real time; 0, as fast as possible, if not given')
@@ -61,72 +60,38 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Start, record, end."""
+    check_options(args, duration=Entry('s', 1e-5, 1e9), step=Entry('s', 1e-5, 0.1))
     parameters = parse_settings(args.settings)
     recorder = RunRecorder(
         args.out, {f'{unit}/{s.name}': s.unit for unit, own in OUTPUTS.items() for s in own},
         load_sheet(args.sheet) if args.sheet else None, recorded_by=_NAME)
     from antenna_drive.lockstep.observer import Observer
     from antenna_drive.lockstep.processes import DriveProcesses
+    from antenna_drive.lockstep.sampling import RunWatch
     last = round(args.duration / args.step)
     parameters.setdefault(TEST_SIGNAL, {}).update({
         'run.step': args.step, 'run.pace': args.pace, 'run.duration': last * args.step,
         'run.observers': [_NAME]})
-    watch = _Watch(recorder, last)
+
+    def step(number: int, time_s: float, samples: Any) -> None:
+        if number <= last:
+            recorder.step(number, samples[:, 0].tolist())
+            watch.done = number
+
+    def complete() -> bool:
+        if not watch.complete(processes, observer):
+            return False
+        recorder.idle()
+        # what is in force comes by another way than the steps
+        return recorder.knows_configuration or time.monotonic() > watch.deadline
+
     try:
-        with Observer(_NAME, watch.step, on_begin=watch.begin,
-                      on_change=recorder.told) as observer:
-            with DriveProcesses(parameters, config=args.config) as processes:
-                with Progress('recording', last, quiet=args.quiet) as progress:
-                    observer.spin(lambda: watch.complete(processes, observer, progress))
+        with Observer(_NAME, step, on_begin=recorder.begin, on_change=recorder.told) as observer, \
+                DriveProcesses(parameters, config=args.config) as processes, \
+                Progress('recording', last, quiet=args.quiet) as progress:
+            watch = RunWatch(last, progress.update)
+            observer.spin(complete)
     finally:
         recorder.close()
     print(f'{recorder.steps} steps, {last * args.step:g} s: {recorder.path}')
     return 0
-
-
-class _Watch:
-    """What has been recorded, and whether the drive still goes on."""
-
-    def __init__(self, recorder: RunRecorder, last: int) -> None:
-        self._recorder = recorder
-        self._last = last
-        self._done = -1
-        self._seen = -1
-        self._next_look = 0.0
-        self._deadline = time.monotonic() + _PATIENCE_S
-
-    def begin(self, run_id: int, step_s: float) -> None:
-        """Begin a bag."""
-        self._recorder.begin(run_id, step_s)
-
-    def step(self, number: int, time_s: float, samples: Any) -> None:
-        """Write a step."""
-        if number <= self._last:
-            self._recorder.step(number, samples[:, 0].tolist())
-            self._done = number
-
-    def complete(self, processes: Any, observer: Any, progress: Progress) -> bool:
-        """Tell whether everything is recorded; UserError if it will never be."""
-        now = time.monotonic()
-        if now < self._next_look and self._done < self._last:
-            return False
-        self._next_look = now + 0.1
-        progress.update(max(0, self._done))
-        if self._done >= self._last:
-            self._recorder.idle()
-            # what is in force comes by another way than the steps
-            return self._recorder.knows_configuration or now > self._deadline
-        processes.check()
-        if self._done != self._seen:
-            self._seen, self._deadline = self._done, now + _PATIENCE_S
-        if now > self._deadline:
-            raise UserError(f'the drive does not go on at step {self._done + 1}: waiting for '
-                            f'{", ".join(observer.missing)}')
-        return False
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value <= 1e9:
-        raise argparse.ArgumentTypeError(f'{text} given, allowed is a number above 0')
-    return value

@@ -28,8 +28,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from antenna_drive.cli.output import add_json_option, write_json
+from antenna_drive.cli.output import add_json_option, check_options, give
 from antenna_drive.cli.reading import add_recording_options, read
+from antenna_drive.cli.settings import add_config_option
+from antenna_drive.parameters.schema import Entry
 from antenna_drive.recording.atomic import refuse_existing
 from antenna_drive.recording.mcap_format import write_bag
 from antenna_drive.recording.replay import distances, twin
@@ -38,19 +40,19 @@ from antenna_drive.recording.replay import distances, twin
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command understands."""
     add_recording_options(parser)
-    parser.add_argument('--config', nargs='+', default=(), metavar='FILE',
-                        help='configuration files or names of sets in config/, later over earlier')
+    add_config_option(parser)
     parser.add_argument('--out', type=Path, metavar='BAG',
                         help='the folder to write, not there yet; RECORDING_twin if not given')
-    parser.add_argument('--step', type=_step, metavar='S',
+    parser.add_argument('--step', type=float, metavar='S',
                         help="macro-step [s]; the recording's own if it tells, else 0.001")
-    parser.add_argument('--every', type=_whole, default=1, metavar='N',
+    parser.add_argument('--every', type=int, default=1, metavar='N',
                         help='write every N-th macro-step only')
     add_json_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Compute and write the twin."""
+    check_options(args, step=Entry('s', 1e-5, 0.1), every=Entry('', 1, whole=True))
     source = Path(args.recording).resolve()
     out = args.out or source.with_name(f'{source.stem}_twin')
     refuse_existing(out)
@@ -58,25 +60,9 @@ def run(args: argparse.Namespace) -> int:
     made = twin(real, args.config, args.step, args.every)
     write_bag(made, out)
     found = distances(real, made)
-    if args.json:
-        write_json({'twin': out, 'signals': found}, args.json)
-    if args.json != '-':
-        for name, distance in found.items():
-            share = f'{100.0 * distance["share"]:.3g} %' if distance['spread'] else '-'
-            print(f'{name:<40} {distance["rms"]:.4g} {real[name].unit}  {share}')
-        print(out)
+    lines = []
+    for name, distance in found.items():
+        share = f'{100.0 * distance["share"]:.3g} %' if distance['spread'] else '-'
+        lines.append(f'{name:<40} {distance["rms"]:.4g} {real[name].unit}  {share}')
+    give({'twin': out, 'signals': found}, args.json, '\n'.join([*lines, str(out)]))
     return 0
-
-
-def _step(text: str) -> float:
-    value = float(text)
-    if not 1e-5 <= value <= 0.1:
-        raise argparse.ArgumentTypeError(f'{text} given, allowed is 1e-5 to 0.1 s')
-    return value
-
-
-def _whole(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f'{text} given, allowed is a whole number from 1')
-    return value

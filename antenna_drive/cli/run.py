@@ -26,8 +26,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from antenna_drive.cli.output import Progress
-from antenna_drive.errors import UserError
+from antenna_drive.cli.output import check_options, Progress
+from antenna_drive.cli.settings import (
+    add_config_option, add_settings_option, parse_settings,
+)
+from antenna_drive.parameters.schema import Entry
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,10 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='simulated time [s]')
     parser.add_argument('--out', type=Path, required=True, metavar='FILE',
                         help='what to write; it must not be there yet')
-    parser.add_argument('--config', nargs='+', default=(), metavar='FILE',
-                        help='configuration files or names of sets in config/, later over earlier')
-    parser.add_argument('--set', nargs='+', default=(), metavar='UNIT.NAME=VALUE', dest='settings',
-                        help='parameters of single units, such as torque_share.bias_pot=0.8')
+    add_config_option(parser)
+    add_settings_option(parser)
     parser.add_argument('--step', type=float, default=1e-3, metavar='S',
                         help='macro-step [s] (default: %(default)s)')
     parser.add_argument('--every', type=int, default=1, metavar='N',
@@ -48,7 +49,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the drive and write what it did."""
-    from antenna_drive.cli.settings import parse_settings
     from antenna_drive.emulator.run import Emulator
     from antenna_drive.emulator.units import overridden
     from antenna_drive.parameters import load
@@ -57,9 +57,7 @@ def run(args: argparse.Namespace) -> int:
     from antenna_drive.recording.mcap_format import write_bag
     from antenna_drive.recording.runs import from_run
 
-    if not 0.0 < args.duration < float('inf') or args.every < 1:
-        raise UserError(f'--duration {args.duration:g} --every {args.every}: allowed is a '
-                        'duration above 0 s, and every 1st step or fewer')
+    check_options(args, duration=Entry('s', 1e-5, 1e9), every=Entry('', 1, whole=True))
     refuse_existing(args.out)
     drive = overridden(load(*args.config), parse_settings(args.settings))
     with Progress('running', 1.0) as progress:

@@ -32,7 +32,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.cli.output import add_json_option, STANDARD_OUTPUT, write_json
+from antenna_drive.cli.output import add_json_option, give
 from antenna_drive.errors import UserError
 from antenna_drive.trial.scorecard import read_cases, score
 
@@ -65,10 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
             pictures.draw_scorecard(figures, arguments.picture)
         except ValueError as error:
             raise UserError(f'{arguments.picture}: cannot be drawn, {error}') from error
-    if arguments.json is not None:
-        write_json(figures, arguments.json)
-    if arguments.json != STANDARD_OUTPUT:
-        print('\n'.join(_lines(figures)))
+    give(figures, arguments.json, '\n'.join(_lines(figures)))
     return 0 if cases else 1
 
 

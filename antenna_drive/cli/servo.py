@@ -32,11 +32,11 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-import sys
 
-from antenna_drive.cli.output import add_json_option, Progress, STANDARD_OUTPUT, write_json
+from antenna_drive.cli.output import add_json_option, check_options, give, Progress
 from antenna_drive.errors import UserError
 from antenna_drive.machines.servo.bam import read_bam
+from antenna_drive.parameters.schema import Entry
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -64,10 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     from antenna_drive.machines.servo.rounds import Effort
     from antenna_drive.machines.servo.study import directions, SPLITS, study, text
 
-    for name, least in (('runs', 20), ('jobs', 1)):
-        if getattr(arguments, name) < least:
-            raise UserError(f'--{name}: {getattr(arguments, name)} given, '
-                            f'allowed is {least} or more')
+    check_options(arguments, runs=Entry('', 20, whole=True), jobs=Entry('', 1, whole=True))
     folder = Path(arguments.directory)
     if not folder.is_dir():
         raise UserError(f'{folder}: no such folder; a folder with *.json logs is needed')
@@ -82,8 +79,6 @@ def run(arguments: argparse.Namespace) -> int:
         result = study(tests, chosen, effort, arguments.without, arguments.jobs,
                        Path(arguments.keep) if arguments.keep else None,
                        lambda share, doing: progress.update(share))
-    if arguments.json:
-        write_json(result, arguments.json)
-    print(text(result), file=sys.stderr if arguments.json == STANDARD_OUTPUT else sys.stdout)
+    give(result, arguments.json, text(result))
     return 0 if all(part['lower_than_best_of_ladder']
                     for part in result['summary'].values()) else 1

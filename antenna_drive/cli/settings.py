@@ -11,10 +11,11 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Parameters of single units on a command line: UNIT.NAME=VALUE."""
+"""Configurations and parameters of single units on a command line."""
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Sequence
 from typing import Any
 
@@ -22,6 +23,18 @@ from antenna_drive.emulator.wiring import UNITS
 from antenna_drive.errors import UserError
 from antenna_drive.parameters.schema import nearest
 import yaml
+
+
+def add_config_option(parser: argparse.ArgumentParser) -> None:
+    """Add `--config FILE ...`, for `load`."""
+    parser.add_argument('--config', nargs='+', default=(), metavar='FILE',
+                        help='configuration files or names of sets in config/, later over earlier')
+
+
+def add_settings_option(parser: argparse.ArgumentParser) -> None:
+    """Add `--set UNIT.NAME=VALUE ...`, for `parse_settings`."""
+    parser.add_argument('--set', nargs='+', default=(), metavar='UNIT.NAME=VALUE', dest='settings',
+                        help='parameters of single units, such as torque_share.bias_pot=0.8')
 
 
 def parse_settings(settings: Sequence[str]) -> dict[str, dict[str, Any]]:

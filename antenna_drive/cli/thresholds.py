@@ -35,10 +35,9 @@ from concurrent.futures import ThreadPoolExecutor
 import json
 import math
 from pathlib import Path
-import sys
 from typing import Any
 
-from antenna_drive.cli.output import add_json_option, Progress, STANDARD_OUTPUT, write_json
+from antenna_drive.cli.output import add_json_option, give, Progress
 from antenna_drive.diagnosis.evidence import Evidence
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
 from antenna_drive.diagnosis.verdict import which
@@ -73,23 +72,18 @@ def run(arguments: argparse.Namespace) -> int:
     table = [{'name': name, 'value': value, **item.metadata}
              for name, item, value in DEFAULT.entries()]
     if arguments.trial is None:
-        if arguments.json:
-            write_json(table, arguments.json)
-        if arguments.json != STANDARD_OUTPUT:
-            for row in table:
-                print(f'{row["name"]:32s} {row["value"]:<10g} {row["unit"]:20s} '
-                      f'{row["set_by"]:20s} {row["decides"]}')
+        give(table, arguments.json, '\n'.join(
+            f'{row["name"]:32s} {row["value"]:<10g} {row["unit"]:20s} '
+            f'{row["set_by"]:20s} {row["decides"]}' for row in table))
         return 0
     if arguments.again:
         found = _run_again(arguments)
     else:
         found = _decided_anew(arguments.trial)
-    if arguments.json:
-        write_json(found, arguments.json)
-    out = sys.stderr if arguments.json == STANDARD_OUTPUT else sys.stdout
-    print(f'{"":44s}' + ''.join(f'{name[:12]:>14s}' for name in FIGURES), file=out)
-    for name, figures in found.items():
-        print(f'{name:44s}' + ''.join(f'{figures[key]:14.3f}' for key in FIGURES), file=out)
+    lines = [f'{"":44s}' + ''.join(f'{name[:12]:>14s}' for name in FIGURES)]
+    lines += [f'{name:44s}' + ''.join(f'{figures[key]:14.3f}' for key in FIGURES)
+              for name, figures in found.items()]
+    give(found, arguments.json, '\n'.join(lines))
     return 0
 
 

@@ -46,8 +46,9 @@ import os
 from pathlib import Path
 import shlex
 
-from antenna_drive.cli.output import Progress
+from antenna_drive.cli.output import check_options, Progress
 from antenna_drive.errors import UserError
+from antenna_drive.parameters.schema import Entry
 from antenna_drive.trial import batch, sealing
 from antenna_drive.trial.family import FAMILIES
 
@@ -117,20 +118,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    for name, least in (('cases', 1), ('seed', 0), ('jobs', 1)):
-        if getattr(arguments, name) < least:
-            raise UserError(f'--{name}: {getattr(arguments, name)} given, '
-                            f'allowed is {least} or more')
-    if not 0.0 <= arguments.tolerance <= LARGEST_TOLERANCE:
-        raise UserError(f'--tolerance: {arguments.tolerance} given, allowed is 0 to '
-                        f'{LARGEST_TOLERANCE}')
+    check_options(
+        arguments, cases=Entry('', 1, whole=True), seed=Entry('', 0, whole=True),
+        jobs=Entry('', 1, whole=True), tolerance=Entry('1', 0.0, LARGEST_TOLERANCE),
+        sample_rate=Entry('Hz', *RATES_HZ), time_limit=Entry('s', 1e-3))
     if arguments.family != 'a' and not arguments.wild:
         raise UserError(f'--family {arguments.family}: its cases are wild; give --wild as well')
     if arguments.wild and arguments.sample_rate is not None:
         raise UserError('--sample-rate: a wild case draws its own; leave it out, or --wild')
-    low, high = RATES_HZ
-    if arguments.sample_rate is not None and not low <= arguments.sample_rate <= high:
-        raise UserError(f'--sample-rate: {arguments.sample_rate} given, allowed is {low:g} to '
-                        f'{high:g} Hz')
-    if not arguments.time_limit > 0.0:
-        raise UserError(f'--time-limit: {arguments.time_limit} given, allowed is more than 0 s')

@@ -33,7 +33,7 @@ __all__ = ['FloatArray', 'Signal', 'Unit']
 
 class Unit(ABC):
     """
-    One unit of the drive, stepped from t_k to t_k+1 by whoever holds its inputs at t_k.
+    One unit of the drive, stepped from t_k to t_k+1 by the caller that holds its inputs at t_k.
 
     Subclass it to put a unit of your own in the place of one of ours: keep the name and
     the outputs of the unit that you replace, and choose any of the drive's signals as inputs.

@@ -177,7 +177,7 @@ def gather(s: Any) -> int:
             return reason
     for peer in range(s.peers.shape[0]):
         while (not s.peers[peer, Peer.stepping]
-               and s.used[peer] < w[Word.step] - w[Word.slack]):
+               and s.used[peer] < max(0, w[Word.step] - w[Word.slack])):
             reason = _take_or_wait(s, peer)
             if reason != _GO_ON:
                 return reason
@@ -242,7 +242,7 @@ def put_out(s: Any) -> int:
         finite = finite and np.isfinite(s.y[n, 0]) and np.isfinite(s.y[n, 1])
     if not finite:
         return FAULT
-    # the last row of frames is this unit's own, should it read itself
+    # the last row of frames is this unit's own, in case it reads itself
     own, slot = s.frames.shape[0] - 1, step % DEPTH
     for n in range(_HEADER + 2 * outputs):
         s.frames[own, slot, n] = s.outgoing[n]

@@ -15,7 +15,7 @@
 From a command line to a running node, and back to an exit code.
 
 This module imports neither ROS 2 nor numpy until it has to, so that Ctrl-C is answered from
-the first moment and a machine without ROS 2 is told so in one line.
+the first moment, and a machine without ROS 2 gets one line that says so.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from types import FrameType
 from typing import Any, TYPE_CHECKING
 
 from antenna_drive.errors import UserError
-from antenna_drive.remedies import remedy
+from antenna_drive.programs import end_with_parent, OK, run_program
 
 if TYPE_CHECKING:
     from antenna_drive.emulator.unit import Unit
@@ -36,9 +36,7 @@ if TYPE_CHECKING:
     from antenna_drive.parameters.schema import Value
     from rclpy.node import Node
 
-OK, BAD_INPUT, NOT_INSTALLED = 0, 2, 3
-
-# The process that a node must not outlive, by number; set by whoever starts nodes for himself.
+# The number of the process that a node must not outlive; set by a program that starts nodes.
 PARENT = 'ANTENNA_DRIVE_PARENT'
 
 # Makes the unit of a node: its name, the wiring, configuration files, what else was given by name.
@@ -124,27 +122,20 @@ def run_unit(unit: Unit, args: Sequence[str] | None = None, wiring: str = '') ->
 def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None,
          fed_by_topic: Sequence[str], description: str, wiring: str) -> int:
     ending = _Ending()
-    _follow(os.environ.get(PARENT))
-    arguments = list(sys.argv[1:] if args is None else args)
-    program = default_name
-    try:
-        if '-h' in arguments or '--help' in arguments:
-            print(_help(program, description))
-            return OK
+    if PARENT in os.environ:
+        end_with_parent()
+        _end_without(int(os.environ[PARENT]))
+
+    def act(arguments: list[str]) -> int:
         choose_transport(os.environ)
-        status = _run_node(default_name, make, arguments, fed_by_topic, wiring, ending)
-    except UserError as error:
-        return _say(program, str(error), BAD_INPUT)
-    except ModuleNotFoundError as error:
-        needed = remedy(error)
-        if needed is None:
-            raise
-        return _say(program, needed, NOT_INSTALLED)
-    # The node has left the graph. What the interpreter and the compiler would still tidy up
-    # takes seconds on a busy machine, and a node must be gone within two.
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(status)
+        _run_node(default_name, make, arguments, fed_by_topic, wiring, ending)
+        # The node has left the graph. What the interpreter and the compiler would still tidy up
+        # takes seconds on a busy machine, and a node must be gone within two.
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(OK)
+
+    return run_program(default_name, _help(default_name, description), args, act)
 
 
 class _Ending:
@@ -170,38 +161,45 @@ class _Ending:
         self._stop = stop
 
 
-def _follow(parent: str | None) -> None:
-    """End when the parent does, where the kernel offers it (Linux)."""
-    if parent is None or not sys.platform.startswith('linux'):
-        return
-    import ctypes
-    pr_set_pdeathsig = 1  # linux/prctl.h
-    ctypes.CDLL(None).prctl(pr_set_pdeathsig, int(signal.SIGTERM))
+def _end_without(parent: int) -> None:
+    """End at once if the parent has ended before the kernel was told to watch it."""
     try:
-        os.kill(int(parent), 0)
+        os.kill(parent, 0)
     except ProcessLookupError:
-        os._exit(OK)  # it died before we could ask
+        os._exit(OK)
 
 
-def _run_node(default_name: str, make: MakeUnit, arguments: list[str],
-              fed_by_topic: Sequence[str], wiring: str, ending: _Ending) -> int:
+def init_ros(name: str, arguments: Sequence[str], example: str) -> None:
+    """
+    Initialise rclpy for the node of this process, which handles signals itself.
+
+    Raises
+    ------
+    UserError : the command line has an argument that is none of ROS 2's, or a wrong one;
+        `example` shows a right one
+
+    """
     import rclpy
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
-
     try:
-        left = remove_ros_args([default_name, *arguments])[1:]
+        left = remove_ros_args([name, *arguments])[1:]
         if left:
             raise UserError(f'{left[0]}: no such option; ROS 2 arguments follow --ros-args, '
-                            "as in --ros-args -p config:=\"['old_circuit']\"")
-        rclpy.init(args=[default_name, *arguments],
-                   signal_handler_options=SignalHandlerOptions.NO)
+                            f'as in --ros-args -p {example}')
+        rclpy.init(args=[name, *arguments], signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
         raise UserError(_first_line(error)) from error
+
+
+def _run_node(default_name: str, make: MakeUnit, arguments: list[str],
+              fed_by_topic: Sequence[str], wiring: str, ending: _Ending) -> None:
+    import rclpy
+    init_ros(default_name, arguments, "config:=\"['old_circuit']\"")
     try:
         node = _bare_node(default_name)
         try:
-            return _spin(node, make, fed_by_topic, wiring, ending)
+            _spin(node, make, fed_by_topic, wiring, ending)
         finally:
             node.destroy_node()
     finally:
@@ -220,7 +218,7 @@ def _bare_node(default_name: str) -> Node:
 
 
 def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], wiring: str,
-          ending: _Ending) -> int:
+          ending: _Ending) -> None:
     from antenna_drive.emulator.wiring import find
     from antenna_drive.lockstep.getting_ready import told_while_compiling
     from antenna_drive.lockstep.node import DriveNode, OWN_PARAMETERS
@@ -238,7 +236,6 @@ def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], wiring: str,
     ending.by(drive_node.stop)
     if not ending.asked:
         drive_node.spin()
-    return OK
 
 
 def choose_transport(environment: dict[str, str] | os._Environ[str]) -> None:
@@ -272,8 +269,3 @@ def _help(program: str, description: str) -> str:
 
 def _first_line(error: Exception) -> str:
     return (str(error).strip() or type(error).__name__).splitlines()[0]
-
-
-def _say(program: str, message: str, status: int) -> int:
-    print(f'{program}: {" ".join(message.split())}', file=sys.stderr)
-    return status

@@ -225,7 +225,7 @@ class Exchange:
         self._s.words[Word.asked] = 1
 
     def listen(self) -> None:
-        """Forget what was asked; whoever calls this looks for what is due after it."""
+        """Forget the request; the caller then looks for what is due."""
         self._s.words[Word.asked] = 0
 
     def run(self, every: int = 0, pace: Pace | None = None, limit_s: float = LIMIT_S) -> int:

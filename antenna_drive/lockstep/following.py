@@ -14,8 +14,9 @@
 """
 The steps of a running drive, put together from the frames of its units by somebody who listens.
 
-Unlike a member of the lock-step, who is there from step 0 on, a follower may come at any time: it
-begins with the first step of which it gets every unit's frame. It turns to another run when the
+Unlike a member of the lock-step, who is there from step 0 on, a follower may come at any time. The
+units then send what they remember, which may have gaps: a follower begins behind the last of them.
+It turns to another run when the
 conductor speaks of it and every unit has sent a step of it: a frame that somebody invents begins
 no run. Nothing here needs ROS.
 """
@@ -30,7 +31,7 @@ from antenna_drive.lockstep.frame import all_finite, HEADER, LARGEST_RUN, NO_RUN
 
 Frame = tuple[float, ...]
 
-# Units are a few steps apart at most; more incomplete steps than these are somebody's invention.
+# Units are a few steps apart at most; more incomplete steps than this are not genuine.
 _DEPTH = 4096
 
 # Runs of which frames are kept, and runs that are over and remembered as such.
@@ -54,6 +55,23 @@ class _Run:
         self.steps: dict[int, dict[str, Frame]] = {}
         self.complete: deque[int] = deque()
         self.next: int | None = None
+        self.heard: set[str] = set()
+        # the newest step that anybody had sent when every unit was heard: older ones are memories
+        self.newest: int | None = None
+
+    def has_begun(self, over: bool) -> bool:
+        """Return whether all memories have come; drop those before their last gap."""
+        if self.next is None:
+            if not self.complete or not over and (
+                    self.newest is None or self.complete[-1] < self.newest):
+                return False
+            known, first = set(self.complete), self.complete[-1]
+            while first - 1 in known:
+                first -= 1
+            self.complete = deque(sorted(number for number in known if number >= first))
+            for older in [number for number in self.steps if number < first]:
+                del self.steps[older]
+        return True
 
     def trim(self) -> None:
         """Drop half of too many incomplete steps: the farthest, or the oldest before the first."""
@@ -97,6 +115,11 @@ class Follower:
         self.run = 0
         self.lost = 0
         self.refused = 0
+        self._over = False
+
+    def finish(self) -> None:
+        """Expect no more frames: memories need not wait for newer ones."""
+        self._over = True
 
     def receive(self, unit: str, frame: Sequence[float]) -> None:
         """Take in a frame of a unit."""
@@ -131,6 +154,9 @@ class Follower:
             self.refused += frames[unit] != frame
             return
         frames[unit] = frame
+        run.heard.add(unit)
+        if run.newest is None and len(run.heard) == len(self._lengths):
+            run.newest = max(run.steps)
         if len(frames) == len(self._lengths):
             run.complete.append(number)
 
@@ -141,15 +167,16 @@ class Follower:
         What is complete of one run comes before the first step of the next.
         """
         while True:
-            if self.run:
-                yield from self._complete(self._runs[self.run])
             following = self._runs.get(self._announced)
-            if self._announced == self.run or following is None or not following.complete:
+            stays = self._announced == self.run or following is None or not following.complete
+            if self.run:
+                yield from self._complete(self._runs[self.run], over=self._over or not stays)
+            if stays or following is None:
                 return
             self._turn(following)
 
-    def _complete(self, run: _Run) -> Iterator[Step]:
-        while run.complete:
+    def _complete(self, run: _Run, over: bool) -> Iterator[Step]:
+        while run.has_begun(over) and run.complete:
             number = run.complete.popleft()
             frames = run.steps.pop(number)
             if run.next is not None and number != run.next:

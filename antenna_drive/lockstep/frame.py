@@ -35,7 +35,7 @@ NO_RUN = 0.0
 # Runs are microseconds of wall time; beyond this a double no longer tells them apart.
 LARGEST_RUN = 2.0 ** 52
 
-# Whoever says that he was born later than this leaves no room for the runs that follow.
+# A birth later than this leaves no room for the runs that follow.
 LATEST_BIRTH = LARGEST_RUN - 2.0 ** 40
 
 _CDR_LITTLE_ENDIAN = b'\x00\x01\x00\x00'

@@ -21,7 +21,8 @@ from threading import Event, Thread
 import time
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from antenna_drive.lockstep.diagnostics import diagnostics
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from numba.core import event
 from rclpy.node import Node
 
@@ -82,22 +83,14 @@ class _Compiling(event.Listener):  # type: ignore[misc]
         topic = self._node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         periods = 0
         while True:
-            topic.publish(self._report())
+            topic.publish(diagnostics(
+                self._node, DiagnosticStatus.WARN,
+                f'compiling the physics, {self._so_far()} so far',
+                [('compiled functions', str(self._functions)),
+                 ('compiling since [s]', f'{time.monotonic() - self._began_s:.1f}')]))
             if self._over.wait(PERIOD_S):
                 break
             periods += 1
             if periods % _LOG_EVERY == 0:
                 self._node.get_logger().info(f'still compiling, {self._so_far()} so far')
         self._node.destroy_publisher(topic)
-
-    def _report(self) -> DiagnosticArray:
-        status = DiagnosticStatus(
-            level=DiagnosticStatus.WARN, name=self._node.get_fully_qualified_name(),
-            message=f'compiling the physics, {self._so_far()} so far', hardware_id='antenna_drive')
-        status.values = [
-            KeyValue(key='compiled functions', value=str(self._functions)),
-            KeyValue(key='compiling since [s]',
-                     value=f'{time.monotonic() - self._began_s:.1f}')]
-        array = DiagnosticArray(status=[status])
-        array.header.stamp = self._node.get_clock().now().to_msg()
-        return array

@@ -57,7 +57,6 @@ class Inbox:
     Attributes
     ----------
     run, step : the run in progress (0.0: none) and the step whose frames are wanted next
-    announced : the run that may follow (0.0: none); its frames are kept for then
     refused : how many frames were refused, by (peer, reason)
     hellos : births [us] of peers that said hello, in order of arrival; the owner empties it
 
@@ -71,7 +70,6 @@ class Inbox:
         """
         self.run = NO_RUN
         self.step = 0
-        self.announced = NO_RUN
         self.refused: Counter[tuple[str, Refusal]] = Counter()
         self.hellos: list[tuple[str, float]] = []
         self.slots: dict[str, list[Frame | None]] = {peer: [None] * DEPTH for peer in lengths}
@@ -87,13 +85,13 @@ class Inbox:
         self.forget(self.run)
         self.run = run
         self.step = step
-        self.announced = NO_RUN
         self._awaited = (run, float(step))
         for slots in self.slots.values():
             slots[:] = [None] * DEPTH
         early, self._early = self._early, deque()
         for peer, frame, _ in early:
-            self._file(peer, frame)
+            # Frames of other runs stay early: the next announcement may be on its way already.
+            self.offer(peer, frame)
 
     def forget(self, run: float) -> None:
         """Let leftovers of a past run pass without counting them as refused."""
@@ -146,12 +144,12 @@ class Inbox:
             self._file(peer, frame)
         elif run == NO_RUN:
             self.hellos.append((peer, frame[1]))
-        elif run > self.run or run == self.announced:
+        elif run not in self._past_runs:
+            # A peer may hear of the next run before we do. Its id may be smaller than ours: the
+            # run in progress may be an invention.
             self._early.append((peer, frame, self.step))
             if len(self._early) > EARLY_FRAMES:
                 self.refuse(self._early.popleft()[0], Refusal.WRONG_RUN)
-        elif run not in self._past_runs:
-            self.refuse(peer, Refusal.WRONG_RUN)
 
     def advance(self) -> None:
         """Drop the frames of the current step and want the next."""
@@ -161,7 +159,7 @@ class Inbox:
         self.step += 1
         self._awaited = (self.run, float(self.step))
         # Nobody can announce a run and let this one go on: what came early and is still
-        # waiting so many steps later belongs to no run.
+        # waiting this many steps later belongs to no run.
         while self._early and self.step - self._early[0][2] > DEPTH:
             self.refuse(self._early.popleft()[0], Refusal.WRONG_RUN)
 
@@ -205,9 +203,6 @@ class Inbox:
         return self.slots[peer][(self.step + DEPTH - 1) % DEPTH] is None
 
     def _file(self, peer: str, frame: Frame) -> None:
-        if frame[0] != self.run:
-            self.refuse(peer, Refusal.WRONG_RUN)
-            return
         step = int(frame[1])
         ahead = step - self.step
         if ahead < 0:

@@ -34,6 +34,10 @@ import numpy as np
 # How far an observer may fall behind: half of what each node remembers.
 SLACK = 500
 
+# Progress of an observer that has not begun the run: it is waited for before the first step, as
+# it could not keep what it gets of a run that it has yet to begin.
+_NOT_BEGUN = -1.0
+
 
 class Member:
     """
@@ -145,7 +149,6 @@ class Member:
         elif step == 0.0 and step_s > 0.0 and not self.inbox.is_over(run):
             self._announced = frame
             self._announced_at = self.inbox.reached(self.conductor)
-            self.inbox.announced = run
         else:
             self.inbox.refuse(self.conductor, Refusal.WRONG_RUN)
 
@@ -183,7 +186,6 @@ class Member:
         if self._announced is not None:
             if self.inbox.reached(self.conductor) > self._announced_at:
                 self._announced = None
-                self.inbox.announced = NO_RUN
                 self.inbox.refuse(self.conductor, Refusal.WRONG_RUN)
             elif stands_still or self.run == NO_RUN or self.fault:
                 return self._begin_announced(self._announced)
@@ -318,8 +320,8 @@ class Conductor(Member):
     It begins a run when it has heard from every other member, publishes step k + 1 only when
     it holds step k of every one, and begins afresh when one of them says hello and makes no more
     steps: that is a node that was started again. So it does when one has left for another run,
-    which somebody invented. Observers are waited for too, but not at every step: they may read
-    in bulk, as long as they stay within what the others remember.
+    which somebody invented. Observers are waited for too, at step 0 but not at every step: they
+    may read in bulk, as long as they stay within what the others remember.
     """
 
     def __init__(self, unit: Unit, birth: float, step_s: float, last_step: int | None = None,
@@ -345,7 +347,7 @@ class Conductor(Member):
         self.wanted_step_s = step_s
         self.last_step = last_step
         self.ended = False
-        self.used = dict.fromkeys(observers, 0.0)
+        self.used = dict.fromkeys(observers, _NOT_BEGUN)
         self._heard: dict[str, float] = {}
         self._begin_again = True
         # Our step when a member said hello, or last spoke of another run.
@@ -407,7 +409,7 @@ class Conductor(Member):
 
     def _behind(self) -> tuple[str, ...]:
         """Return the observers that have to catch up before the next step."""
-        least = self.step - SLACK
+        least = max(0, self.step - SLACK)
         if self.last_step is not None and self.step > self.last_step:
             least = self.step
         return tuple(name for name, used in self.used.items() if used < least)
@@ -443,7 +445,7 @@ class Conductor(Member):
         self._hello_at.clear()
         self._elsewhere_at.clear()
         self.ended = False
-        self.used = dict.fromkeys(self.used, 0.0)
+        self.used = dict.fromkeys(self.used, _NOT_BEGUN)
         run = max(float(int(now)), self.birth + 1.0, self.run + 1.0,
                   *(heard + 1.0 for heard in self._heard.values()))
         return self._begin(run, self.wanted_step_s)

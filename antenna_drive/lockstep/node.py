@@ -17,12 +17,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 import gc
-import json
 import time
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.lockstep import compiled_loop, ros_parameters
+from antenna_drive.lockstep.changes import CHANGES, write_record
 from antenna_drive.lockstep.compiled_unit import form_of
 from antenna_drive.lockstep.exchange import BRIEF_WAIT_S, compile_ahead, Exchange
 from antenna_drive.lockstep.member import Conductor, Member
@@ -51,7 +51,7 @@ EXCHANGE = Entry('', description='auto: the compiled exchange where it can be us
                  'python: the exchange in Python', choices=('auto', 'python'))
 DURATION = Entry('s', 0.0, 1e9, 'simulated time after which the run ends, 0: never')
 
-# What a node itself may be told, beside the settings of its unit.
+# The parameters of a node itself, beside the settings of its unit.
 OWN_PARAMETERS = ('config', 'wiring', 'exchange', 'publish_rate', 'run.step', 'run.pace',
                   'run.lead', 'run.duration', 'run.observers')
 
@@ -93,7 +93,6 @@ class DriveNode:
         """
         self._node = node
         self._unit = unit
-        self._fed_by_topic = tuple(fed_by_topic)
         self._outputs = outputs
         self.tuning = ros_parameters.Tuning(unit)
         self._stop = False
@@ -101,11 +100,10 @@ class DriveNode:
         settings: dict[str, tuple[Entry, Value]] = {
             name: item for name, item in unit.settings().items() if name not in fed_by_topic}
         rate_hz = overrides.number('publish_rate', PUBLISH_RATE, 100.0)
-        own: dict[str, tuple[Entry, Value]] = {'publish_rate': (PUBLISH_RATE, rate_hz)}
         exchange = overrides.get('exchange', EXCHANGE, 'python')
-        own['exchange'] = (EXCHANGE, exchange)
         self._pace: Pace | None = None
-        self._member = self._make_member(birth, overrides, own)
+        self._member = self._make_member(birth, overrides)
+        own = overrides.own
         overrides.check_all_known([*settings, *own])
         ros_parameters.declare_names(node, 'config', [*config] or ['reference'],
                                      'configuration files or sets of config/, later over earlier')
@@ -147,18 +145,13 @@ class DriveNode:
         """Return of how many steps the compiled exchange notes the time; for a benchmark."""
         return 0
 
-    def _make_member(self, birth: float, overrides: ros_parameters.Overrides,
-                     own: dict[str, tuple[Entry, Value]]) -> Member:
+    def _make_member(self, birth: float, overrides: ros_parameters.Overrides) -> Member:
         if self._unit.name != TEST_SIGNAL:
             return Member(self._unit, birth, self._outputs)
         step_s = overrides.number('run.step', STEP, 1e-3)
         pace = overrides.number('run.pace', PACE, 1.0)
         lead_s = overrides.number('run.lead', LEAD, LEAD_S)
         duration = overrides.number('run.duration', DURATION, 0.0)
-        own['run.step'] = (STEP, step_s)
-        own['run.pace'] = (PACE, pace)
-        own['run.lead'] = (LEAD, lead_s)
-        own['run.duration'] = (DURATION, duration)
         observers = overrides.names('run.observers', ())
         ros_parameters.declare_names(self._node, 'run.observers', observers,
                                      'names of recorders that every step waits for')
@@ -255,8 +248,8 @@ class DriveNode:
     def _made(self, exchange: Exchange, before: int) -> None:
         """Do what is due after the steps that the compiled exchange has made since `before`."""
         member = self._member
-        if self._every and member.step % self._every == 0 and not member.fault:
-            self._readings.publish(member.step, member.step_s, exchange.outputs)
+        if not member.fault:
+            self._publish_readings(exchange.outputs)
         self._stepped()
 
     def _give_up(self, exchange: Exchange, reason: int) -> None:
@@ -296,25 +289,25 @@ class DriveNode:
         changes = self.tuning.apply()
         if changes and self._member.run:
             self._record.add(self._member.run, self._member.step, changes)
-            self._report.last_change = json.dumps(
-                {'run': int(self._member.run), 'step': self._member.step, 'changes': changes})
+            self._report.last_change = write_record(self._member.run, self._member.step, CHANGES,
+                                                    changes)
 
     def _publish(self, outputs: FloatArray) -> None:
-        member = self._member
-        step = member.step
-        self._link.publish(member.message())
-        if step == 0:
+        self._link.publish(self._member.message())
+        if self._member.step == 0:
             self._begun()
-        if self._every and step % self._every == 0:
-            self._readings.publish(step, member.step_s, outputs)
+        self._publish_readings(outputs)
         self._stepped()
+
+    def _publish_readings(self, outputs: FloatArray) -> None:
+        member = self._member
+        if self._every and member.step % self._every == 0:
+            self._readings.publish(member.step, member.step_s, outputs)
 
     def _stepped(self) -> None:
         self._quiet = self._stands_still = False
         self._report.stepped()
-        now = time.monotonic()
-        if now >= self._report.next_s:
-            self._report.publish(now)
+        self._report.publish_if_due(time.monotonic())
 
     def _begun(self) -> None:
         member = self._member
@@ -373,8 +366,7 @@ class DriveNode:
         self._quiet = not ready
         now = time.monotonic()
         self._stands_still = self._report.stands_still(now)
-        if now >= self._report.next_s:
-            self._report.publish(now)
+        self._report.publish_if_due(now)
 
 
 def _as_float(value: Value) -> float:

@@ -79,7 +79,6 @@ class Observer:
     Attributes
     ----------
     names : the signals, 'unit/signal', in the order of the rows given to `on_step`
-    refused_records : messages on `<unit>/changes` that are no record of a change
 
     """
 
@@ -126,7 +125,6 @@ class Observer:
         self._told = -1
         self._link = FrameLink(self._node, self._member.layouts)
         self._serving: Serving | None = None
-        self.refused_records = 0
         if on_change is not None:
             self._listen(outputs, on_change)
         if not guest:
@@ -136,9 +134,7 @@ class Observer:
         for unit in outputs:
             def pass_on(message: String, unit: str = unit) -> None:
                 record = read_record(message.data)
-                if record is None:
-                    self.refused_records += 1
-                else:
+                if record is not None:
                     on_change(unit, record)
 
             self._node.create_subscription(String, f'{unit}/changes', pass_on, CHANGES_QOS)

@@ -28,7 +28,7 @@ from std_msgs.msg import Float64, String
 
 READING_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 
-# Whoever comes late still gets the changes of the run in progress.
+# A late subscriber still gets the changes of the run in progress.
 CHANGES_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE,
                          durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -38,7 +38,7 @@ _LITTLE_ENDIAN = b'\x00\x01\x00\x00'
 
 
 class Readings:
-    """Publish `<node>/<signal>` every so many steps, and `clock` if the node owns the time."""
+    """Publish `<node>/<signal>` every few steps, and `clock` if the node owns the time."""
 
     def __init__(self, node: Node, signals: tuple[Signal, ...], rate_hz: float,
                  with_clock: bool, amperes: float | None = None) -> None:

@@ -17,14 +17,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from antenna_drive.lockstep.diagnostics import diagnostics
 from antenna_drive.lockstep.exchange import Exchange
 from antenna_drive.lockstep.member import Conductor, Member
 from antenna_drive.lockstep.pace import Pace
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
 PERIOD_S = 1.0
-# A wait is told after this; with the period above that is within two seconds.
+# A wait is reported after this; with the period above that is within two seconds.
 PATIENCE_S = 0.9
 # A run that goes on makes a step within this; else another that was announced takes its place.
 STANDSTILL_S = 0.2
@@ -58,7 +59,7 @@ class Report:
         self._waiting_since: float | None = None
         self._told = False
         self._fault_told = ''
-        self.next_s = 0.0
+        self._next_s = 0.0
         self.last_change = ''
         self.refused_values = 0
         self.exchange: Exchange | None = None
@@ -103,19 +104,15 @@ class Report:
             return f'waiting for {names} to begin a run'
         return f'waiting for {names} at step {member.step} of run {member.run:.0f}'
 
-    def publish(self, now: float) -> None:
-        """Publish the state at `now` [s]."""
-        self.next_s = now + PERIOD_S
+    def publish_if_due(self, now: float) -> None:
+        """Publish the state at `now` [s] if the last report is one period old."""
+        if now < self._next_s:
+            return
+        self._next_s = now + PERIOD_S
         if self._waiting_since is not None:
             self.waiting(now)  # the log never says less than the report
         level, message = self._judge(now)
-        status = DiagnosticStatus(
-            level=level, name=self._node.get_fully_qualified_name(), message=message,
-            hardware_id='antenna_drive')
-        status.values = [KeyValue(key=key, value=value) for key, value in self._values(now)]
-        array = DiagnosticArray(status=[status])
-        array.header.stamp = self._node.get_clock().now().to_msg()
-        self._topic.publish(array)
+        self._topic.publish(diagnostics(self._node, level, message, self._values(now)))
 
     def _judge(self, now: float) -> tuple[bytes, str]:
         member = self._member

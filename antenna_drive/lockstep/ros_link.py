@@ -33,7 +33,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Float64MultiArray
 
-# One second of frames at 1 kHz. Transient local: whoever matches late still gets frame 0.
+# One second of frames at 1 kHz. Transient local: a late subscriber still gets frame 0.
 FRAME_QOS = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
     depth=1000,

@@ -62,7 +62,6 @@ class Tuning:
         self._queue: deque[_Request] = deque()
         self._lock = Lock()  # held while changes are put in force or withdrawn
         self.wake: Callable[[], None] = _nothing
-        self.refused = 0
 
     @property
     def pending(self) -> bool:
@@ -82,7 +81,6 @@ class Tuning:
         try:
             self._unit.check(changes)
         except ParameterError as error:
-            self.refused += 1
             return str(error)
         request = _Request(changes)
         self._queue.append(request)
@@ -91,7 +89,6 @@ class Tuning:
             with self._lock:
                 if not request.done.is_set():
                     self._queue.remove(request)
-                    self.refused += 1
                     return f'the node has not come to its next step for {PATIENCE_S:g} s'
         return request.refusal
 
@@ -114,7 +111,8 @@ class Overrides:
     """
     What the user said of parameters at the start, with -p or --params-file.
 
-    Each is asked for by name; what nobody asked for is misspelt or belongs elsewhere.
+    Each is asked for by name; what nobody asked for is misspelt or belongs elsewhere. `own` has
+    the entries and values of those asked for by `get` and `number`.
     """
 
     def __init__(self, node: Node) -> None:
@@ -125,6 +123,7 @@ class Overrides:
                 self._values[name] = _plain(parameter.value)
                 node.undeclare_parameter(name)
         self._asked: set[str] = set()
+        self.own: dict[str, tuple[Entry, Value]] = {}
 
     def get(self, name: str, entry: Entry, default: Value) -> Value:
         """
@@ -136,9 +135,9 @@ class Overrides:
 
         """
         self._asked.add(name)
-        if name not in self._values:
-            return default
-        return entry.check(name, self._values[name])
+        value = entry.check(name, self._values[name]) if name in self._values else default
+        self.own[name] = (entry, value)
+        return value
 
     def number(self, name: str, entry: Entry, default: float) -> float:
         """Return the number given for a parameter, or its default; raise as `get` does."""

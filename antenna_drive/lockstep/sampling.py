@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import time
 
 from antenna_drive.emulator.unit import FloatArray
+from antenna_drive.emulator.units import home
 from antenna_drive.emulator.wiring import TEST_SIGNAL
 from antenna_drive.errors import UserError
 from antenna_drive.lockstep.observer import Observer
@@ -54,7 +55,7 @@ class Sampled:
 
 
 def sample_processes(steps: int, step_s: float, *, name: str = 'observer',
-                     parameters: Mapping[str, Mapping[str, Parameter]] | None = None,
+                     settings: Mapping[str, Parameter] | None = None,
                      config: Sequence[str] = (), pace: float = 0.0, namespace: str = '',
                      domain_id: int | None = None,
                      progress: Callable[[int], None] | None = None) -> Sampled:
@@ -67,7 +68,9 @@ def sample_processes(steps: int, step_s: float, *, name: str = 'observer',
         number and length [s] of the macro-steps
     name
         name of the observing node
-    parameters, config, namespace, domain_id
+    settings
+        parameters of the drive by dotted name, such as 'torque_share.circuit.bias_pot'
+    config, namespace, domain_id
         see DriveProcesses
     pace
         how many times faster than real time, 0 for as fast as possible
@@ -79,69 +82,74 @@ def sample_processes(steps: int, step_s: float, *, name: str = 'observer',
     UserError : a process has ended by itself or the drive does not go on
 
     """
-    given = {unit: dict(values) for unit, values in (parameters or {}).items()}
-    given[TEST_SIGNAL] = {**given.get(TEST_SIGNAL, {}), 'run.step': float(step_s),
-                          'run.pace': float(pace), 'run.duration': steps * step_s,
-                          'run.observers': [name]}
+    given: dict[str, dict[str, Parameter]] = {
+        TEST_SIGNAL: {'run.step': float(step_s), 'run.pace': float(pace),
+                      'run.duration': steps * step_s, 'run.observers': [name]}}
+    for parameter, value in (settings or {}).items():
+        unit, key = home(parameter)
+        given.setdefault(unit, {})[key] = value
     processes = DriveProcesses(given, config=config, namespace=namespace, domain_id=domain_id)
-    collected = _Collected(steps, progress)
-    with Observer(name, collected.step, on_begin=collected.begin, namespace=namespace,
+    watch = RunWatch(steps, progress)
+    moments: dict[str, float] = {}
+
+    def begin(run: int, step_s: float) -> None:
+        watch.done = -1
+
+    def take(k: int, time_s: float, values: FloatArray) -> None:
+        if k in (0, steps):
+            moments['began' if k == 0 else 'ended'] = time.monotonic()
+        if k <= steps:
+            samples[k] = values
+            watch.done = k
+
+    with Observer(name, take, on_begin=begin, namespace=namespace,
                   domain_id=domain_id) as observer, processes:
-        collected.made(observer.names)
-        collected.watch(processes, observer)
-        observer.spin(collected.complete)
-        return Sampled(observer.names, collected.samples, len(processes.order),
-                       collected.ended - collected.began, collected.began - collected.started)
+        moments['started'] = time.monotonic()
+        samples = np.zeros((steps + 1, len(observer.names), 2))
+        observer.spin(lambda: watch.complete(processes, observer))
+    return Sampled(observer.names, samples, len(processes.order),
+                   moments['ended'] - moments['began'], moments['began'] - moments['started'])
 
 
-class _Collected:
-    """The samples so far, and the watch over those who make them."""
+class RunWatch:
+    """
+    How far a run of the processes is, and whether it goes on.
 
-    def __init__(self, steps: int, progress: Callable[[int], None] | None) -> None:
-        self._steps = steps
+    Attributes
+    ----------
+    done : the last step that was received, -1 for none
+    deadline : when the next step must have come, on the clock of time.monotonic() [s]
+
+    """
+
+    def __init__(self, last: int, progress: Callable[[int], None] | None = None) -> None:
+        """Watch a run up to its step `last`; `progress` is called with the step now and then."""
+        self.done = -1
+        self.deadline = time.monotonic() + BEGIN_PATIENCE_S
+        self._last = last
         self._progress = progress
-        self._done = self._seen = -1
-        self.samples = np.zeros((0, 0, 2))
-        self.began = self.ended = self.started = 0.0
+        self._seen = -1
+        self._next_look = 0.0
 
-    def made(self, names: Sequence[str]) -> None:
-        self.samples = np.zeros((self._steps + 1, len(names), 2))
+    def complete(self, processes: DriveProcesses, observer: Observer) -> bool:
+        """
+        Return whether the last step has come.
 
-    def watch(self, processes: DriveProcesses, observer: Observer) -> None:
-        self._processes = processes
-        self._observer = observer
-        self.started = time.monotonic()
-        self._next_look = self.started
-        self._deadline = self.started + BEGIN_PATIENCE_S
+        Raises
+        ------
+        UserError : a process has ended, or no step comes any more
 
-    def begin(self, run: int, step_s: float) -> None:
-        self._done = -1
-
-    def step(self, k: int, time_s: float, samples: FloatArray) -> None:
-        if k == 0:
-            self.began = time.monotonic()
-        if k <= self._steps:
-            self.samples[k] = samples
-            self._done = k
-            if k == self._steps:
-                self.ended = time.monotonic()
-
-    def complete(self) -> bool:
-        if self._done >= self._steps:
-            return True
+        """
         now = time.monotonic()
-        if now >= self._next_look:
-            self._next_look = now + 0.1
-            self._look(now)
-        return False
-
-    def _look(self, now: float) -> None:
-        self._processes.check()
-        if self._done != self._seen:
-            self._seen = self._done
-            self._deadline = now + STEP_PATIENCE_S
+        if self.done >= self._last or now < self._next_look:
+            return self.done >= self._last
+        self._next_look = now + 0.1
+        processes.check()
+        if self.done != self._seen:
+            self._seen, self.deadline = self.done, now + STEP_PATIENCE_S
             if self._progress is not None:
-                self._progress(self._done)
-        if now > self._deadline:
-            raise UserError(f'the drive does not go on at step {self._done + 1}: waiting for '
-                            f'{", ".join(self._observer.missing)}')
+                self._progress(self.done)
+        if now > self.deadline:
+            raise UserError(f'the drive does not go on at step {self.done + 1}: waiting for '
+                            f'{", ".join(observer.missing)}')
+        return False

@@ -27,7 +27,7 @@ class Serving:
     """
     Serves a node's subscriptions, services and timers until it is closed.
 
-    Whatever arrives may be wrong: a callback that fails is told and counted, and the next one
+    Whatever arrives may be wrong: a callback that fails is logged, and the next one
     is served.
 
     Attributes
@@ -38,7 +38,6 @@ class Serving:
 
     def __init__(self, node: Node) -> None:
         """Begin to serve."""
-        self.faults = 0
         self._log = node.get_logger()
         self._executor = SingleThreadedExecutor(context=node.context)
         self._executor.add_node(node)
@@ -53,7 +52,6 @@ class Serving:
             except (ExternalShutdownException, ShutdownException):
                 return
             except Exception as error:  # noqa: B902 (whatever a message makes a library raise)
-                self.faults += 1
                 self._log.error(f'a message could not be served, {type(error).__name__}: {error}')
 
     def close(self) -> None:

@@ -26,27 +26,21 @@ from collections.abc import Sequence
 import sys
 
 from antenna_drive.errors import UserError
-
-OK, BAD_INPUT = 0, 2
+from antenna_drive.programs import run_program
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
-    arguments = list(sys.argv[1:] if args is None else args)
-    if '-h' in arguments or '--help' in arguments:
-        print(__doc__.strip())
-        return OK
-    try:
-        if not arguments or arguments[0].startswith('-'):
-            raise UserError('which recording? command_player RECORDING [--ros-args ...]')
-        from antenna_drive.recording.files import read_recording
-        from antenna_drive.recording.replay import CommandUnit
-        unit = CommandUnit(read_recording(arguments[0]))
-    except UserError as error:
-        print(f'command_player: {" ".join(str(error).split())}', file=sys.stderr)
-        return BAD_INPUT
+    return run_program('command_player', __doc__, args, _run)
+
+
+def _run(arguments: list[str]) -> int:
+    if not arguments or arguments[0].startswith('-'):
+        raise UserError('which recording? command_player RECORDING [--ros-args ...]')
     from antenna_drive.lockstep.entry import run_unit
-    return run_unit(unit, arguments[1:])
+    from antenna_drive.recording.files import read_recording
+    from antenna_drive.recording.replay import CommandUnit
+    return run_unit(CommandUnit(read_recording(arguments[0])), arguments[1:])
 
 
 if __name__ == '__main__':

@@ -34,33 +34,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 import sys
 
-from antenna_drive.errors import UserError
-from antenna_drive.remedies import remedy
-
-OK, FAILED, BAD_INPUT, NOT_INSTALLED = 0, 1, 2, 3
+from antenna_drive.programs import run_program
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
-    arguments = list(sys.argv[1:] if args is None else args)
-    if '-h' in arguments or '--help' in arguments:
-        print(__doc__.strip())
-        return OK
-    try:
-        from antenna_drive.nodes.recorder_node import run
-        return run(arguments)
-    except UserError as error:
-        return _say(str(error), BAD_INPUT)
-    except ModuleNotFoundError as error:
-        needed = remedy(error)
-        if needed is None:
-            raise
-        return _say(needed, NOT_INSTALLED)
+    return run_program('recorder', __doc__, args, _run)
 
 
-def _say(message: str, status: int) -> int:
-    print(f'recorder: {" ".join(message.split())}', file=sys.stderr)
-    return status
+def _run(arguments: list[str]) -> int:
+    # without ROS 2 this import is what says so
+    from antenna_drive.nodes.recorder_node import run
+    return run(arguments)
 
 
 if __name__ == '__main__':

@@ -27,7 +27,7 @@ from typing import Any
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.errors import UserError
 from antenna_drive.lockstep.changes import read_record
-from antenna_drive.lockstep.entry import choose_transport
+from antenna_drive.lockstep.entry import choose_transport, init_ros
 from antenna_drive.lockstep.following import Follower, Step
 from antenna_drive.lockstep.frame import FrameLayout
 from antenna_drive.lockstep.readings import CHANGES_QOS
@@ -39,15 +39,13 @@ from antenna_drive.recording.sheet import load_sheet
 from rcl_interfaces.msg import ParameterDescriptor
 import rclpy
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import remove_ros_args
 from std_msgs.msg import String
 
 NAME = 'recorder'
 OK, FAILED = 0, 1
 # No wait is longer than this [s]; then what was written is made safe.
 _LONGEST_WAIT_S = 0.25
-# How long a new run may take to tell its configuration before its absence is told [s].
+# How long a new run may take to send its configuration before a warning [s].
 _PATIENCE_S = 5.0
 
 
@@ -70,14 +68,7 @@ def run(arguments: Sequence[str]) -> int:
 
     """
     choose_transport(os.environ)
-    left = remove_ros_args([NAME, *arguments])[1:]
-    if left:
-        raise UserError(f'{left[0]}: no such option; ROS 2 arguments follow --ros-args, as in '
-                        '--ros-args -p out:=my_run')
-    try:
-        rclpy.init(args=[NAME, *arguments], signal_handler_options=SignalHandlerOptions.NO)
-    except RuntimeError as error:
-        raise UserError(str(error).splitlines()[0]) from error
+    init_ros(NAME, arguments, 'out:=my_run')
     node = Node(NAME)
     try:
         return _RecorderNode(node).spin()
@@ -142,6 +133,7 @@ class _RecorderNode:
                 if not came:
                     self._guarded(self._recorder.idle)
                 self._look()
+            self._follower.finish()
             self._gather(OUTPUTS)
             self._guarded(self._recorder.close)
             self._look()

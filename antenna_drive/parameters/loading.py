@@ -23,26 +23,25 @@ a section motor_1 or motor_2: `motor_1: {gearbox: {half_gap: 0.2}}`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields, MISSING
+from dataclasses import fields, is_dataclass, MISSING, replace
 from pathlib import Path
 from typing import Any, get_type_hints
 
 from antenna_drive.parameters import files
 from antenna_drive.parameters.plain_yaml import read_yaml
-from antenna_drive.parameters.schema import Entry, nearest, ParameterError, Value
+from antenna_drive.parameters.schema import Entry, mapping_of, nearest, ParameterError, Value
 from antenna_drive.parameters.sets import (
-    Ammeter, Amplifier, Armature, Axis, Drive, Encoder, entries, Filter1, Gearbox, Motor,
-    MotorDrive, Plant, RateCommand, Share, Tachometer, TestSignal, TorqueShare, Waveform,
+    Axis, Drive, Encoder, entries, Filter1, MotorDrive, TestSignal, TorqueShare, Waveform,
 )
 
 MOTOR_SECTIONS: dict[str, type] = {
-    'rate_command': RateCommand, 'amplifier': Amplifier, 'armature': Armature, 'motor': Motor,
-    'gearbox': Gearbox, 'tachometer': Tachometer, 'ammeter': Ammeter,
-}
-SECTIONS: dict[str, type] = {
-    'axis': Axis, 'encoder': Encoder, 'torque_share': TorqueShare, 'filter_1': Filter1,
-    **MOTOR_SECTIONS,
-}
+    name: kind for name, kind in get_type_hints(MotorDrive).items()
+    if isinstance(kind, type) and is_dataclass(kind)}
+SECTIONS: dict[str, type] = {'axis': Axis, 'encoder': Encoder, 'torque_share': TorqueShare,
+                             'filter_1': Filter1, **MOTOR_SECTIONS}
+# Where the sets of the drive are that have a section of their own.
+PLACES = {'axis': 'plant.axis', 'encoder': 'plant.encoder',
+          'torque_share': 'torque_share.circuit', 'filter_1': 'torque_share.filter_1'}
 MOTOR_SIGNS = {'motor_1': -1.0, 'motor_2': 1.0}
 START_IN_GAP = 'start_in_gap'
 TEST_SIGNAL_PARTS = ('rate', 'torque')
@@ -50,6 +49,8 @@ _ENTRY_KEYS = ('value', 'unit', 'range', 'source', 'note')
 
 # What a file says of one parameter, by dotted name, and which file says it.
 _Given = dict[str, tuple[Value, str]]
+# What a section may say: of an entry or of a section within it.
+_Known = dict[str, Any]
 
 
 def load(*sources: str | Path, kind: Any = Drive) -> Drive:
@@ -80,7 +81,7 @@ def load(*sources: str | Path, kind: Any = Drive) -> Drive:
         given.update(content)
     if not alone:
         given = {**_read(find('reference'), SECTIONS)[1], **given}
-    return _drive(given, str(sources[-1]) if sources else 'reference', kind, more)
+    return _drive(given, str(sources[-1]) if sources else 'reference', kind)
 
 
 def find(source: str | Path) -> Path:
@@ -104,93 +105,45 @@ def find(source: str | Path) -> Path:
 
 
 def _read(path: Path, sections: Mapping[str, type]) -> tuple[str, _Given]:
-    content = read_yaml(path)
-    if content is None:
-        content = {}
-    if not isinstance(content, dict):
-        raise ParameterError(f'{path}: {type(content).__name__} given, '
-                             'allowed is a mapping of sections')
-    base = content.pop('base', 'reference')
-    if base not in ('reference', 'none'):
-        raise ParameterError(f'{path}: base: {base!r} given, allowed is reference or none')
+    """Return the base that a file names, and what it says of parameters."""
+    known: _Known = {name: dict(entries(kind)) for name, kind in sections.items()}
+    motor = {name: dict(entries(kind)) for name, kind in MOTOR_SECTIONS.items()}
+    start = dict(entries(MotorDrive))[START_IN_GAP]
+    known.update(dict.fromkeys(MOTOR_SIGNS, {**motor, START_IN_GAP: start}))
+    known['test_signal'] = {**dict.fromkeys(TEST_SIGNAL_PARTS, dict(entries(Waveform))),
+                            **dict(entries(TestSignal))}
     given: _Given = {}
-    allowed = (*sections, *MOTOR_SIGNS, 'test_signal')
-    for section, body in content.items():
-        if section in sections:
-            _section(path, str(section), sections[section], body, given)
-        elif section in MOTOR_SIGNS:
-            _motor_section(path, str(section), body, given)
-        elif section == 'test_signal':
-            _test_signal_section(path, body, given)
-        else:
-            raise ParameterError(
-                f'{path}: {section}: no such section{nearest(str(section), allowed)}; '
-                f'allowed are {", ".join(allowed)}')
+    content = read_yaml(path)
+    try:
+        content = dict(mapping_of('', {} if content is None else content))
+        base = content.pop('base', 'reference')
+        if base not in ('reference', 'none'):
+            raise ParameterError(f'base: {base!r} given, allowed is reference or none')
+        _take('', content, known, str(path), given)
+    except ParameterError as error:
+        raise ParameterError(f'{path}: {error}') from None
     return base, given
 
 
-def _mapping(path: Path, key: str, body: Any) -> Mapping[str, Any]:
-    if not isinstance(body, dict):
-        raise ParameterError(f'{path}: {key}: {body!r} given, allowed is a mapping of entries')
-    return body
-
-
-def _section(path: Path, name: str, kind: type, body: Any, given: _Given) -> None:
-    known = dict(entries(kind))
-    for key, item in _mapping(path, name, body).items():
-        if key not in known:
-            raise ParameterError(f'{path}: {name}.{key}: no such entry'
-                                 f'{nearest(str(key), tuple(known))}; '
-                                 f'allowed are {", ".join(known)}')
-        given[f'{name}.{key}'] = (_entry(path, f'{name}.{key}', known[key], item), str(path))
-
-
-def _motor_section(path: Path, motor: str, body: Any, given: _Given) -> None:
-    allowed = (*MOTOR_SECTIONS, START_IN_GAP)
-    for key, item in _mapping(path, motor, body).items():
-        if key in MOTOR_SECTIONS:
-            _section(path, f'{motor}.{key}', MOTOR_SECTIONS[key], item, given)
-        elif key == START_IN_GAP:
-            entry = dict(entries(MotorDrive))[START_IN_GAP]
-            given[f'{motor}.{key}'] = (_entry(path, f'{motor}.{key}', entry, item), str(path))
+def _take(prefix: str, body: Any, known: _Known, source: str, given: _Given) -> None:
+    """Put what a section says of parameters, and its own sections, into `given`."""
+    for key, item in mapping_of(prefix.rstrip('.'), body, known).items():
+        part = known[key]
+        if isinstance(part, Entry):
+            given[f'{prefix}{key}'] = (_value(f'{prefix}{key}', part, item), source)
         else:
-            raise ParameterError(f'{path}: {motor}.{key}: no such section'
-                                 f'{nearest(str(key), allowed)}; '
-                                 f'allowed are {", ".join(allowed)}')
+            _take(f'{prefix}{key}.', item, part, source, given)
 
 
-def _test_signal_section(path: Path, body: Any, given: _Given) -> None:
-    own = dict(entries(TestSignal))
-    for key, item in _mapping(path, 'test_signal', body).items():
-        if key in TEST_SIGNAL_PARTS:
-            _section(path, f'test_signal.{key}', Waveform, item, given)
-        elif key in own:
-            given[f'test_signal.{key}'] = (
-                _entry(path, f'test_signal.{key}', own[key], item), str(path))
-        else:
-            allowed = (*TEST_SIGNAL_PARTS, *own)
-            raise ParameterError(f'{path}: test_signal.{key}: no such entry'
-                                 f'{nearest(str(key), allowed)}; '
-                                 f'allowed are {", ".join(allowed)}')
-
-
-def _entry(path: Path, key: str, entry: Entry, item: Any) -> Value:
-    try:
-        if not isinstance(item, dict):
-            return entry.check(key, item)
-        for part in item:
-            if part not in _ENTRY_KEYS:
-                raise ParameterError(f'{key}: {part}: no such part of an entry'
-                                     f'{nearest(str(part), _ENTRY_KEYS)}; '
-                                     f'allowed are {", ".join(_ENTRY_KEYS)}')
-        if 'value' not in item:
-            raise ParameterError(f'{key}: value is missing, allowed is {entry.allowed()}')
-        if 'unit' in item and item['unit'] != entry.unit:
-            raise ParameterError(
-                f'{key}: unit {item["unit"]!r} given, allowed is {entry.unit!r}')
-        return _narrowed(key, entry, item).check(key, item['value'])
-    except ParameterError as error:
-        raise ParameterError(f'{path}: {error}') from None
+def _value(key: str, entry: Entry, item: Any) -> Value:
+    if not isinstance(item, dict):
+        return entry.check(key, item)
+    mapping_of(key, item, _ENTRY_KEYS)
+    if 'value' not in item:
+        raise ParameterError(f'{key}: value is missing, allowed is {entry.allowed()}')
+    if 'unit' in item and item['unit'] != entry.unit:
+        raise ParameterError(f'{key}: unit {item["unit"]!r} given, allowed is {entry.unit!r}')
+    return _narrowed(key, entry, item).check(key, item['value'])
 
 
 def _narrowed(key: str, entry: Entry, item: Mapping[str, Any]) -> Entry:
@@ -203,58 +156,50 @@ def _narrowed(key: str, entry: Entry, item: Mapping[str, Any]) -> Entry:
     if not numbers or not entry.low <= bounds[0] <= bounds[1] <= entry.high:
         raise ParameterError(f'{key}: range {bounds!r} given, allowed is [low, high] within '
                              f'[{entry.low:g}, {entry.high:g}]')
-    return Entry(entry.unit, float(bounds[0]), float(bounds[1]), entry.description, entry.live,
-                 entry.choices, entry.lengths, entry.whole)
+    return replace(entry, low=float(bounds[0]), high=float(bounds[1]))
 
 
-def _drive(given: _Given, source: str, kind: Any, more: Mapping[str, type]) -> Drive:
-    axis = _set(Axis, ('axis',), given, source)
+def _drive(given: _Given, source: str, kind: Any) -> Drive:
+    axis: Axis = _set(Axis, PLACES['axis'], given, source)
     _check_modes(axis, given)
-    torque_share = _set(TorqueShare, ('torque_share',), given, source)
-    if torque_share.saturation_low > torque_share.saturation_high:
+    for motor, sign in MOTOR_SIGNS.items():
+        given[f'{motor}.sign'] = sign, source
+        given[f'{motor}.gear_ratio'] = axis.gear_ratio, source
+    drive: Drive = _set(kind, '', given, source)
+    share = drive.torque_share.circuit
+    if share.saturation_low > share.saturation_high:
         raise ParameterError(f'{given["torque_share.saturation_low"][1]}: '
-                             'torque_share.saturation_low: '
-                             f'{torque_share.saturation_low:g} given, '
-                             'allowed is at most saturation_high '
-                             f'({torque_share.saturation_high:g} V)')
-    parts = {part: _set(Waveform, (f'test_signal.{part}',), given, source)
-             for part in TEST_SIGNAL_PARTS}
-    for part, waveform in parts.items():
-        check_waveform(waveform, f'{source}: test_signal.{part}')
-    drive: Drive = kind(
-        test_signal=_set(TestSignal, ('test_signal',), given, source, **parts),
-        motor_1=_motor('motor_1', axis, given, source),
-        motor_2=_motor('motor_2', axis, given, source),
-        torque_share=Share(circuit=torque_share,
-                           filter_1=_set(Filter1, ('filter_1',), given, source)),
-        plant=Plant(axis=axis, encoder=_set(Encoder, ('encoder',), given, source)),
-        **{name: _set(item, (name,), given, source) for name, item in more.items()})
+                             f'torque_share.saturation_low: {share.saturation_low:g} given, '
+                             f'allowed is at most saturation_high ({share.saturation_high:g} V)')
+    for part in TEST_SIGNAL_PARTS:
+        check_waveform(getattr(drive.test_signal, part), f'{source}: test_signal.{part}')
     return drive
 
 
-def _motor(motor: str, axis: Axis, given: _Given, source: str) -> MotorDrive:
-    parts = {name: _set(kind, (f'{motor}.{name}', name), given, source)
-             for name, kind in MOTOR_SECTIONS.items()}
-    start = given.get(f'{motor}.{START_IN_GAP}', (0.0, ''))[0]
-    return MotorDrive(sign=MOTOR_SIGNS[motor], gear_ratio=axis.gear_ratio,
-                      start_in_gap=start, **parts)  # type: ignore[arg-type]
+def _set(kind: type, place: str, given: _Given, source: str) -> Any:
+    """
+    Build a set and those within it.
 
-
-def _set(kind: type, sections: tuple[str, ...], given: _Given, source: str, **parts: Any) -> Any:
-    """Build one set from the first of `sections` that gives each of its entries."""
-    found: dict[str, Any] = dict(parts)
+    A section of a file goes by the place of its set in the drive, such as motor_1.gearbox, or by
+    the name that all sets of this kind share, such as gearbox.
+    """
+    shared = next((section for section, own in PLACES.items() if own == place),
+                  place.rpartition('.')[2])
+    hints = get_type_hints(kind)
+    found: dict[str, Any] = {}
     for item in fields(kind):
-        if 'entry' not in item.metadata:
+        if is_dataclass(hints[item.name]):
+            within = f'{place}.{item.name}' if place else item.name
+            found[item.name] = _set(hints[item.name], within, given, source)
             continue
-        for section in sections:
-            if f'{section}.{item.name}' in given:
-                found[item.name] = given[f'{section}.{item.name}'][0]
-                break
-        else:
-            if item.default is MISSING:
-                entry: Entry = item.metadata['entry']
-                raise ParameterError(f'{source}: {sections[-1]}.{item.name}: is missing, '
-                                     f'allowed is {entry.allowed()}')
+        names = [name for name in (f'{place}.{item.name}', f'{shared}.{item.name}')
+                 if name in given]
+        if names:
+            found[item.name] = given[names[0]][0]
+        elif item.default is MISSING:
+            entry: Entry = item.metadata['entry']
+            raise ParameterError(f'{source}: {shared}.{item.name}: is missing, '
+                                 f'allowed is {entry.allowed()}')
     return kind(**found)
 
 

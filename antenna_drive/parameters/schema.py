@@ -15,12 +15,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 import difflib
 import math
+from typing import Any
 
-from antenna_drive.errors import UserError
+from antenna_drive.errors import one_line, UserError
 
 Value = float | int | bool | str | tuple[float, ...]
 
@@ -46,7 +47,7 @@ class Entry:
 
     """
 
-    unit: str
+    unit: str = ''
     low: float = -math.inf
     high: float = math.inf
     description: str = ''
@@ -102,10 +103,32 @@ class Entry:
         return int(number) if self.whole else number
 
 
-def nearest(key: str, known: Mapping[str, object] | tuple[str, ...]) -> str:
+def nearest(key: str, known: Iterable[str]) -> str:
     """Return ', did you mean ...?' for a misspelt key, or nothing."""
     close = difflib.get_close_matches(key, list(known), n=1)
     return f', did you mean {close[0]}?' if close else ''
+
+
+def mapping_of(key: str, body: object,
+               allowed: Collection[str] | None = None) -> Mapping[str, Any]:
+    """
+    Return a mapping that a file holds under a key, '' for the file itself.
+
+    Raises
+    ------
+    ParameterError : it is no mapping, or one of its keys is not allowed
+
+    """
+    if not isinstance(body, Mapping):
+        where = f'{key}: ' if key else ''
+        raise ParameterError(f'{where}{one_line(repr(body), 40)} given, allowed is a mapping of '
+                             'entries')
+    for name in body:
+        if allowed is not None and name not in allowed:
+            where = one_line(f'{key}.{name}' if key else name)
+            raise ParameterError(f'{where}: no such entry{nearest(str(name), allowed)}; '
+                                 f'allowed are {", ".join(allowed)}')
+    return body
 
 
 def check_changes(changes: Mapping[str, object], entries: Mapping[str, Entry]) -> dict[str, Value]:

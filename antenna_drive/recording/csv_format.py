@@ -26,10 +26,10 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 import csv
 from dataclasses import replace
 from decimal import Decimal
-import difflib
 import math
 from pathlib import Path
 import re
@@ -38,6 +38,7 @@ import warnings
 
 from antenna_drive.errors import one_line
 from antenna_drive.limits import CSV_LINE, SAMPLES, SIGNALS, TEXT
+from antenna_drive.parameters.schema import nearest
 from antenna_drive.recording.atomic import new_file, refuse_existing
 from antenna_drive.recording.plain import from_json, PlainDataError, to_json
 from antenna_drive.recording.recording import (
@@ -265,10 +266,8 @@ def _header(path: Path, line: int, header: list[str]) -> list[str]:
                 raise cell.refuse(str(error)) from None
         else:
             known = [TIME, *FIELD_COLUMNS]
-            close = difflib.get_close_matches(column, known, n=1)
-            hint = f', did you mean {close[0]}?' if close else ''
             raise cell.refuse(
-                f'no such column {one_line(repr(column), 40)}{hint} Allowed are '
+                f'no such column {one_line(repr(column), 40)}{nearest(column, known)} Allowed are '
                 f"{', '.join(known)} and 'unit/signal [unit]'; antenna-drive import --map reads "
                 'other columns')
         if name in names:
@@ -399,8 +398,7 @@ def write_csv(recording: Recording, path: str | Path, *, field: bool = False,
     targets = [beside, *([sheet_path] if recording.sheet else []), path]
     for target in targets:
         refuse_existing(target)
-    written: list[Path] = []
-    try:
+    with ExitStack() as undo:
         for target in targets:
             with new_file(target) as stream:
                 if target == beside:
@@ -409,12 +407,9 @@ def write_csv(recording: Recording, path: str | Path, *, field: bool = False,
                     stream.write(dump_sheet(recording.sheet).encode())
                 else:
                     _write_rows(stream, list(chosen), channels, stamps)
-            written.append(target)
-    except BaseException:
-        for target in written:
-            target.unlink(missing_ok=True)
-        raise
-    return tuple(written)
+            undo.callback(target.unlink, missing_ok=True)
+        undo.pop_all()
+    return tuple(targets)
 
 
 def _write_rows(stream: IO[bytes], columns: Sequence[str], channels: Sequence[Channel],

@@ -29,7 +29,7 @@ from antenna_drive.recording.sheet import Sensors
 import numpy as np
 
 MOTORS = ('motor_1', 'motor_2')
-# A reading within so many standard deviations of its noise is not told from zero.
+# A reading within this many standard deviations of its noise counts as zero.
 NOISE_WIDTH = 3.0
 
 

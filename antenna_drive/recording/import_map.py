@@ -23,7 +23,6 @@ from array import array
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta, timezone
-import difflib
 import itertools
 import math
 from pathlib import Path
@@ -34,7 +33,7 @@ from antenna_drive.emulator.wiring import OUTPUTS, signal_names
 from antenna_drive.errors import one_line
 from antenna_drive.limits import SAMPLES
 from antenna_drive.parameters.plain_yaml import read_yaml
-from antenna_drive.parameters.schema import Entry, nearest, ParameterError
+from antenna_drive.parameters.schema import Entry, mapping_of, nearest, ParameterError
 from antenna_drive.recording.csv_format import (
     Cell, FIELD_COLUMNS, open_text, parse_nanoseconds, parse_number, rows,
 )
@@ -162,7 +161,7 @@ def parse_map(tree: object) -> ImportMap:
     ParameterError : an entry is missing, unknown or not allowed; the message names the key
 
     """
-    top = _mapping('the map', tree, _TOP)
+    top = mapping_of('the map', tree, _TOP)
     texts = {key: _text(key, top[key]) for key in _TEXT_ENTRIES if key in top}
     for key, allowed in (('delimiter', ',;\t| '), ('decimal', '.,')):
         if key in texts and (len(texts[key]) != 1 or texts[key] not in allowed):
@@ -178,7 +177,7 @@ def parse_map(tree: object) -> ImportMap:
     skip = int(_SKIP_LINES.check('skip_lines', plain_value(  # type: ignore[arg-type]
         top.get('skip_lines', 0))))
     signals = {}
-    own = _mapping('signals', top.get('signals'), None)
+    own = mapping_of('signals', top.get('signals'))
     for name, body in own.items():
         signal = FIELD_COLUMNS.get(str(name), str(name))
         if signal in signals:
@@ -187,18 +186,6 @@ def parse_map(tree: object) -> ImportMap:
     if not signals:
         raise ParameterError('signals: none is given')
     return ImportMap(_time(top.get('time')), signals, skip_lines=skip, source=top, **texts)
-
-
-def _mapping(key: str, value: object, allowed: tuple[str, ...] | None) -> Mapping[str, Any]:
-    if not isinstance(value, Mapping):
-        raise ParameterError(f'{key}: {one_line(repr(plain_value(value)), 40)} given, allowed is '
-                             'a mapping')
-    for name in value:
-        if allowed is not None and name not in allowed:
-            raise ParameterError(f'{key}.{one_line(name)}: no such entry'
-                                 f'{nearest(str(name), allowed)}; allowed are '
-                                 f'{", ".join(allowed)}')
-    return value
 
 
 def _text(key: str, value: object, choices: tuple[str, ...] | None = None) -> str:
@@ -210,7 +197,7 @@ def _text(key: str, value: object, choices: tuple[str, ...] | None = None) -> st
 
 
 def _time(body: object) -> TimeMap:
-    entries = _mapping('time', body, _TIME)
+    entries = mapping_of('time', body, _TIME)
     return TimeMap(
         _text('time.column', entries.get('column')),
         _text('time.unit', entries.get('unit', 's'), (*TIME_UNITS, ISO_8601)),
@@ -228,14 +215,13 @@ def _signal(key: str, name: str, body: object) -> SignalMap:
     unit = unit_of(name)
     if not unit:
         if name.partition('/')[0] in OUTPUTS:
-            close = difflib.get_close_matches(name, signal_names(), n=1)
-            hint = f', did you mean {close[0]}?' if close else ''
-            raise ParameterError(f'{key}: the drive has no such signal{hint}')
+            raise ParameterError(f'{key}: the drive has no such signal'
+                                 f'{nearest(name, signal_names())}')
         try:
             check_name(name)
         except RecordingError as error:
             raise ParameterError(f'signals: {error}') from None
-    entries = _mapping(key, body, _SIGNAL)
+    entries = mapping_of(key, body, _SIGNAL)
     numbers = {entry: _number(f'{key}.{entry}', entries[entry], entry)
                for entry in _NUMBERS if entry in entries}
     sign = entries.get('sign', 1)
@@ -374,9 +360,8 @@ def _places(path: Path, line: int, header: list[str], import_map: ImportMap) -> 
         for s in import_map.signals.values())
     for column in needed:
         if header.count(column) != 1:
-            close = difflib.get_close_matches(column, header, n=1)
-            hint = f', did you mean {one_line(repr(close[0]), 60)}?' if close else ''
-            what = 'is there twice' if column in header else f'is not there{hint}'
+            what = 'is there twice' if column in header else (
+                f'is not there{one_line(nearest(column, header))}')
             raise RecordingError(f'{path}: line {line}: the column '
                                  f'{one_line(repr(column), 60)} {what}')
     return {column: header.index(column) for column in needed}

@@ -27,6 +27,7 @@ what was synchronised is safe, see `sync_s`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 import io
 import math
@@ -146,14 +147,9 @@ class BagWriter:
         self._flushed_ns = 0
         self._counts = [0] * len(self._signals)
         self._first_ns, self._last_ns = 2**63 - 1, -1
-        try:
-            attachments = {
-                CONFIGURATION: to_json(freeze(dict(configuration or {}))),
-                NOTES: to_json(freeze(dict(notes or {}))),
-                FILE_NAME: dump_sheet(sheet or TestSheet()),
-            }
-        except PlainDataError as error:
-            raise RecordingError(str(error)) from None
+        attachments = {
+            CONFIGURATION: _as_json(configuration or {}), NOTES: _as_json(notes or {}),
+            FILE_NAME: dump_sheet(sheet or TestSheet())}
         refuse_existing(self.path)
         try:
             self.path.mkdir(parents=True)
@@ -251,10 +247,8 @@ class BagWriter:
             writer.add_message(self._topics[signal], time_ns,
                                _CDR_FLOAT64.pack(_CDR_HEADER, value), time_ns, step & 0xFFFFFFFF)
         self._counts[signal] += 1
-        if time_ns < self._first_ns:
-            self._first_ns = time_ns
-        if time_ns > self._last_ns:
-            self._last_ns = time_ns
+        self._first_ns = min(time_ns, self._first_ns)
+        self._last_ns = max(time_ns, self._last_ns)
 
     def _check(self, signal: int, time_ns: int, value: float) -> None:
         if math.isinf(value) or not 0 <= time_ns < 2**63:
@@ -271,10 +265,7 @@ class BagWriter:
         RecordingError : the file cannot be written, or it is no plain data
 
         """
-        try:
-            text = to_json(freeze(dict(configuration)))
-        except PlainDataError as error:
-            raise RecordingError(str(error)) from None
+        text = _as_json(configuration)
         with self._guarded() as writer:
             writer.add_attachment(0, 0, CONFIGURATION, 'application/json', text.encode())
 
@@ -287,10 +278,7 @@ class BagWriter:
         RecordingError : the file cannot be written, or a value is no plain data
 
         """
-        try:
-            text = to_json(freeze(dict(values)))
-        except PlainDataError as error:
-            raise RecordingError(f'{unit}: {error}') from None
+        text = _as_json(values, f'{unit}: ')
         with self._guarded() as writer:
             writer.add_metadata(CHANGE, {'step': str(step), 'unit': unit, 'values': text})
         self.flush()
@@ -361,36 +349,31 @@ class BagWriter:
             'custom_data': {}, 'ros_distro': 'unknown'}}, sort_keys=False)
         return text
 
-    def _guarded(self) -> _Guard:
+    @contextmanager
+    def _guarded(self) -> Iterator[Writer]:
+        """Turn a full disk into one line that says how much is safe, and end the writing."""
         if self._writer is None:
             raise RecordingError(f'{self.path}: the bag is closed')
-        return _Guard(self)
+        try:
+            yield self._writer
+        except OSError as error:
+            self._abandon()
+            safe = self.written_ns
+            so_far = (f'recorded up to {safe / NANOSECONDS:.3f} s' if safe >= 0
+                      else 'nothing recorded')
+            raise RecordingError(
+                f'{self.path}: cannot be written, {error.strerror or error}; {so_far}') from error
 
     def _abandon(self) -> None:
         self._writer = None
         self._raw.close()
 
 
-class _Guard:
-    """Turns a full disk into one line that says how much is safe, and ends the writing."""
-
-    def __init__(self, bag: BagWriter) -> None:
-        self._bag = bag
-
-    def __enter__(self) -> Writer:
-        assert self._bag._writer is not None
-        return self._bag._writer
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
-        if not isinstance(error, OSError):
-            return
-        self._bag._abandon()
-        safe = self._bag.written_ns
-        so_far = f'recorded up to {safe / NANOSECONDS:.3f} s' if safe >= 0 else 'nothing recorded'
-        raise RecordingError(
-            f'{self._bag.path}: cannot be written, {error.strerror or error}; {so_far}'
-        ) from error
+def _as_json(content: Mapping[str, Any], prefix: str = '') -> str:
+    try:
+        return to_json(freeze(dict(content)))
+    except PlainDataError as error:
+        raise RecordingError(f'{prefix}{error}') from None
 
 
 def _copy(tree: Mapping[str, Any]) -> dict[str, Any]:

@@ -14,7 +14,7 @@
 """
 Writes the runs of a drive to bags while it runs, one bag for each run.
 
-Whoever listens to the drive calls `begin`, `step` and `idle` from one thread; `told`, what the
+The listener of the drive calls `begin`, `step` and `idle` from one thread; `told`, what the
 nodes say of their parameters, may come from another.
 """
 
@@ -201,7 +201,7 @@ class RunRecorder:
         self._changes = later
 
     def _forget_most(self) -> None:
-        # Nobody is several runs ahead: what is kept of many is somebody's invention.
+        # No node is several runs ahead: records of many other runs are not genuine.
         while len(self._settings) > _MOST_RUNS:
             of_another = [run for run in self._settings if run != self._run]
             del self._settings[of_another[0]]

@@ -27,13 +27,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-import difflib
 import math
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple
 
 from antenna_drive.emulator.wiring import OUTPUTS
 from antenna_drive.errors import one_line, UserError
+from antenna_drive.parameters.schema import nearest
 from antenna_drive.recording.plain import freeze, PlainDataError
 from antenna_drive.recording.sheet import TestSheet
 import numpy as np
@@ -372,9 +372,8 @@ class Recording:
         try:
             return self.channels[name]
         except KeyError:
-            close = difflib.get_close_matches(name, list(self.channels), n=1)
-            hint = f', did you mean {close[0]}?' if close else ''
-            raise RecordingError(f'{name}: no such signal in this recording{hint}') from None
+            raise RecordingError(f'{name}: no such signal in this recording'
+                                 f'{nearest(name, self.channels)}') from None
 
     def __contains__(self, name: object) -> bool:
         """Tell whether the signal was recorded."""
@@ -405,17 +404,6 @@ class Recording:
         return (self.end_ns - self.start_ns) / NANOSECONDS
 
     # -- cutting ------------------------------------------------------------------------------
-
-    def select(self, names: Sequence[str]) -> Recording:
-        """
-        Return the recording with these signals only, in this order.
-
-        Raises
-        ------
-        RecordingError : there is no such signal
-
-        """
-        return replace(self, channels={name: self[name] for name in names})
 
     def between(self, start_s: float = -math.inf, end_s: float = math.inf) -> Recording:
         """Return the samples of start_s <= t < end_s, with their time stamps."""

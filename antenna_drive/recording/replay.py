@@ -43,7 +43,8 @@ from scipy.ndimage import median_filter
 
 _OUTPUTS = wiring.OUTPUTS[wiring.TEST_SIGNAL]
 COMMAND, TORQUE = (f'{wiring.TEST_SIGNAL}/{signal.name}' for signal in _OUTPUTS)
-# A slope so many times the median of those around it, itself one of them, is a jump.
+# A slope is a jump if it exceeds the median of the slopes around it, including itself, by this
+# factor.
 _JUMP = 20.0
 _AROUND = 9
 

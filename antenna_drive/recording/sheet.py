@@ -21,7 +21,6 @@ names the file, the key and what is allowed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 import math
 from pathlib import Path
@@ -29,7 +28,7 @@ from typing import Any, ClassVar, get_args, get_type_hints
 
 from antenna_drive.errors import one_line
 from antenna_drive.parameters.plain_yaml import read_yaml
-from antenna_drive.parameters.schema import Entry, nearest, ParameterError
+from antenna_drive.parameters.schema import Entry, mapping_of, ParameterError
 from antenna_drive.parameters.sets import SINES_LIMIT
 import yaml
 
@@ -211,10 +210,7 @@ def parse_sheet(tree: object) -> TestSheet:
 
 
 def _parse(key: str, tree: object, classes: tuple[type, ...]) -> Any:
-    if not isinstance(tree, Mapping):
-        raise ParameterError(f'{key or "the sheet"}: {type(tree).__name__} given, allowed is a '
-                             'mapping of entries')
-    given = dict(tree)
+    given = dict(mapping_of(key, tree))
     chosen = classes[0]
     if hasattr(classes[0], 'kind'):
         kinds = {c.kind: c for c in classes}  # type: ignore[attr-defined]
@@ -224,11 +220,8 @@ def _parse(key: str, tree: object, classes: tuple[type, ...]) -> Any:
     known = {item.name: item for item in fields(chosen)}
     types = get_type_hints(chosen)
     content = {}
-    for name, value in given.items():
-        full = one_line(f'{key}.{name}' if key else name)
-        if name not in known:
-            close = nearest(str(name), tuple(known))
-            raise ParameterError(f'{full}: no such entry{close}; allowed are {", ".join(known)}')
+    for name, value in mapping_of(key, given, known).items():
+        full = f'{key}.{name}' if key else name
         if value is None:
             continue
         metadata = known[name].metadata

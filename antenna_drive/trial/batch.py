@@ -22,7 +22,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed, Future, ProcessPoolExecutor, ThreadPoolExecutor
-import importlib.util
 import json
 import math
 import multiprocessing
@@ -160,22 +159,23 @@ def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
     truths = [sealing.open_truth(folder, name, manifest) for name in wanted]
     complete = len(names) - len(wanted)
     done(complete, len(names))
-    # The first case compiles the equations for the processes that follow.
-    if truths:
-        make_case(folder, truths[0])
+    for _ in _made(folder, truths, jobs):
         complete += 1
         done(complete, len(names))
-    if jobs == 1 or len(truths) < 2:
-        for truth in truths[1:]:
-            make_case(folder, truth)
-            complete += 1
-            done(complete, len(names))
-        return
-    context = multiprocessing.get_context('spawn')
-    with ProcessPoolExecutor(jobs, mp_context=context) as pool:
-        for _ in _finished([pool.submit(make_case, folder, truth) for truth in truths[1:]]):
-            complete += 1
-            done(complete, len(names))
+
+
+def _made(folder: Path, truths: Sequence[Truth], jobs: int) -> Iterator[None]:
+    """Make the cases of these truths, in `jobs` processes; yield after each."""
+    # The first case compiles the equations for the processes that follow.
+    alone = 1 if jobs > 1 else len(truths)
+    for truth in truths[:alone]:
+        make_case(folder, truth)
+        yield
+    if truths[alone:]:
+        context = multiprocessing.get_context('spawn')
+        with ProcessPoolExecutor(jobs, mp_context=context) as pool:
+            yield from _finished([pool.submit(make_case, folder, truth)
+                                  for truth in truths[alone:]])
 
 
 def _remove_drafts(folder: Path) -> None:
@@ -261,13 +261,7 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
     -------
     number of cases that failed
 
-    Raises
-    ------
-    UserError : this installation has no diagnosis
-
     """
-    if importlib.util.find_spec('antenna_drive.cli.diagnose') is None:
-        raise UserError('--diagnose: this installation has no antenna-drive diagnose')
     names = list(manifest['seals'])
     wanted = [name for name in names if not (folder / name / VERDICT).exists()]
     complete, failures = len(names) - len(wanted), 0

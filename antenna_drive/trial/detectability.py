@@ -92,25 +92,18 @@ class Study:
         self._solver = np.linalg.inv(gram + np.eye(len(gram)))
 
     def _places(self, neutral: Tolerances) -> list[FloatArray]:
+        """Return the effects of the motors' places in their gaps, of each recording alone."""
         columns = []
-        size = len(self._base) // RECORDINGS
         for place in ((0.4, -0.2), (0.3, -0.1)):
             change = (self._signals(neutral, place, None) - self._base) * UNIFORM_SPREAD / 0.1
-            for recording in range(RECORDINGS):
-                column = np.zeros_like(change)
-                part = slice(recording * size, (recording + 1) * size)
-                column[part] = change[part]
-                columns.append(column)
+            columns += list(change * np.kron(np.eye(RECORDINGS),
+                                             np.ones(len(change) // RECORDINGS)))
         return columns
 
     def _offsets(self) -> list[FloatArray]:
-        columns = []
+        """Return a zero error of each column of each recording."""
         count = len(self._times)
-        for block in range(len(self._base) // count):
-            column = np.zeros_like(self._base)
-            column[block * count:(block + 1) * count] = UNIFORM_SPREAD
-            columns.append(column)
-        return columns
+        return list(UNIFORM_SPREAD * np.kron(np.eye(len(self._base) // count), np.ones(count)))
 
     def _signals(self, tolerances: Tolerances, place: tuple[float, float],
                  effect: tuple[str, dict[str, float]] | None) -> FloatArray:

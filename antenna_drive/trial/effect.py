@@ -18,11 +18,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 import math
+from typing import Any
 
 from antenna_drive.trial.machine import Records
 import numpy as np
 
 Parameters = Mapping[str, float]
+Change = Callable[[Records, Parameters], None]
 
 
 @dataclass(frozen=True)
@@ -73,9 +75,6 @@ class Quantity:
         return value
 
 
-PHASE = Quantity('phase', 'rad', 0.0, 2.0 * math.pi, 'even')
-
-
 @dataclass(frozen=True)
 class Defect:
     """
@@ -93,7 +92,7 @@ class Defect:
     key: str
     form: str
     quantities: tuple[Quantity, ...]
-    change: Callable[[Records, Parameters], None]
+    change: Change
 
     def draw(self, size: float, random: np.random.Generator) -> dict[str, float]:
         """
@@ -116,3 +115,56 @@ class Defect:
         for quantity in others:
             values[quantity.name] = quantity.at(float(random.uniform()), random)
         return values
+
+
+def defects(table: Mapping[str, Mapping[str, Any]],
+            functions: Mapping[str, Change]) -> dict[str, Defect]:
+    """
+    Return the effects of a table by key, in its order.
+
+    Parameters
+    ----------
+    table
+        entries by place and name; effects.yaml describes them
+    functions
+        changes that are more than setting or scaling fields, by key
+
+    """
+    found = {}
+    for place, entries in table.items():
+        for name, entry in entries.items():
+            key = f'{place}.{name}'
+            quantities = tuple(Quantity(quantity, **limits)
+                               for quantity, limits in entry['sizes'].items())
+            found[key] = Defect(key, entry['form'], quantities,
+                                functions.get(key) or _change(place, entry))
+    return found
+
+
+def _change(place: str, entry: Mapping[str, Any]) -> Change:
+    """Return the change that an entry describes: fields to set, fields to scale."""
+    def change(machine: Records, values: Parameters) -> None:
+        motors = _motors(place, values)
+        for path, quantity in entry.get('sets', {}).items():
+            _field(machine, path, motors)[...] = values[quantity]
+        for path in entry.get('scales', ()):
+            _field(machine, path, motors)[...] *= values['factor']
+    return change
+
+
+def _motors(place: str, values: Parameters) -> slice:
+    """Return which motors an effect changes: that of its place or of its numbers, or both."""
+    number = place.rpartition('_')[2]
+    if 'motor' in values:
+        which = int(values['motor'])
+    elif number.isdigit():
+        which = int(number)
+    else:
+        return slice(None)
+    return slice(which - 1, which)
+
+
+def _field(machine: Records, path: str, motors: slice) -> Any:
+    record, field = path.split('.')
+    column = getattr(machine, record)[field]
+    return column[motors] if record == 'motors' else column

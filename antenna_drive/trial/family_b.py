@@ -26,29 +26,16 @@ import math
 from typing import Any
 
 from antenna_drive.trial import programme
-from antenna_drive.trial.effect import Defect, Parameters, Quantity
+from antenna_drive.trial.effect import Change, Defect, defects, Parameters
 from antenna_drive.trial.effects import CATALOGUE as CATALOGUE_A
-from antenna_drive.trial.effects import Change, gust_of, setting
+from antenna_drive.trial.effects import gust_of
 from antenna_drive.trial.machine import LAW_B, Records
-from antenna_drive.trial.outside import MOTOR, motor_values
+from antenna_drive.trial.table import read_table
 from antenna_drive.trial.wild_programme import knots, levels, Shapes, SIDEREAL_DEG_S
 import numpy as np
 
-LAWS = {
-    'viscous_friction': "Eyring's fluid: c k asinh(w / k), k 100 rad/s or 6.5 mrad/s",
-    'stribeck_friction': 'rise / (1 + (w / half_rate)^2), at rest too',
-    'friction_asymmetry': 'level times exp(share) when positive, exp(-share) when negative',
-    'load_dependent_friction': 'share T_g^2 / (abs(T_g) + 1 N m)',
-    'torque_ripple': 'flattened sine of the shaft angle, tanh(2 sin a) / tanh 2',
-    'amplifier_dead_zone': 'v - d v / sqrt(v^2 + d^2) of the current demand',
-    'hysteresis': "elastic torque times 1 + share z, z' = (v - abs(v) z abs(z)) / 0.07 rad",
-    'transmission_error': 'two harmonics of the motor angle, sin a + 0.3 sin(2 a + 1)',
-    'position_dependent_friction': 'plates: level times 1 + share tanh(3 sin a) / tanh 3',
-    'wind_gust': "24 sines with Kaimal's spectrum, another draw per recording",
-    'bull_gear_backlash': 'both gaps wider by one half gap times 1 + 0.4 sin(elevation)',
-    'ripple': 'two harmonics, sin a + 0.5 sin(2 a + 0.8), in proportion to the rate',
-    'cyclic_error': 'two harmonics, the third a fifth of the first',
-    'delay': 'of the rate error of both motors, as four equal lags'}
+_TABLE = read_table('family_b.yaml')
+LAWS: dict[str, str] = _TABLE['laws']
 
 
 def _gust(machine: Records, values: Parameters) -> None:
@@ -79,49 +66,7 @@ def _shaker(machine: Records, values: Parameters) -> None:
     machine.structure['gust_frequency'][0, 0] = 2.0 * math.pi * values['frequency']
 
 
-OUTSIDE: dict[str, Defect] = {effect.key: effect for effect in (
-    Defect('outside.tach_saturation', 'a tachometer saturates, L tanh(w / L), inside the loop',
-           (Quantity('limit', 'rad/s', 500.0, 150.0), MOTOR),
-           motor_values(tach_saturation='limit')),
-    Defect('outside.tach_dead_band', 'brush film of a tachometer, w - d tanh(w / d), '
-           'inside the loop',
-           (Quantity('half_width', 'rad/s', 0.03, 1.0), MOTOR),
-           motor_values(tach_dead_band='half_width')),
-    Defect('outside.loop_crosstalk', "a rate loop sees a share of the other motor's rate",
-           (Quantity('share', '1', 0.02, 0.3, turned='sign'), MOTOR),
-           motor_values(loop_crosstalk='share')),
-    Defect('outside.eddy_brake', 'an eddy-current brake drags, most at one rate',
-           (Quantity('torque', 'N m', 0.5, 8.0), MOTOR, Quantity('rate', 'rad/s', 8.0, 40.0)),
-           motor_values(eddy_brake='torque', eddy_rate='rate')),
-    Defect('outside.magnet_saturation', 'torque constant falls with the square of the current',
-           (Quantity('loss', '1/A^2', 0.004, 0.08), MOTOR),
-           motor_values(magnet_saturation='loss')),
-    Defect('outside.mesh_stiffness', 'gear stiffness varies with the angle of the motor',
-           (Quantity('share', '1', 0.05, 0.5), MOTOR, Quantity('cycles', '1/rev', 1, 12, 'whole')),
-           motor_values(mesh_stiffness='share', mesh_stiffness_cycles='cycles')),
-    Defect('outside.structure_play', 'play in the joint of the first mode',
-           (Quantity('half_play', 'rad', 5e-7, 2e-5),),
-           setting('structure', mode_play='half_play')),
-    Defect('outside.cable_wrap', 'a cable wrap pulls in proportion to the angle',
-           (Quantity('stiffness', 'N m/rad', 3e5, 3e7),), setting('structure', cable='stiffness')),
-    Defect('outside.hard_spot', 'one place of the rail rubs harder',
-           (Quantity('share', '1', 0.3, 3.0), Quantity('at', 'rad', 2e-4, 8e-4),
-            Quantity('width', 'rad', 5e-5, 2e-4)),
-           setting('structure', hard_spot='share', hard_spot_at='at', hard_spot_width='width')),
-    Defect('outside.shaker', 'a machine on the dish shakes it at one frequency',
-           (Quantity('torque', 'N m', 3e3, 1e5), Quantity('frequency', 'Hz', 1.5, 7.0)), _shaker),
-    Defect('outside.command_leak', 'the rate command leaks into the torque share',
-           (Quantity('leak', '1/s', 0.06, 1.0, turned='sign'),),
-           setting('circuit', command_leak='leak')),
-    Defect('outside.ammeter_lag', 'the ammeters follow slowly, first order',
-           (Quantity('time', 's', 0.01, 0.3),), setting('sensors', ammeter_lag='time')),
-    Defect('outside.ammeter_crosstalk', 'each ammeter reads a share of the other current',
-           (Quantity('share', '1', 0.08, 0.4, turned='sign'),),
-           setting('sensors', ammeter_crosstalk='share')),
-    Defect('outside.encoder_play', 'the encoder hangs on a coupling with play',
-           (Quantity('half_play', 'rad', 3e-6, 3e-4),),
-           setting('sensors', encoder_play='half_play')),
-)}
+OUTSIDE = defects({'outside': _TABLE['outside']}, {'outside.shaker': _shaker})
 
 
 def _staircase(duration: float, rest: float, random: np.random.Generator) -> dict[str, Any]:

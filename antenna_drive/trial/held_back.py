@@ -31,7 +31,7 @@ from antenna_drive.trial.real_antenna import FloatArray
 from antenna_drive.trial.sheet import SensorGrade
 import numpy as np
 
-# A signal has a gap to close if its mean square is so many times that of the noise.
+# A signal has a gap to close if its mean square exceeds that of the noise by this factor.
 GAP = 2.0
 
 

@@ -214,11 +214,8 @@ def reliability(confidences: Sequence[float], right: Sequence[bool]) -> list[Bin
     bins = []
     for k in range(BINS):
         inside = [i for i, p in enumerate(place) if p == k]
-        mean: Callable[[list[float]], float] = (
-            lambda values: sum(values) / len(values) if values else math.nan)
         bins.append(Bin(k / BINS, (k + 1) / BINS, len(inside),
-                        mean([confidences[i] for i in inside]),
-                        mean([float(right[i]) for i in inside])))
+                        _mean(confidences[i] for i in inside), _mean(right[i] for i in inside)))
     return bins
 
 

@@ -23,12 +23,13 @@ left out too.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from antenna_drive.trial import nominal
 from antenna_drive.trial.effect import Parameters
 from antenna_drive.trial.family_b import LAWS
+from antenna_drive.trial.machine import nominal
+from antenna_drive.trial.table import read_table
 from antenna_drive.trial.verdict import Interval, Verdict
 
 
@@ -37,7 +38,7 @@ class Size(NamedTuple):
 
     parameter: str                              # of the verdict, behind the effect's id
     unit: str
-    of: Callable[[Parameters], float]           # from the quantities of the truth
+    true: float
 
 
 class StatedSize(NamedTuple):
@@ -58,44 +59,7 @@ class StatedSize(NamedTuple):
         return self.stated.low <= self.true <= self.stated.high
 
 
-def _relative(parameter: str = 'change') -> Size:
-    return Size(parameter, '1', lambda values: values['factor'] - 1.0)
-
-
-def _same(parameter: str, quantity: str, unit: str) -> Size:
-    return Size(parameter, unit, lambda values: values[quantity])
-
-
-_BY_NAME: Mapping[str, Size] = {
-    'friction_asymmetry': _same('share', 'share', '1'),
-    'torque_constant': _relative(),
-    'armature_resistance': Size(
-        'change', 'ohm', lambda values: (values['factor'] - 1.0) * nominal.RESISTANCE.value),
-    'amplifier_gain': _relative(),
-    'amplifier_offset': _same('offset', 'voltage', 'V'),
-    'current_limit': _relative(),
-    'gap': _relative(),
-    'stiffness': _relative(),
-    'hysteresis': _same('share', 'share', '1'),
-    'bias_pot': _relative(),
-    'fade_out_voltage': Size(
-        'change', '1', lambda values: values['shift'] / nominal.FADE_OUT_VOLTAGE.value),
-    'share_filter': _relative('rate_change'),
-    'filter_1_gain': _relative(),
-    'filter_1_pole': _relative(),
-    'gravity_imbalance': _same('torque', 'torque', 'N m'),
-    'wind_steady': _same('torque', 'torque', 'N m'),
-    'inertia': _relative(),
-    'mode_damping': _relative('factor'),
-    'extra_mode': _same('inertia', 'inertia', 'kg m^2'),
-    'gain': _same('change', 'error', '1'),
-    'offset': _same('offset', 'offset', ''),
-    'quantisation': _same('step', 'step', 'rad'),
-    'delay': _same('error_time', 'delay', 's')}
-_COULOMB = {
-    'axis': _relative(),
-    'motor': Size('torque', 'A', lambda values: (
-        (values['factor'] - 1.0) * nominal.MOTOR_COULOMB.value))}
+_TABLE = read_table('sizes.yaml')
 
 
 def size_of(effect: str, values: Parameters) -> Size | None:
@@ -110,12 +74,15 @@ def size_of(effect: str, values: Parameters) -> Size | None:
         its quantities in the truth
 
     """
-    component, name = effect.split('.', 1)
-    if name == 'coulomb_friction':
-        return _COULOMB['axis' if component == 'axis' else 'motor']
-    if name == 'mode_frequency':
-        return _relative(f'change_{int(values["mode"])}')
-    return _BY_NAME.get(name)
+    row = _TABLE.get(effect) or _TABLE.get(effect.split('.', 1)[1])
+    if row is None:
+        return None
+    true = values[row['number']] - (1.0 if row['number'] == 'factor' else 0.0)
+    if 'times' in row:
+        true *= nominal(*row['times'].split('.'))
+    if 'over' in row:
+        true /= nominal(*row['over'].split('.'))
+    return Size(row['parameter'].format(mode=int(values.get('mode', 0))), row['unit'], true)
 
 
 def stated_sizes(truth: Mapping[str, Any], verdict: Verdict) -> list[StatedSize]:
@@ -139,5 +106,5 @@ def stated_sizes(truth: Mapping[str, Any], verdict: Verdict) -> list[StatedSize]
         size = size_of(key, entry['parameters'])
         stated = first.parameters.get(f'{key}.{size.parameter}') if size else None
         if size and stated and size.unit in ('', stated.unit):
-            found.append(StatedSize(key, size.of(entry['parameters']), stated))
+            found.append(StatedSize(key, size.true, stated))
     return found

@@ -22,6 +22,7 @@ those of `programme`. Steps, tracking and slews are straight lines between knots
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from antenna_drive.trial import programme
@@ -85,10 +86,7 @@ def draw_programme(shapes: Shapes, tolerance: float, random: np.random.Generator
         bias = dict(sheet.bias)
         if 'at_s' in bias:
             bias['at_s'] = round(float(random.uniform(0.25, 0.55)) * duration, 1)
-        sheets.append(CaseSheet(
-            circuit=sheet.circuit, filter_1=sheet.filter_1, bias=bias,
-            waveform=makers[kind](duration, rest, random), elevation_deg=sheet.elevation_deg,
-            parameter_tolerance=tolerance))
+        sheets.append(replace(sheet, bias=bias, waveform=makers[kind](duration, rest, random)))
     knowledge = str(random.choice(list(KNOWLEDGE), p=list(KNOWLEDGE.values())))
     given = [None if knowledge == 'no sheet' and k < len(plain)
              else sheet.given(sensors=knowledge == 'whole') for k, sheet in enumerate(sheets)]

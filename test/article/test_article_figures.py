@@ -24,6 +24,7 @@ from antenna_drive import cli
 from antenna_drive.article import figures, loaded_axis
 from antenna_drive.article.measures import Results, with_circuits
 from antenna_drive.article.profile_measures import loaded_axis as loop_of_load
+from antenna_drive.programs import OK
 import numpy as np
 import pytest
 
@@ -55,7 +56,7 @@ def test_every_figure_is_a_file_and_on_the_page(
         short_load: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('antenna_drive.cli.article.EXPERIMENTS', ('T3a',))
     folder = tmp_path / 'new' / 'figures'
-    assert cli.main(['article', '--figures', str(folder)]) == cli.OK
+    assert cli.main(['article', '--figures', str(folder)]) == OK
     assert {path.name for path in folder.iterdir()} == {
         *(f'fig_{number:02d}.svg' for number in NUMBERS), 'figures.html'}
     for number in NUMBERS:
@@ -68,7 +69,7 @@ def test_every_figure_is_a_file_and_on_the_page(
 
 @pytest.mark.parametrize('number', AXES)
 def test_axes_are_the_articles(number: int, results: Results, short_load: None) -> None:
-    draw = next(draw for own, _, draw in figures.FIGURES if own == number)
+    draw = figures.FIGURES[number]
     axes = draw(results).axes
     x, y = AXES[number]
     labels = [axis.get_xlabel() for axis in axes if axis.get_xlabel()]

@@ -18,9 +18,7 @@ from __future__ import annotations
 import cmath
 import math
 
-from antenna_drive.article.linear import (
-    bias_loop, growth, rate_loop, stability_limit, step_response,
-)
+from antenna_drive.article.linear import bias_loop, growth, stability_limit
 from antenna_drive.article.stability import growth_rate
 from antenna_drive.parameters import load
 import numpy as np
@@ -69,14 +67,3 @@ def test_simulation_and_eigenvalues_agree_on_how_fast_a_disturbance_grows(gain: 
     expected = growth(bias_loop(drive, gain, POLES[0], rotors_held=True))
     # the lock-step at 1 ms moves the limit by 0.4 of 145, and growth with it
     assert growth_rate(drive, gain, POLES[0]) == pytest.approx(expected, abs=0.06)
-
-
-def test_the_rate_loop_follows_its_command_without_error() -> None:
-    matrix, gain = rate_loop(load())
-    time = np.arange(0.0, 20.0, 1e-3)
-    assert step_response(load(), time)[-1] == pytest.approx(1.0, abs=2e-3)
-    # apart from the free rotation of the axis every state comes to rest
-    roots = np.sort(np.linalg.eigvals(matrix).real)
-    assert roots[-1] == pytest.approx(0.0, abs=1e-6)
-    assert roots[-2] < -0.1
-    assert gain.shape == (matrix.shape[0],)

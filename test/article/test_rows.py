@@ -30,6 +30,7 @@ from antenna_drive.calibration.problem import read_problem
 from antenna_drive.cli.article import CONFIGURATION
 from antenna_drive.parameters.files import config_dir
 from antenna_drive.parameters.sets import changed
+from antenna_drive.programs import BAD_INPUT, OK
 import numpy as np
 import pytest
 
@@ -168,18 +169,18 @@ def test_a_conclusion_follows_from_the_configuration() -> None:
     # by hand: 10.4, 11.6 and 11.2 V as shares of a saturation of 14.5 V
     wide = changed_reference(torque_share__circuit__saturation_high=14.5)
     for share in ('14.5 V', '0.717', '0.800', '0.772'):
-        assert share in conclusion(wide, 'bias_pot')
+        assert share in conclusion(wide, 'k_p')
     # an inductance 2.5 times as large halves the stability limit or more: Fig. 21(e) is above it
     slow = {f'motor_{m}__armature__inductance': 0.03125 for m in (1, 2)}
-    said = conclusion(changed_reference(**slow), 'stability_limit_units')
+    said = conclusion(changed_reference(**slow), 'stability_limit')
     assert 'No reading fits' in said
     assert "k' = 145.2, above the limit" in said
     # with a small gear ratio even 308 kgf m would need a small motor
-    said = conclusion(changed_reference(plant__axis__gear_ratio=150.0), 'torque_unit')
+    said = conclusion(changed_reference(plant__axis__gear_ratio=150.0), 'kGm')
     assert 'All readings fit' in said
     # 6 kW at a ratio of 150 against 632 kW at 14868
     assert f'{308.0 * 9.80665 * math.radians(0.685 / 0.85) * 150.0 / 1e3:.3g} kW' in said
-    assert 'Fits: pound-inches' in conclusion(Results(with_circuits('reference')), 'torque_unit')
+    assert 'Fits: pound-inches' in conclusion(Results(with_circuits('reference')), 'kGm')
 
 
 @pytest.mark.parametrize('seed', [1, 2])
@@ -219,7 +220,7 @@ def test_the_command_gives_rows_and_contradictions_as_json(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('antenna_drive.cli.article.EXPERIMENTS', ('T3a', 'T4a'))
     target = tmp_path / 'article.json'
-    assert cli.main(['article', '--config', 'reference', '--json', str(target)]) == cli.OK
+    assert cli.main(['article', '--config', 'reference', '--json', str(target)]) == OK
     told = json.loads(target.read_text())
     assert {row['id'].partition('.')[0] for row in told['rows']} == {'T3a', 'T4a'}
     for row in told['rows']:
@@ -230,5 +231,5 @@ def test_the_command_gives_rows_and_contradictions_as_json(
 
 
 def test_an_unknown_parameter_set_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(['article', '--config', 'referense']) == cli.BAD_INPUT
+    assert cli.main(['article', '--config', 'referense']) == BAD_INPUT
     assert 'did you mean reference?' in capsys.readouterr().err

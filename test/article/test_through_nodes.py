@@ -19,6 +19,7 @@ import json
 from pathlib import Path
 
 from antenna_drive import cli
+from antenna_drive.programs import OK
 import pytest
 
 pytest.importorskip('rclpy')
@@ -33,7 +34,7 @@ def test_five_processes_give_the_rows_of_one(
     for options in ([], ['--through-nodes']):
         target = tmp_path / f'{len(options)}.json'
         assert cli.main(['article', '--config', 'reference', *options, '--json',
-                         str(target)]) == cli.OK
+                         str(target)]) == OK
         rows = json.loads(target.read_text())['rows']
         assert {row['id'].partition('.')[0] for row in rows} == set(article.THROUGH_NODES)
         obtained.append({row['id']: row['obtained'] for row in rows})

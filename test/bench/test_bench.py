@@ -26,10 +26,11 @@ from antenna_drive.bench import batches, c_loop, measuring, peers, simulation, s
 from antenna_drive.bench.batches import Task
 from antenna_drive.bench.peers import Setting
 from antenna_drive.bench.stamps import WARM_STEPS
-from antenna_drive.cli import BAD_INPUT, main
+from antenna_drive.cli import main
 from antenna_drive.emulator.run import simulate
 from antenna_drive.emulator.wiring import UNITS
 from antenna_drive.lockstep.pace import LEAD_S
+from antenna_drive.programs import BAD_INPUT
 import numpy as np
 import pytest
 

@@ -26,6 +26,7 @@ from antenna_drive.calibration.report import report
 from antenna_drive.calibration.search import FitCandidate, search
 from antenna_drive.errors import UserError
 from antenna_drive.parameters import load, ParameterError
+from antenna_drive.programs import BAD_INPUT, OK
 import numpy as np
 import pytest
 
@@ -167,20 +168,20 @@ search: {population: 4, spread: 0.1}
     out = tmp_path / 'fitted.yaml'
     arguments = ['calibrate', str(targets), '--out', str(out), '--count', '8',
                  '--log', str(tmp_path / 'fit.log')]
-    assert cli.main(arguments) == cli.OK
+    assert cli.main(arguments) == OK
     said = capsys.readouterr().out
     assert 'T4a.overshoot' in said
     assert 'gearbox.contact_damping' in said
     # less damping overshoots more than the reference's 0.133 does
     assert 0.05 <= load(str(out)).motor_1.gearbox.contact_damping <= 0.4
     first = out.read_bytes()
-    assert cli.main(arguments) == cli.OK
+    assert cli.main(arguments) == OK
     assert out.read_bytes() == first
 
 
 def test_a_missing_file_is_told_in_one_line(capsys: pytest.CaptureFixture[str],
                                             tmp_path: Path) -> None:
-    assert cli.main(['calibrate', 'nowhere', '--out', str(tmp_path / 'x')]) == cli.BAD_INPUT
+    assert cli.main(['calibrate', 'nowhere', '--out', str(tmp_path / 'x')]) == BAD_INPUT
     error = capsys.readouterr().err
     assert 'nowhere' in error
     assert error.count('\n') == 1

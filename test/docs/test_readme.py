@@ -16,7 +16,7 @@
 from pathlib import Path
 import re
 
-from antenna_drive.cli import available
+from antenna_drive.cli import COMMANDS
 from antenna_drive.emulator import wiring
 from antenna_drive.emulator.units import build
 from antenna_drive.parameters import load
@@ -47,7 +47,7 @@ def test_every_tuning_parameter_is_named_and_no_other(unit: str) -> None:
 
 
 def test_every_command_is_named() -> None:
-    for command in available():
+    for command in COMMANDS:
         assert f'`{command}`' in README or f'antenna-drive {command}' in README, command
 
 

@@ -136,7 +136,7 @@ def test_its_parameters_are_read_and_checked_like_ours(pointed: Wiring, tmp_path
     assert drive.position_loop.integral_gain == 0.3
     assert drive.position_loop.proportional_gain == 0.8
     assert drive.motor_1.gearbox.half_gap == 0.16
-    with pytest.raises(ParameterError, match='position_loop: no such section'):
+    with pytest.raises(ParameterError, match='position_loop: no such entry'):
         load(file)
     file.write_text('position_loop: {integral_gian: 0.3}\n')
     with pytest.raises(ParameterError, match='mine.yaml: position_loop.integral_gian'):

@@ -54,6 +54,10 @@ class Conducted:
         self.channel.arrived['plant'] += [
             (self.run_id, float(k), 1e-3, 0.0, 0.0) for k in range(first, last + 1)]
 
+    def report(self, *steps: int) -> None:
+        """Let the observer's reports of its progress arrive."""
+        self.channel.arrived['watcher'] += [(self.run_id, float(k), 1e-3) for k in steps]
+
 
 def test_every_unit_of_the_drive_has_a_loop_but_a_subclass_has_none() -> None:
     drive = load()
@@ -70,9 +74,12 @@ def test_the_loop_waits_for_an_observer_that_falls_behind() -> None:
     drive = Conducted()
     drive.give(0, 2 * SLACK)
     assert drive.exchange.run(limit_s=60.0) == compiled_loop.MISSING
+    assert drive.member.step == 0, 'the watcher has not begun the run'
+    drive.report(0)
+    assert drive.exchange.run(limit_s=60.0) == compiled_loop.MISSING
     assert drive.member.step == SLACK + 1
     assert drive.member.missing() == ('watcher',)
-    drive.channel.arrived['watcher'] += [(drive.run_id, 3.0, 1e-3), (drive.run_id, 7.0, 1e-3)]
+    drive.report(3, 7)
     assert drive.exchange.run(limit_s=60.0) == compiled_loop.MISSING
     assert drive.member.step == SLACK + 8
     assert drive.member.used == {'watcher': 7.0}
@@ -82,6 +89,7 @@ def test_the_loop_waits_for_an_observer_that_falls_behind() -> None:
 def test_the_loop_gives_the_steps_of_python() -> None:
     drive, alone = Conducted(last_step=40), build('test_signal', load())
     drive.give(0, 40)
+    drive.report(0)
     assert drive.exchange.run(every=7, limit_s=60.0) == compiled_loop.STEPPED
     assert drive.member.step == 7
     assert drive.exchange.run(limit_s=60.0) == compiled_loop.LAST_STEP
@@ -94,6 +102,7 @@ def test_the_loop_counts_late_steps_and_returns_when_it_is_asked() -> None:
     drive, pace = Conducted(last_step=5), Pace(1.0)
     pace.note(0, 1e-3, 0.0)  # due long ago, on the clock since the machine was started
     drive.give(0, 5)
+    drive.report(0)
     drive.exchange.ask()
     assert drive.exchange.run(pace=pace, limit_s=60.0) == compiled_loop.LIMIT
     assert drive.member.step == 0

@@ -64,6 +64,8 @@ def test_every_step_once_and_in_order_however_the_units_interleave(
         if rng.random() < 0.2:
             follower.receive(unit, item)  # a frame may come twice
         steps += list(follower.steps())
+    follower.finish()
+    steps += list(follower.steps())
     first, last = joined + max(ahead), joined + min(ahead) + count + 4
     assert [step.number for step in steps] == list(range(first, last + 1))
     assert follower.lost == 0
@@ -79,6 +81,32 @@ def feed(follower: Follower, steps: range, run: int = RUN) -> list[int]:
             follower.receive(unit, frame(unit, k, run))
         found += [step.number for step in follower.steps() if step.run == run]
     return found
+
+
+def test_memories_with_a_gap_are_followed_from_behind_it() -> None:
+    """Under load a unit's memory loses frames on its way; the record then begins later."""
+    follower = Follower(LENGTHS, 'test_signal')
+    found = []
+    for unit in UNITS:
+        for k in range(500, 1500):
+            if not (unit == 'plant' and 900 <= k < 930):
+                follower.receive(unit, frame(unit, k))
+            found += [step.number for step in follower.steps()]
+    assert found == list(range(930, 1500))
+    assert follower.lost == 0
+    assert feed(follower, range(1500, 1520)) == list(range(1500, 1520))
+    feed(follower, range(1530, 1540))
+    assert follower.lost == 10, 'a gap behind the beginning is a loss'
+
+
+def test_memories_of_a_drive_that_has_ended_are_kept() -> None:
+    follower = Follower(LENGTHS, 'test_signal')
+    for unit in UNITS:
+        for k in range(100, 200 + (unit == 'test_signal')):
+            follower.receive(unit, frame(unit, k))
+    assert not list(follower.steps())
+    follower.finish()
+    assert [step.number for step in follower.steps()] == list(range(100, 200))
 
 
 def test_a_new_run_begins_with_the_conductor() -> None:

@@ -66,7 +66,6 @@ def test_what_was_refused_is_never_put_in_force() -> None:
     assert not tuning.pending
     assert tuning.apply() == {}
     assert unit.in_force == []
-    assert tuning.refused == 1
 
 
 def test_what_waits_behind_a_refused_change_is_put_in_force() -> None:

@@ -18,7 +18,7 @@ from __future__ import annotations
 from pathlib import Path
 import subprocess
 
-from antenna_drive.cli import NOT_INSTALLED
+from antenna_drive.programs import NOT_INSTALLED
 from antenna_drive.remedies import REMEDIES
 from installations import bare_environment, install_in_new_venv, NODES, ROOT
 import pytest

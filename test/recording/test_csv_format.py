@@ -186,7 +186,7 @@ def test_field_columns_are_written_under_their_names(tmp_path: Path) -> None:
     assert (tmp_path / 'a.csv').read_text().splitlines() == [
         HEADER, '0.0,0.0,1.0,2.0,3.0,4.0,5.0,6.0', '0.02,-0.0,-1.0,-2.0,-3.0,-4.0,-5.0,-6.0']
     with pytest.raises(RecordingError, match='test_signal/rate_command: no such signal'):
-        write_csv(recording.select(['plant/encoder']), tmp_path / 'b.csv', field=True)
+        write_csv(recording, tmp_path / 'b.csv', field=True, names=['plant/encoder'])
 
 
 def test_nothing_is_overwritten_and_nothing_half_written(tmp_path: Path) -> None:

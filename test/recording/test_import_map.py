@@ -122,7 +122,7 @@ PLAIN = f'time: {{column: t}}\nsignals: {{{COMMAND}: {{column: r}}}}\n'
     ('t,r\n0,1\n1,x\n', "line 3, column r: 'x' is no number"),
     ('t,r\n0,1\n1,2,3\n', 'line 3: 3 cells, but the header has 2'),
     ('t,R\n0,1\n', "line 1: the column 'r' is not there"),
-    ('t,rr\n0,1\n', "line 1: the column 'r' is not there, did you mean 'rr'"),
+    ('t,rr\n0,1\n', "line 1: the column 'r' is not there, did you mean rr"),
     ('t,r,r\n0,1,1\n', "line 1: the column 'r' is there twice"),
     ('t,r\n,1\n', 'line 2, column r: there is a value, but no time stamp'),
     ('t,r\n1e300,1\n', 'line 2, column t: .*beyond'),

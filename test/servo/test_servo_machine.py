@@ -35,6 +35,7 @@ from antenna_drive.machines.servo.machine import ServoMachine
 from antenna_drive.machines.servo.physics import GRAVITY, ORDER
 from antenna_drive.machines.servo.rounds import Effort, folds, lacking, numbers
 from antenna_drive.machines.servo.study import compared, Direction, directions, summed
+from antenna_drive.programs import BAD_INPUT
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -344,7 +345,7 @@ def test_the_command_writes_the_comparison(tmp_path: Path,
 
 @pytest.mark.parametrize(('arguments', 'words'), [
     (['nowhere'], 'nowhere: no such folder'),
-    (['.', '--runs', '3'], '--runs: 3 given, allowed is 20 or more'),
+    (['.', '--runs', '3'], '--runs: 3 given, allowed is a whole number of 20 or more'),
     (['.', '--jobs', '0'], '--jobs: 0 given'),
     (['.'], 'holds no *.json logs'),
 ])
@@ -352,7 +353,7 @@ def test_wrong_input_is_told_in_one_line(arguments: list[str], words: str, tmp_p
                                          monkeypatch: pytest.MonkeyPatch,
                                          capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
-    assert cli.main(['servo', *arguments]) == cli.BAD_INPUT
+    assert cli.main(['servo', *arguments]) == BAD_INPUT
     error = capsys.readouterr().err
     assert words in error
     assert error.count('\n') == 1
@@ -362,17 +363,17 @@ def test_logs_that_cannot_serve_are_told_in_one_line(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for kp in (100.0, 200.0):
         log_of(made(kp, 'slow', 1.0), tmp_path / f'{kp:g}.json')
-    assert cli.main(['servo', str(tmp_path)]) == cli.BAD_INPUT
+    assert cli.main(['servo', str(tmp_path)]) == BAD_INPUT
     assert 'nothing can be withheld' in capsys.readouterr().err
     log_of(made(400.0, 'slow', 1.0), tmp_path / '400.json')
-    assert cli.main(['servo', str(tmp_path), '--without', 'gearbox.magic']) == cli.BAD_INPUT
+    assert cli.main(['servo', str(tmp_path), '--without', 'gearbox.magic']) == BAD_INPUT
     assert 'gearbox.magic: no such effect' in capsys.readouterr().err
     text = (tmp_path / '400.json').read_text()
     (tmp_path / '400.json').write_text(text.replace('xl330', 'mx64'))
-    assert cli.main(['servo', str(tmp_path)]) == cli.BAD_INPUT
+    assert cli.main(['servo', str(tmp_path)]) == BAD_INPUT
     assert "motor: 'mx64' given, the drive law is known of xl330" in capsys.readouterr().err
     (tmp_path / '400.json').write_text(text.replace('"mass": 0.5', '"mass": 0'))
-    assert cli.main(['servo', str(tmp_path)]) == cli.BAD_INPUT
+    assert cli.main(['servo', str(tmp_path)]) == BAD_INPUT
     assert '400: mass: 0 given, allowed is more than 0' in capsys.readouterr().err
 
 

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import csv
 import hashlib
-import importlib.util
 import json
 from pathlib import Path
 import shutil
@@ -220,7 +219,6 @@ def stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     launcher.write_text(f'#!/bin/sh\nexec {sys.executable} {program} "$@"\n')
     launcher.chmod(0o755)
     monkeypatch.setattr(sys, 'executable', str(launcher))
-    monkeypatch.setattr(importlib.util, 'find_spec', lambda name: name)
     return tmp_path / 'told.txt'
 
 

@@ -27,8 +27,7 @@ from antenna_drive.trial import batch, imperfections, sealing, waveform
 from antenna_drive.trial.cases import build_machine, draw_truths
 from antenna_drive.trial.detectability import PERFECT
 from antenna_drive.trial.family import FAMILIES
-from antenna_drive.trial.machine import reference_machine
-from antenna_drive.trial.nominal import COUNTER_TORQUE_GAIN, DIFFERENCE_GAIN, FILTER_1, TACH_GAIN
+from antenna_drive.trial.machine import FILTER_1, nominal, reference_machine
 from antenna_drive.trial.real_antenna import simulate
 from antenna_drive.trial.sensors import record
 from antenna_drive.trial.sheet import CaseSheet
@@ -236,8 +235,9 @@ def test_zero_in_the_loop_makes_the_currents_differ_as_the_integrators_demand(ki
     off.motors['tach_offset'][0] = zero
     (before, rate), (after, slower) = steady(exact, sheet), steady(off, sheet)
     filter_1 = FILTER_1[kind]
-    expected = (TACH_GAIN.value * zero / (2.0 * COUNTER_TORQUE_GAIN.value)
-                / (filter_1.gain / filter_1.pole) / DIFFERENCE_GAIN.value)
+    expected = (nominal('motors', 'tach_gain') * zero
+                / (2.0 * nominal('circuit', 'counter_torque_gain'))
+                / (filter_1['gain'] / filter_1['pole']) / nominal('circuit', 'difference_gain'))
     assert after - before == pytest.approx(expected, rel=0.02)
     assert slower - rate == pytest.approx(-0.5 * zero, rel=0.02)
 

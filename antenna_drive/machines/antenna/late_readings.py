@@ -63,7 +63,8 @@ def read_at(time: FloatArray, out: FloatArray, wanted: FloatArray, late: FloatAr
 
 
 @compiled
-def _read_at(time, out, wanted, late, found):  # type: ignore[no-untyped-def]
+def _read_at(time: FloatArray, out: FloatArray, wanted: FloatArray, late: FloatArray,
+             found: FloatArray) -> None:
     last = time.size - 1
     for c in range(late.size):
         i = 0

@@ -1,0 +1,76 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""From a command line to an exit code: what the programs of this package have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+import signal
+import sys
+
+from antenna_drive.errors import UserError
+from antenna_drive.remedies import remedy
+
+OK, NEGATIVE, BAD_INPUT, NOT_INSTALLED = 0, 1, 2, 3
+
+
+def run_program(name: str, description: str, args: Sequence[str] | None,
+                act: Callable[[list[str]], int]) -> int:
+    """
+    Run a program or print its help; return its exit code.
+
+    Parameters
+    ----------
+    name
+        of the program, at the start of its error messages
+    description
+        what --help prints
+    args
+        command line without the program's name; None for the process's own
+    act
+        the program, from its arguments to its exit code
+
+    """
+    arguments = list(sys.argv[1:] if args is None else args)
+    if '-h' in arguments or '--help' in arguments:
+        print(description.strip())
+        return OK
+    return answered(name, lambda: act(arguments))
+
+
+def answered(name: str, act: Callable[[], int]) -> int:
+    """Return the exit code of `act`; say in one line what the user can mend."""
+    try:
+        return act()
+    except UserError as error:
+        return say(name, str(error), BAD_INPUT)
+    except ModuleNotFoundError as error:
+        needed = remedy(error)
+        if needed is None:
+            raise
+        return say(name, needed, NOT_INSTALLED)
+
+
+def say(name: str, message: str, status: int) -> int:
+    """Print a message of a program to standard error, in one line; return the exit code."""
+    print(f'{name}: {" ".join(message.split())}', file=sys.stderr)
+    return status
+
+
+def end_with_parent() -> None:
+    """Let the kernel send SIGTERM to this process when its parent ends (on Linux)."""
+    if sys.platform.startswith('linux'):
+        import ctypes
+        pr_set_pdeathsig = 1  # linux/prctl.h
+        ctypes.CDLL(None).prctl(pr_set_pdeathsig, int(signal.SIGTERM))
