@@ -32,6 +32,9 @@ from antenna_drive.diagnosis.settings import DEFAULT, Settings
 import numpy as np
 from scipy import linalg
 
+# share of a single-precision column's power that may be rounding
+_ROUNDING = 1e-6
+
 
 @dataclass(frozen=True)
 class Confusability:
@@ -132,7 +135,7 @@ def visibility(problem: LeastSquares, state: FitState,
         units.append(first.unit)
         # an effect is named if it gains more than its price, and is larger than its tolerance
         sizes.append(max(np.sqrt(2.0 * price / power), first.tolerance)
-                     if power > 1e-9 else np.inf)
+                     if power > _ROUNDING * float(column @ column) else np.inf)
         remainders.append(column - state.jacobian @ imitated)
     matrix = np.array(remainders)
     gram = matrix @ matrix.T

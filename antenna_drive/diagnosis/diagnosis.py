@@ -224,5 +224,5 @@ def _evidence(problem: LeastSquares, hypotheses: Sequence[Hypothesis], best: Hyp
     top = verdict.best(hypotheses, problem.settings)
     raw = problem.residuals({})
     return Evidence(hypotheses, [
-        lack_of_fit(problem, raw, best if h is top else h, explained if h.effects else None)
+        lack_of_fit(problem, raw, best if h is top else h, explained if h.named else None)
         for h in hypotheses])

@@ -293,7 +293,8 @@ def _sensor_effects(into: _Catalogue, encoder_digit: float) -> None:
                                ReadingGain(channel, (f'{motor}.ammeter.gain',)))))
         into.add(current, 'offset', 'drift of the ammeter', 'reading shifted',
                  _form(_number('offset', 'A', -1.0, 1.0, 1e-3,
-                               ReadingZero(channel, (f'{motor}.ammeter.offset',)))))
+                               ReadingZero(channel, (f'{motor}.ammeter.offset',)),
+                               healthy=0.02)))
     into.add('encoder', 'quantisation', 'bits of the encoder are lost', 'steps in the angle',
              _quantisation(encoder_digit))
     into.add('encoder', 'cyclic_error', 'eccentric scale or uneven interpolation',
