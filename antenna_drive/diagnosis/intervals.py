@@ -14,9 +14,10 @@
 """
 Intervals of fitted values, by Laplace's approximation.
 
-A Hessian of derivatives that are right to a percent knows nothing of directions in which two
-columns differ by less. There the priors alone count: without that, a change of a number and the
-tolerance of the same number would be told apart by the rounding of a difference quotient.
+Difference quotients of a drive that sticks and slips are right to a tenth. A Hessian of them knows
+nothing of directions in which two columns differ by less. There the priors alone count: without
+that, a change of a number and the tolerance of the same number would be told apart by the error of
+a difference quotient.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from typing import Any
 
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.least_squares import FitState, prior_precision
-from antenna_drive.diagnosis.machine import FloatArray
+from antenna_drive.diagnosis.machine import FloatArray, Parameter
 from antenna_drive.diagnosis.settings import IntervalSettings
 import numpy as np
 
@@ -68,9 +69,15 @@ def values_with_intervals(hypothesis: Hypothesis, left: float,
     found = {}
     for parameter, value in hypothesis.values:
         half_width = _TWO_SIDED_95 * float(np.hypot(
-            sigma[names.index(parameter.name)], settings.model_error * abs(value)))
+            max(sigma[names.index(parameter.name)], _same_number(parameter, value)),
+            settings.model_error * abs(value)))
         found[parameter.name] = {
             'value': value, 'ci95': [max(value - half_width, parameter.low),
                                      min(value + half_width, parameter.high)],
             'unit': parameter.unit}
     return found
+
+
+def _same_number(parameter: Parameter, value: float) -> float:
+    """Return the standard deviation that the tolerance of the same number adds to a change."""
+    return parameter.tolerance / 3.0 ** 0.5 * (abs(1.0 + value) if parameter.unit == '1' else 1.0)

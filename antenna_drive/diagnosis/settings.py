@@ -230,7 +230,7 @@ class IntervalSettings:
     """Intervals of fitted values."""
 
     derivative_error: float = _setting(
-        0.01, '1', 'share of a derivative that may be wrong', WILD)
+        0.1, '1', 'share of a derivative that may be wrong', WILD)
     model_error: float = _setting(
         3e-3, '1', 'standard deviation that every value has, as a share of itself', WILD)
 
