@@ -31,7 +31,7 @@ For example:
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -60,6 +60,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='write the configuration with what was found to FILE (.yaml)')
     parser.add_argument('--jobs', type=int, default=2, metavar='N',
                         help='simulations at once (default: 2)')
+    parser.add_argument('--without', action='append', default=[], metavar='EFFECT',
+                        help='leave an effect out of the catalogue, to see what is then said')
+    parser.add_argument('--matters', action='append', default=[], metavar='SIGNAL=VALUE',
+                        help="say of a signal's remainder beyond noise whether it is larger than "
+                             'VALUE, in the unit of the signal, e.g. current_1=0.05')
     parser.add_argument('--threshold', action='append', default=[], metavar='NAME=VALUE',
                         help='change a threshold; antenna-drive thresholds lists them')
 
@@ -73,6 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_options(arguments, jobs=Entry('', 1, whole=True))
     drive = load(*arguments.config)
     settings = _settings(arguments.threshold)
+    limits = dict(_numbers('--matters', arguments.matters))
     recordings = {}
     with warnings_in_one_line():
         for path in arguments.recordings:
@@ -83,7 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
     with Progress('diagnosis', 1.0) as progress:
         diagnosis = diagnose_recordings(
             recordings, drive, lambda share, doing: progress.update(share), arguments.jobs,
-            settings)
+            settings, arguments.without, limits)
     correction = corrected(drive, diagnosis)
     if arguments.report:
         from antenna_drive.diagnosis.page import contents
@@ -104,18 +110,24 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _numbers(option: str, texts: Sequence[str]) -> Iterator[tuple[str, float]]:
+    """Yield name and value of each NAME=VALUE."""
+    for text in texts:
+        name, _, value = text.partition('=')
+        try:
+            yield name, float(value)
+        except ValueError as error:
+            raise UserError(f'{option} {text}: {value!r} given, allowed is a number') from error
+
+
 def _settings(changes: Sequence[str]) -> Settings:
     """Return the thresholds with what was given changed."""
     from antenna_drive.diagnosis.settings import DEFAULT
     settings = DEFAULT
     known = {name: value for name, _, value in DEFAULT.entries()}
-    for text in changes:
-        name, equals, value = text.partition('=')
+    for name, value in _numbers('--threshold', changes):
         if name not in known:
-            raise UserError(f'--threshold {text}: {name}: no such threshold; '
-                            'antenna-drive thresholds lists them')
-        try:
-            settings = settings.changed(name, type(known[name])(value))
-        except ValueError as error:
-            raise UserError(f'--threshold {text}: {value!r} given, allowed is a number') from error
+            raise UserError(f'--threshold {name}: no such threshold; antenna-drive thresholds '
+                            'lists them')
+        settings = settings.changed(name, type(known[name])(value))
     return settings

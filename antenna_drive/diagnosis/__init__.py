@@ -25,15 +25,15 @@ from antenna_drive.diagnosis.evidence import Evidence
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.least_squares import LeastSquares
 from antenna_drive.diagnosis.machine import (
-    Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point,
-    Regimes, TimeScales,
+    Colour, Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Parameter,
+    Point, Regimes, TimeScales,
 )
 from antenna_drive.diagnosis.motion import Motion
 from antenna_drive.diagnosis.ranking import rank_hypotheses, Ranking
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
 
 __all__ = [
-    'check_machine', 'Confusability', 'confusability', 'Course', 'DEFAULT', 'diagnose',
+    'check_machine', 'Colour', 'Confusability', 'confusability', 'Course', 'DEFAULT', 'diagnose',
     'Diagnosis', 'Diagram', 'DiagramBlock', 'DisturbanceInput', 'Effect', 'Evidence', 'Experiment',
     'FloatArray', 'Form', 'Hypothesis', 'idle_effects', 'LeastSquares', 'Machine', 'MachineError',
     'Motion', 'Parameter', 'Point', 'Progress', 'rank_hypotheses', 'Ranking', 'Regimes',

@@ -23,12 +23,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
-from antenna_drive.diagnosis.least_squares import LeastSquares, prior_precision
+from antenna_drive.diagnosis.least_squares import FitState, LeastSquares, prior_precision
 from antenna_drive.diagnosis.machine import FloatArray, Machine
+from antenna_drive.diagnosis.noise import with_model_error
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
 import numpy as np
 from scipy import linalg
+
+# share of a single-precision column's power that may be rounding
+_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -95,10 +100,28 @@ def confusability(machine: Machine, progress: Callable[[float], None] = lambda s
         thresholds
 
     """
-    problem = LeastSquares(machine, settings=settings)
-    state = problem.start(machine.nuisances, {})
+    problem = LeastSquares(machine.with_experiments(
+        with_model_error(machine.experiments, settings.noise)), settings=settings)
+    return visibility(problem, problem.start(machine.nuisances, {}), progress)
+
+
+def visibility(problem: LeastSquares, state: FitState,
+               progress: Callable[[float], None] = lambda share: None) -> Confusability:
+    """
+    Say how large each effect must be to show beside a fit of the nuisances, and what it is like.
+
+    Parameters
+    ----------
+    problem, state
+        the tests, and a fit of the nuisances with its Jacobian
+    progress
+        called with the share that is done
+
+    """
+    machine, settings = problem.machine, problem.settings
     factor = linalg.cho_factor(state.hessian + np.diag(prior_precision(state.parameters)))
     ids, units, sizes, remainders = [], [], [], []
+    price = settings.penalty.effect + settings.penalty.parameter
     for i, effect in enumerate(machine.effects.values()):
         progress(i / len(machine.effects))
         form = machine.typical_form(effect)
@@ -110,8 +133,9 @@ def confusability(machine: Machine, progress: Callable[[float], None] = lambda s
         power = float(column @ column - cross @ imitated)
         ids.append(effect.id)
         units.append(first.unit)
-        sizes.append(np.sqrt(2.0 * settings.confusability.detectable / power)
-                     if power > 1e-9 else np.inf)
+        # an effect is named if it gains more than its price, and is larger than its tolerance
+        sizes.append(max(np.sqrt(2.0 * price / power), first.tolerance)
+                     if power > _ROUNDING * float(column @ column) else np.inf)
         remainders.append(column - state.jacobian @ imitated)
     matrix = np.array(remainders)
     gram = matrix @ matrix.T
@@ -119,3 +143,11 @@ def confusability(machine: Machine, progress: Callable[[float], None] = lambda s
     alike = (gram / np.outer(size, size)) ** 2
     return Confusability(tuple(ids), np.array(sizes), tuple(units), np.asarray(alike),
                          settings.confusability.alike)
+
+
+def could_hide(problem: LeastSquares, state: FitState) -> list[dict[str, Any]]:
+    """Return how large each effect could be and still hide in these tests, for the JSON."""
+    found = visibility(problem, problem.refreshed(state, central=False))
+    return [{'effect': effect, 'size': float(size) if np.isfinite(size) else None, 'unit': unit}
+            for effect, size, unit in zip(found.effects, found.detectable, found.units,
+                                          strict=True)]

@@ -27,16 +27,17 @@ from typing import Any
 
 from antenna_drive.diagnosis import localisation, unknown_input, verdict
 from antenna_drive.diagnosis.check import check_machine
-from antenna_drive.diagnosis.elimination import backward_elimination
+from antenna_drive.diagnosis.confusability import could_hide
+from antenna_drive.diagnosis.elimination import backward_elimination, forward_selection
 from antenna_drive.diagnosis.evidence import Evidence
 from antenna_drive.diagnosis.held_out import held_out
 from antenna_drive.diagnosis.hypothesis import Hypothesis
-from antenna_drive.diagnosis.lack_of_fit import lack_of_fit, residual_tests
-from antenna_drive.diagnosis.least_squares import LeastSquares, prior_precision
+from antenna_drive.diagnosis.intervals import values_with_intervals
+from antenna_drive.diagnosis.lack_of_fit import lack_of_fit, remains, residual_tests
+from antenna_drive.diagnosis.least_squares import LeastSquares
 from antenna_drive.diagnosis.machine import Machine
 from antenna_drive.diagnosis.search import Search
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
-import numpy as np
 try:
     from threadpoolctl import threadpool_limits
 except ImportError:  # no ROS distribution names it: the results are the same, only slower
@@ -48,6 +49,7 @@ _LISTED = 12
 
 _HEADLINES = {
     'no_gap': 'no gap: machine and model agree within tolerance and noise',
+    'too_few_to_judge': 'too few samples to judge: no gap shows, and none could',
     'explained': 'explained: one of the known effects closes the gap',
     'partly_explained': 'partly explained: a known effect closes some of the gap',
     'unknown_effect': 'unknown effect: nothing in the catalogue closes the gap',
@@ -93,15 +95,39 @@ class Diagnosis:
             place = result['may_enter_at'][0]
             lines.append(f'  what is not named most likely enters as {place["name"]}, which could '
                          f'explain {100.0 * place["explained"]:.0f} % of the gap')
-        fraction = result['how_far']['explained_fraction']
-        if fraction['value'] is not None:
-            lines.append(f'  explains {share_text(fraction)}, judged on '
-                         f'{result["how_far"]["held_out"]}')
-        elif result['verdict'] != 'no_gap' and fraction.get('reason'):
-            lines.append('  how much of the gap that explains cannot be judged on withheld data: '
-                         f'{fraction["reason"]}')
+        lines += [f'  {line}' for line in _closed(result)]
+        lines += [f'  also seen: {item["effect"]}, {_why_small(item)}'
+                  for item in result['also_seen']]
+        lines += [f'  remains: {line}' for line in _remainders(result['remains'])]
         lines += [f'  note: {note}' for note in result['notes']]
         return '\n'.join(lines)
+
+
+def _closed(result: Mapping[str, Any]) -> list[str]:
+    """Return how much of the gap is closed, and by what."""
+    fraction, named = result['how_far']['explained_fraction'], result['statements']['named']
+    if not named['best_of_catalogue']:
+        return []
+    names = ' and '.join(named['best_of_catalogue'])
+    if fraction['value'] is None:
+        return [f'how much of the gap {names} explains cannot be judged on withheld data: '
+                f'{fraction["reason"]}'] if fraction.get('reason') else []
+    return [f'{names} explains {share_text(fraction)}, judged on {result["how_far"]["held_out"]}']
+
+
+def _why_small(item: Mapping[str, Any]) -> str:
+    if item['within_tolerance']:
+        return 'within its tolerance'
+    return f'explains {100.0 * item["share"]:.2g} % of the gap'
+
+
+def _remainders(remains: Mapping[str, Any]) -> list[str]:
+    """Return what remains of the signals that matter, or of all if nobody said which do."""
+    asked = any(item.get('matters') is not None for item in remains.values())
+    return [f'{signal} {item["beyond_noise"]:.2g} {item["unit"]} beyond noise of '
+            f'{item["noise"]:.2g} {item["unit"]}' + (', which matters' if asked else '')
+            for signal, item in remains.items() if 'rms' in item
+            and (item['matters'] if asked else item['beyond_noise'] > item['noise'])]
 
 
 def share_text(fraction: Mapping[str, Any]) -> str:
@@ -123,7 +149,8 @@ def value_lines(parameters: Mapping[str, Any]) -> list[str]:
 
 
 def diagnose(machine: Machine, progress: Progress = lambda share, doing: None, threads: int = 2,
-             settings: Settings = DEFAULT) -> Diagnosis:
+             settings: Settings = DEFAULT, limits: Mapping[str, float] | None = None,
+             ) -> Diagnosis:
     """
     Diagnose a machine in its experiments.
 
@@ -137,6 +164,8 @@ def diagnose(machine: Machine, progress: Progress = lambda share, doing: None, t
         how many hypotheses are fitted at once
     settings
         thresholds
+    limits
+        for some signals, the remainder beyond noise from which it matters, in the signal's unit
 
     Raises
     ------
@@ -146,15 +175,16 @@ def diagnose(machine: Machine, progress: Progress = lambda share, doing: None, t
     check_machine(machine)
     # whole fits run side by side: their matrices need no threads of their own
     with threadpool_limits(1, 'blas') if threadpool_limits else nullcontext():
-        return _diagnose(machine, progress, threads, settings)
+        return _diagnose(machine, progress, threads, settings, limits or {})
 
 
-def _diagnose(machine: Machine, progress: Progress, threads: int,
-              settings: Settings) -> Diagnosis:
+def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Settings,
+              limits: Mapping[str, float]) -> Diagnosis:
     began = time.monotonic()
     search = Search(LeastSquares(machine, settings=settings),
                     lambda share, doing: progress(0.9 * share, doing), threads)
-    hypotheses, best = backward_elimination(search, search.run(), settings)
+    hypotheses, best = forward_selection(
+        search, *backward_elimination(search, search.run(), settings), settings)
     # the noise is that of the motion that was found
     problem = search.whole
     none = hypotheses[0]
@@ -169,12 +199,18 @@ def _diagnose(machine: Machine, progress: Progress, threads: int,
         located, places = localisation.of_the_unknown(problem, none.state, lack)
     if decision.word != 'unknown_effect':
         located = localisation.of_effects(problem, decision.answers, none.state, best.state)
+    left = problem.noise_level(best.state.residual) ** 2
     result = {
         'verdict': decision.word,
+        'statements': verdict.statements(decision, best),
         'where': located,
-        'which': verdict.which(decision, settings.verdict, _values),
+        'which': verdict.which(decision, settings.verdict, lambda answer: values_with_intervals(
+            answer, left, settings.interval)),
+        'also_seen': verdict.also_seen(hypotheses, settings),
         'confusable': decision.confusable,
         'how_far': reach,
+        'could_hide': could_hide(problem, best.state) if decision.word == 'no_gap' else [],
+        'remains': remains(problem, best.state, limits),
         'residual_tests': residual_tests(problem, best.state, lack),
         'may_enter_at': [vars(place) for place in places if place.evidence > 0.0],
         'fits': evidence.as_data(),
@@ -191,23 +227,5 @@ def _evidence(problem: LeastSquares, hypotheses: Sequence[Hypothesis], best: Hyp
     top = verdict.best(hypotheses, problem.settings)
     raw = problem.residuals({})
     return Evidence(hypotheses, [
-        lack_of_fit(problem, raw, best if h is top else h, explained if h.effects else None)
+        lack_of_fit(problem, raw, best if h is top else h, explained if h.named else None)
         for h in hypotheses])
-
-
-def _values(hypothesis: Hypothesis) -> dict[str, Any]:
-    """Return the values of a hypothesis' effects with 95 percent intervals (Laplace)."""
-    state = hypothesis.state
-    hessian = state.hessian + np.diag(prior_precision(state.parameters))
-    scale = np.sqrt(np.maximum(np.diag(hessian), 1e-30))
-    covariance = np.linalg.pinv(hessian / np.outer(scale, scale)) / np.outer(scale, scale)
-    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    names = [p.name for p in state.parameters]
-    found = {}
-    for parameter, value in hypothesis.values:
-        half_width = 1.96 * float(sigma[names.index(parameter.name)])
-        found[parameter.name] = {
-            'value': value, 'ci95': [max(value - half_width, parameter.low),
-                                     min(value + half_width, parameter.high)],
-            'unit': parameter.unit}
-    return found

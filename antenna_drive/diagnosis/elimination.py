@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Backward elimination: whether each effect of a hypothesis is needed.
+Stepwise selection: whether each effect of a hypothesis is needed, and whether another one is.
 
 A fit of a hundred nuisances may stop before it has converged, and that looks like a weak effect.
 Where an effect gains little, the fit without it is therefore run until it has converged.
@@ -37,6 +37,13 @@ class Fits(Protocol):
 
     def without(self, hypothesis: Hypothesis, effect: str) -> Hypothesis:
         """Return a hypothesis without one of its effects, fitted until it has converged."""
+
+    def with_another(self, hypothesis: Hypothesis) -> list[Hypothesis]:
+        """Return a hypothesis whose fit has converged with each of a few more effects."""
+
+    def judged_by(self, best: Hypothesis,
+                  hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return hypotheses with their costs at the noise that one of them leaves."""
 
 
 def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings: Settings,
@@ -80,3 +87,41 @@ def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings:
         leading = verdict.best(list(found.values()), settings)
         if leading is not best:
             best, converged = leading, fits.converged(leading)
+
+
+def forward_selection(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
+                      settings: Settings) -> tuple[list[Hypothesis], Hypothesis]:
+    """
+    Add effects to a pair one after the other, until none is worth its price.
+
+    Parameters
+    ----------
+    fits
+        the search that the hypotheses come from
+    hypotheses
+        from `backward_elimination`
+    best
+        the best of them, with a fit that has converged
+    settings
+        thresholds
+
+    Returns
+    -------
+    the hypotheses, and the best of them with a fit that has converged
+
+    """
+    found = list(hypotheses)
+    while 2 <= len(best.effects) < settings.search.most_effects:
+        # the best as it has converged, so that it does not lose to fits that went further
+        found = [best if set(h.effects) == set(best.effects) else h for h in found]
+        more = fits.with_another(best)
+        if not more:
+            break
+        found = fits.judged_by(min(more, key=lambda h: h.cost), [*found, *more])
+        leading = verdict.best(found, settings)
+        if len(leading.effects) <= len(best.effects):
+            found = fits.judged_by(leading, found)
+            best = next(h for h in found if set(h.effects) == set(best.effects))
+            break
+        best = fits.converged(leading)
+    return found, best

@@ -74,13 +74,15 @@ class Evidence:
 def _form_data(form: Form, point: Mapping[str, float]) -> dict[str, Any]:
     return {'name': form.name, 'scanned': form.scanned, 'parameters': [
         {'name': p.name, 'unit': p.unit, 'value': point[p.name], 'low': p.low, 'high': p.high,
-         'prior_sigma': p.prior_sigma, 'tolerance': p.tolerance} for p in form.parameters]}
+         'prior_sigma': p.prior_sigma, 'tolerance': p.tolerance, 'is_shape': p.is_shape}
+        for p in form.parameters]}
 
 
 def _hypothesis(data: Mapping[str, Any]) -> Hypothesis:
     forms = tuple(Form(form['name'], tuple(
         Parameter(p['name'], p['unit'], p['low'], p['high'], 1.0, p['prior_sigma'],
-                  tolerance=p['tolerance']) for p in form['parameters']),
+                  tolerance=p['tolerance'], is_shape=p.get('is_shape', False))
+        for p in form['parameters']),
         scanned=form['scanned']) for form in data['forms'])
     values = [p['value'] for form in data['forms'] for p in form['parameters']]
     none = np.zeros(0)

@@ -15,7 +15,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 from antenna_drive.diagnosis.least_squares import FitState
@@ -50,6 +50,18 @@ class Hypothesis:
         """Return the parameters of the effects with their values."""
         point = self.state.point()
         return [(p, point[p.name]) for form in self.forms for p in form.parameters]
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Return the effects that are larger than a machine in good order may have."""
+        point = self.state.point()
+        return tuple(effect for effect, form in zip(self.effects, self.forms, strict=True)
+                     if any(abs(point[p.name]) > p.tolerance for p in form.sizes))
+
+    def parameters_of(self, effects: Collection[str]) -> set[str]:
+        """Return the names of the parameters of some of its effects."""
+        return {p.name for effect, form in zip(self.effects, self.forms, strict=True)
+                if effect in effects for p in form.parameters}
 
     @property
     def has_course(self) -> bool:

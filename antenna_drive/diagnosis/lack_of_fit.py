@@ -15,6 +15,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from antenna_drive.diagnosis import residual_statistics as statistics
@@ -46,7 +47,7 @@ def lack_of_fit(problem: LeastSquares, raw: FloatArray, best: Hypothesis,
     point = best.state.point()
     implausibility = max((form.implausibility(point) for form in best.forms), default=0.0)
     return LackOfFit(_slow_excess(problem, best.state), _left(problem, raw, best), fast,
-                     fast_left, implausibility, explained, loudest)
+                     fast_left, implausibility, explained, loudest, _enough(problem))
 
 
 def _slow_excess(problem: LeastSquares, state: FitState) -> float:
@@ -60,12 +61,22 @@ def _slow_excess(problem: LeastSquares, state: FitState) -> float:
     found = []
     for k, experiment in enumerate(problem.experiments):
         z = np.clip(problem.residuals_of(state, k), -settings.clip, settings.clip)
-        # at rest the residual of a quantised reading is a fraction of a digit, and not noise
-        found += [statistics.slow_excess(z[:, c], settings)
-                  for c, channel in enumerate(experiment.channels)
-                  if channel not in experiment.quantised
-                  and np.isfinite(z[:, c]).sum() > settings.least_samples]
+        for c, channel in enumerate(experiment.channels):
+            count = np.isfinite(z[:, c]).sum()
+            # at rest the residual of a quantised reading is a fraction of a digit, and not noise
+            if channel in experiment.quantised or not count:
+                continue
+            # few samples have no slow part: their size alone speaks
+            found.append(statistics.slow_excess(z[:, c], settings)
+                         if count > settings.least_samples
+                         else statistics.power(z[:, c], settings) - 1.0)
     return float(np.mean(np.maximum(found, settings.least_excess))) if found else 0.0
+
+
+def _enough(problem: LeastSquares) -> bool:
+    """Return whether a signal has so many samples that its residual can be judged."""
+    least = problem.settings.lack_of_fit.least_samples
+    return any((np.isfinite(e.measured).sum(axis=0) > least).any() for e in problem.experiments)
 
 
 def _left(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> float:
@@ -77,9 +88,10 @@ def _left(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> float:
         z = problem.residuals_of(best.state, k)
         first = raw[problem.rows(k)].reshape(experiment.measured.shape)
         for c, channel in enumerate(experiment.channels):
-            if channel in experiment.quantised or not np.isfinite(z[:, c]).any():
+            there = np.isfinite(z[:, c])
+            if channel in experiment.quantised or there.sum() < 2:
                 continue
-            white = 0.5 * float(np.nanmean(np.diff(z[:, c]) ** 2))
+            white = 0.5 * float(np.mean(np.diff(z[there, c]) ** 2))
             greatest = settings.greatest_energy
             energy += [min(float(np.nanmean(z[:, c] ** 2)), greatest) - white,
                        min(float(np.mean(first[:, c] ** 2)), greatest) - white]
@@ -112,6 +124,47 @@ def _fast(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> tuple[str
                 signal, loudest = channel, float(now)
                 share = float(np.clip((now - 1.0) / max(before - 1.0, 1e-3), 0.0, 1.0))
     return signal, loudest, share
+
+
+def remains(problem: LeastSquares, state: FitState,
+            limits: Mapping[str, float]) -> dict[str, dict[str, Any]]:
+    """
+    Return what a hypothesis leaves of each signal, in its own unit, for the JSON.
+
+    Parameters
+    ----------
+    problem
+        the whole tests
+    state
+        of the hypothesis
+    limits
+        for some signals, the remainder beyond noise from which it matters
+
+    """
+    predicted = problem.machine.simulate([state.point()])[0]
+    found: dict[str, dict[str, Any]] = {}
+    first = problem.experiments[0]
+    for c, (channel, unit) in enumerate(zip(first.channels, first.units, strict=True)):
+        gaps, noises = [], []
+        for experiment, values in zip(problem.experiments, predicted, strict=True):
+            assert values is not None
+            there = np.isfinite(experiment.measured[:, c]) & np.isfinite(values[:, c])
+            gaps.append((experiment.measured[:, c] - values[:, c])[there])
+            level = experiment.colours[c].level if experiment.colours else 1.0
+            noises.append(level * experiment.noise[there, c])
+        gap, noise = np.concatenate(gaps), np.concatenate(noises)
+        if gap.size < problem.settings.lack_of_fit.least_samples:
+            found[channel] = {'unit': unit, 'too_few_to_judge': int(gap.size)}
+            continue
+        # a spike is no part of what a model leaves
+        bound = problem.settings.lack_of_fit.clip_fast * max(
+            1.4826 * float(np.median(np.abs(gap))), float(np.median(noise)))
+        rms = float(np.sqrt(np.mean(np.clip(gap, -bound, bound) ** 2)))
+        usual = float(np.sqrt(np.mean(noise ** 2)))
+        beyond = float(np.sqrt(max(rms ** 2 - usual ** 2, 0.0)))
+        found[channel] = {'unit': unit, 'rms': rms, 'noise': usual, 'beyond_noise': beyond,
+                          'matters': (beyond > limits[channel] if channel in limits else None)}
+    return found
 
 
 def residual_tests(problem: LeastSquares, state: FitState, lack: LackOfFit) -> dict[str, Any]:

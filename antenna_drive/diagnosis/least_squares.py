@@ -28,6 +28,7 @@ from functools import cached_property
 
 from antenna_drive.diagnosis.box_qp import box_constrained_step
 from antenna_drive.diagnosis.machine import FloatArray, Machine, Parameter
+from antenna_drive.diagnosis.noise import whitened
 from antenna_drive.diagnosis.settings import DEFAULT, FitSettings, Settings
 import numpy as np
 from numpy.typing import NDArray
@@ -149,7 +150,10 @@ class LeastSquares:
         experiment = self.experiments[k]
         if predicted is None:
             return np.zeros(self.sizes[k])
-        z = ((experiment.measured - predicted) / (self.scale * experiment.noise)).ravel()
+        z = (experiment.measured - predicted) / (self.scale * experiment.noise)
+        for c, colour in enumerate(experiment.colours):
+            z[:, c] = whitened(z[:, c], colour)
+        z = z.ravel()
         z[~self.valid[self.rows(k)]] = 0.0
         # a prediction that diverged is a bad one, not an error
         bound = self.settings.fit.runaway
@@ -169,6 +173,12 @@ class LeastSquares:
         """Return a state of a problem with another noise scale, without its Jacobian."""
         residual = state.residual * (scale / self.scale)
         return replace(state.without_jacobian(), residual=residual,
+                       cost=self._cost(residual, state.x, prior_precision(state.parameters)))
+
+    def judged(self, state: FitState) -> FitState:
+        """Return a state of a problem with other noise as it is in this one, not fitted."""
+        residual = self.residuals(state.point())
+        return replace(state, residual=residual, weight=self.weights(residual),
                        cost=self._cost(residual, state.x, prior_precision(state.parameters)))
 
     def noise_level(self, residual: FloatArray) -> float:

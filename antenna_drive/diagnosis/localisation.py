@@ -49,9 +49,9 @@ def of_effects(problem: LeastSquares, answers: Sequence[Answer], none: FitState,
     """
     parts: dict[str, float] = {}
     for answer in answers:
-        for effect in answer.hypothesis.effects:
+        for effect in answer.effects:
             part = problem.machine.effects[effect].component
-            share = answer.probability / len(answer.hypothesis.effects)
+            share = answer.probability / len(answer.effects)
             parts[part] = parts.get(part, 0.0) + share
     return _located(problem, parts, lambda k: problem.residuals_of(none, k) ** 2
                     - problem.residuals_of(best, k) ** 2)

@@ -22,7 +22,8 @@ override, for speed or because you know your machine better.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 import math
 
@@ -144,6 +145,24 @@ class DisturbanceInput:
 
 
 @dataclass(frozen=True)
+class Colour:
+    """
+    The colour of noise: a filter whose output is white, see `noise`.
+
+    Attributes
+    ----------
+    pole : of the slow part, for one sample; 0 if there is none
+    gain : share of an innovation that stays in the slow part
+    level : standard deviation of the innovations, in units of the stated noise
+
+    """
+
+    pole: float = 0.0
+    gain: float = 0.0
+    level: float = 1.0
+
+
+@dataclass(frozen=True)
 class Experiment:
     """
     What was measured in one test.
@@ -157,6 +176,9 @@ class Experiment:
     measured : shape (n, c); NaN where there is no sample
     noise : standard deviation of the residuals of a perfect model, shape (n, c)
     quantised : names of signals whose residual at rest is a fraction of a digit, not noise
+    model_error : slow error that the model may have in each signal however right it is, shape
+        (c,), in the signals' units; None for a usual share of the motion
+    colours : of the noise, one for each signal, as a diagnosis finds it; empty for white noise
 
     """
 
@@ -167,6 +189,15 @@ class Experiment:
     measured: FloatArray
     noise: FloatArray
     quantised: tuple[str, ...] = ()
+    model_error: FloatArray | None = None
+    colours: tuple[Colour, ...] = ()
+
+    def model_error_of(self, channel: int, share: float) -> float:
+        """Return the model's error in a signal; by default a share of the signal's spread."""
+        if self.model_error is not None:
+            return float(self.model_error[channel])
+        values = self.measured[:, channel]
+        return share * float(np.nanstd(values)) if np.isfinite(values).any() else 0.0
 
 
 @dataclass(frozen=True)
@@ -314,6 +345,27 @@ class Machine(ABC):
         """Return how fast the machine is; by default in proportion to the longest test."""
         return TimeScales.of_duration(max(
             float(e.time[-1] - e.time[0]) for e in self.experiments))
+
+    def with_experiments(self, experiments: Sequence[Experiment]) -> Machine:
+        """Return the machine with the same experiments, of which more is known."""
+        other = copy(self)
+        other.experiments = tuple(experiments)
+        return other
+
+    def without(self, effects: Collection[str]) -> Machine:
+        """
+        Return the machine with a catalogue that lacks some effects, and what they are parts of.
+
+        Raises
+        ------
+        KeyError : there is no effect of a name
+
+        """
+        gone = {name for effect in effects for name in (effect, *self.effects[effect].parts)}
+        other = copy(self)
+        other.effects = {name: effect for name, effect in self.effects.items()
+                         if name not in gone and not gone.intersection(effect.parts)}
+        return other
 
     def with_noise_at(self, point: Point) -> Machine:
         """

@@ -27,6 +27,7 @@ import numpy as np
 
 _VERDICTS = {
     'no_gap': ('No gap', 'Machine and model agree within tolerance and noise.'),
+    'too_few_to_judge': ('Too few samples', 'No gap shows, and none could.'),
     'explained': ('Explained', 'A known effect closes the gap.'),
     'partly_explained': ('Partly explained', 'A known effect closes some of the gap.'),
     'unknown_effect': ('Unknown effect', 'Nothing in the catalogue closes the gap.'),

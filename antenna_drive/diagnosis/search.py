@@ -36,6 +36,7 @@ from typing import Any
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.least_squares import FitState, Jacobian, least_cost, LeastSquares
 from antenna_drive.diagnosis.machine import Parameter
+from antenna_drive.diagnosis.noise import same_noise, with_estimated_noise
 from antenna_drive.diagnosis.screening import (
     jacobian_of_form, rescaled, scan, screened, sensitivities, Sensitivity,
 )
@@ -307,6 +308,10 @@ class Search:
             none = self._sorted(refitted, bare)[0]
             priced = [self._priced(h) for h in chosen]
             anchor = chosen[0] if priced[0] < none.cost else none
+            if number + 1 < options.passes and self._noise_taken(anchor):
+                # costs compare at one and the same noise only
+                whole, before = self.whole, np.inf
+                continue
             reached = self._priced(anchor)
             chosen = [singles[0], *(h for h, price in zip(chosen, priced, strict=True)
                                     if h is not singles[0] and price < reached + options.reach)]
@@ -317,6 +322,21 @@ class Search:
         unique = {frozenset(h.effects): h for h in sorted(
             chosen, key=lambda h: -self._priced(h))}
         return [none, *sorted(unique.values(), key=self._priced)]
+
+    def _noise_taken(self, best: Hypothesis) -> bool:
+        """Take the noise from what the best hypothesis leaves; return whether it is another."""
+        machine = self.whole.machine
+        point = best.state.point()
+        predicted = machine.simulate([point])[0]
+        residuals = [e.measured - p for e, p in zip(machine.experiments, predicted, strict=True)
+                     if p is not None]
+        experiments = with_estimated_noise(
+            machine.experiments, residuals, self.whole.settings.noise)
+        if same_noise(experiments[0], machine.experiments[0], self.whole.settings.noise):
+            return False
+        self.whole = LeastSquares(machine.with_experiments(experiments),
+                                  settings=self.whole.settings)
+        return True
 
     def converged(self, hypothesis: Hypothesis) -> Hypothesis:
         """Go on with a fit, with central differences, as long as that gains much."""
@@ -330,6 +350,34 @@ class Search:
             if before - state.cost < max(options.settled, options.final_gain * before):
                 break
         return replace(hypothesis, state=state)
+
+    def with_another(self, hypothesis: Hypothesis) -> list[Hypothesis]:
+        """Return a hypothesis whose fit has converged with each of a few more effects."""
+        state = hypothesis.state
+        known = sensitivities(self.whole, state, self._pool.map)
+        promising = [item for gain, item in screened(
+            self.whole, state, known, hypothesis.effects)[:self.settings.partners]
+            if gain > self.settings.partner_gain]
+
+        def added(item: Sensitivity) -> Hypothesis:
+            more = self.whole.extended(state, item.form.parameters, [
+                p.start for p in item.form.parameters], item.jacobian)
+            return Hypothesis(
+                (*hypothesis.effects, item.effect), (*hypothesis.forms, item.form),
+                self.whole.fit(more, self.settings.full_iterations)).without_jacobian(True)
+
+        return list(self._pool.map(added, promising))
+
+    def judged_by(self, best: Hypothesis,
+                  hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """
+        Return hypotheses with their costs at the noise that one of them leaves.
+
+        Slow noise may be what an effect does that the others lack.
+        """
+        if not self._noise_taken(best):
+            return list(hypotheses)
+        return [replace(h, state=self.whole.judged(h.state)) for h in hypotheses]
 
     def without(self, hypothesis: Hypothesis, effect: str) -> Hypothesis:
         """Return a hypothesis without one of its effects, fitted until it has converged."""

@@ -30,6 +30,7 @@ DESIGN = 'design'
 PRACTICE = 'practice cases'
 TRIAL_0 = 'trial 0'
 TRIAL_2 = 'trial 2'
+WILD = 'wild practice cases'
 
 
 def _setting(default: Any, unit: str, decides: str, set_by: str = DESIGN) -> Any:
@@ -117,6 +118,7 @@ class SearchSettings:
     pair_iterations: int = _setting(6, '1', "iterations of a pair's further fit")
     settling_iterations: int = _setting(10, '1', 'iterations of a fit with fresh derivatives')
     full_iterations: int = _setting(6, '1', 'iterations of a fit to the whole tests')
+    most_effects: int = _setting(4, '1', 'greatest number of effects of a hypothesis')
     doubtful: float = _setting(
         0.25, '1', 'gain, as a share of the cost, below which an effect is fitted without and '
         'judged anew', TRIAL_2)
@@ -143,9 +145,6 @@ class VerdictSettings:
 
     temperature: float = _setting(
         8.0, 'half chi-square', 'cost that makes a hypothesis e times less probable', PRACTICE)
-    form_error: float = _setting(
-        0.02, '1', "gain, as a share of the noise's cost, that an error of the model's form may "
-        'have', TRIAL_0)
     second_effect: float = _setting(
         60.0, 'half chi-square', 'price of a second effect', PRACTICE)
     second_share: float = _setting(
@@ -208,6 +207,35 @@ class LackOfFitSettings:
 
 
 @dataclass(frozen=True)
+class NoiseSettings:
+    """The noise that a recording shows, and the error that every model has."""
+
+    model_error: float = _setting(
+        3e-3, '1', "slow error of a model, as a share of a signal's standard deviation", WILD)
+    least_level: float = _setting(
+        1.0 / 3.0, 'stated noise', 'lower bound of the level of white noise')
+    model_error_hz: float = _setting(0.3, 'Hz', "corner of a model's error in planned tests")
+    greatest_level: float = _setting(
+        3.0, 'stated noise', 'upper bound of the levels of white and of slow noise')
+    same_level: float = _setting(
+        0.05, '1', 'change of a level up to which it is the same')
+    worth_a_colour: float = _setting(
+        8.0, 'log evidence', 'evidence below which noise is white')
+    clip: float = _setting(5.0, 'residual level', 'residual beyond which a sample is an outlier')
+    least_samples: int = _setting(50, '1', 'samples below which an experiment tells no noise')
+
+
+@dataclass(frozen=True)
+class IntervalSettings:
+    """Intervals of fitted values."""
+
+    derivative_error: float = _setting(
+        0.1, '1', 'share of a derivative that may be wrong', WILD)
+    model_error: float = _setting(
+        3e-3, '1', 'standard deviation that every value has, as a share of itself', WILD)
+
+
+@dataclass(frozen=True)
 class LocalisationSettings:
     """Where the gap lies, and where an unknown input acts."""
 
@@ -240,8 +268,6 @@ class HeldOutSettings:
 class ConfusabilitySettings:
     """Which effects a planned test can tell apart, from derivatives alone."""
 
-    detectable: float = _setting(
-        12.0, 'half chi-square', 'cost without the effect from which an effect shows')
     alike: float = _setting(
         0.95, '1', 'share of what an effect does that another must imitate to pass for it')
 
@@ -254,7 +280,9 @@ class Settings:
     search: SearchSettings = SearchSettings()
     penalty: PenaltySettings = PenaltySettings()
     verdict: VerdictSettings = VerdictSettings()
+    noise: NoiseSettings = NoiseSettings()
     lack_of_fit: LackOfFitSettings = LackOfFitSettings()
+    interval: IntervalSettings = IntervalSettings()
     localisation: LocalisationSettings = LocalisationSettings()
     held_out: HeldOutSettings = HeldOutSettings()
     confusability: ConfusabilitySettings = ConfusabilitySettings()

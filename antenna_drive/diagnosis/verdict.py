@@ -24,7 +24,7 @@ hypothesis leaves.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from typing import Any
 
@@ -48,6 +48,7 @@ class LackOfFit:
     explained : upper end of the interval of what its effects explain of withheld data; None
         without effects
     loudest : signal whose fast part is the loudest
+    enough : False if no signal has samples enough to be judged
 
     """
 
@@ -58,15 +59,27 @@ class LackOfFit:
     implausibility: float = 0.0
     explained: float | None = None
     loudest: str = ''
+    enough: bool = True
 
 
 @dataclass(frozen=True)
 class Answer:
-    """A hypothesis with its score and probability."""
+    """
+    What hypotheses that name the same effects say.
+
+    Attributes
+    ----------
+    hypothesis : the one of them with the least score
+    score : its score
+    probability : of all of them
+    effects : that it names: those that are larger than their tolerances
+
+    """
 
     hypothesis: Hypothesis
     score: float
     probability: float
+    effects: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -76,7 +89,7 @@ class Decision:
 
     Attributes
     ----------
-    word : no_gap, explained, partly_explained or unknown_effect
+    word : no_gap, too_few_to_judge, explained, partly_explained or unknown_effect
     answers : the hypotheses by score, with probabilities that leave room for `unknown`
     unknown : probability of something outside the catalogue
     lack : what the best hypothesis leaves
@@ -107,12 +120,12 @@ def decide(hypotheses: Sequence[Hypothesis], lack: LackOfFit, settings: Settings
     """
     unknown = unknown_probability(lack, settings.verdict)
     answers = rank(hypotheses, unknown, settings)
-    named = best(hypotheses, settings).effects
+    named = best(hypotheses, settings).named
     top = max(answers, key=lambda answer: answer.probability)
     if unknown > top.probability:
         word = 'unknown_effect'
-    elif not top.hypothesis.effects:
-        word = 'no_gap'
+    elif not top.effects:
+        word = 'no_gap' if lack.enough else 'too_few_to_judge'
     else:
         word = 'explained' if unknown < settings.verdict.partly else 'partly_explained'
     return Decision(word, answers, unknown, lack,
@@ -134,22 +147,36 @@ def which(decision: Decision, settings: VerdictSettings,
 
     """
     entries: list[dict[str, Any]] = []
-    likeliest = set(decision.answers[0].hypothesis.effects)
+    likeliest = set(decision.answers[0].effects)
     for answer in decision.answers[:settings.entries]:
-        effects = answer.hypothesis.effects
+        effects = answer.effects
         # the members of the likeliest pair, and 'none', are listed however improbable they are
         if answer.probability >= settings.least_probability or set(effects) <= likeliest:
             entries.append({'effects': list(effects) or ['none'],
                             'probability': answer.probability,
-                            'parameters': values(answer.hypothesis)})
+                            'parameters': {
+                                name: value for name, value in values(answer.hypothesis).items()
+                                if name in answer.hypothesis.parameters_of(effects)}})
     if ['none'] not in [entry['effects'] for entry in entries]:
-        share = next(a.probability for a in decision.answers if not a.hypothesis.effects)
+        share = next(a.probability for a in decision.answers if not a.effects)
         entries.append({'effects': ['none'], 'probability': share, 'parameters': {}})
     entries.append({'effects': ['unknown'], 'probability': decision.unknown, 'parameters': {}})
     total = sum(entry['probability'] for entry in entries)
     for entry in entries:
         entry['probability'] /= total
     return sorted(entries, key=lambda entry: -entry['probability'])
+
+
+def statements(decision: Decision, best_hypothesis: Hypothesis) -> dict[str, Any]:
+    """Return what is named beside its runner-up, for the JSON."""
+    known = [(list(answer.effects) or ['none'], answer.probability)
+             for answer in decision.answers]
+    first, second, *_ = [*sorted([*known, (['unknown'], decision.unknown)],
+                                 key=lambda item: -item[1]), ([], 0.0)]
+    return {'named': {
+        'effects': first[0], 'probability': first[1],
+        'runner_up': {'effects': second[0], 'probability': second[1]},
+        'best_of_catalogue': list(best_hypothesis.named)}}
 
 
 class _Scores:
@@ -159,7 +186,6 @@ class _Scores:
         none = min(h.cost for h in hypotheses if not h.effects)
         single = min((h.cost for h in hypotheses if len(h.effects) == 1), default=none)
         self._first_gain = max(none - single, 0.0)
-        self._noise = min(h.cost for h in hypotheses)
         self._settings = settings
 
     def __call__(self, hypothesis: Hypothesis) -> float:
@@ -167,9 +193,6 @@ class _Scores:
         settings = self._settings.verdict
         count = len(hypothesis.effects)
         total = hypothesis.penalised(self._settings.penalty)
-        if count:
-            # no model has quite its machine's form
-            total += settings.form_error * self._noise
         if count > 1:
             # a second effect must do more than mend the form of the first; the same effect in
             # a second place has the same form and mends nothing
@@ -177,6 +200,29 @@ class _Scores:
             share = settings.twin_share if twins else settings.second_share
             total += (count - 1) * (settings.second_effect + share * self._first_gain)
         return total
+
+
+def also_seen(hypotheses: Sequence[Hypothesis], settings: Settings) -> list[dict[str, Any]]:
+    """
+    Return effects that show and are not worth a name, for the JSON: the greatest gain first.
+
+    Each is within its tolerance, or explains a small share of the gap beside what is named.
+    """
+    top = best(hypotheses, settings)
+    gap = max(h.cost for h in hypotheses if not h.effects) - top.cost
+    found: dict[str, dict[str, Any]] = {}
+    for hypothesis in hypotheses:
+        extra = set(hypothesis.effects) - set(top.named)
+        if len(extra) != 1 or not set(top.named) < set(hypothesis.effects):
+            continue
+        effect = extra.pop()
+        without = min(h.cost for h in hypotheses if set(h.effects) == set(top.named))
+        gain = without - hypothesis.cost
+        if gain > settings.penalty.effect and gain > found.get(effect, {}).get('gain', 0.0):
+            found[effect] = {'effect': effect, 'gain': gain,
+                             'share': min(gain / gap, 1.0) if gap > 0.0 else 0.0,
+                             'within_tolerance': effect not in hypothesis.named}
+    return sorted(found.values(), key=lambda item: -float(item['gain']))
 
 
 def unknown_probability(lack: LackOfFit, settings: VerdictSettings) -> float:
@@ -205,7 +251,7 @@ def _logistic(logit: float) -> float:
 
 def rank(hypotheses: Sequence[Hypothesis], unknown: float, settings: Settings) -> list[Answer]:
     """
-    Return the hypotheses by score, with their probabilities.
+    Return what the hypotheses name, by score, with probabilities.
 
     Parameters
     ----------
@@ -221,9 +267,14 @@ def rank(hypotheses: Sequence[Hypothesis], unknown: float, settings: Settings) -
     scores = np.array([score(h) for h in hypotheses])
     weight = np.exp(-(scores - scores.min()) / settings.verdict.temperature)
     weight /= weight.sum()
-    answers = [Answer(h, float(s), float(w) * (1.0 - unknown))
-               for h, s, w in zip(hypotheses, scores, weight, strict=True)]
-    return sorted(answers, key=lambda answer: answer.score)
+    found: dict[frozenset[str], Answer] = {}
+    for i in np.argsort(scores, kind='stable'):
+        hypothesis, share = hypotheses[i], float(weight[i]) * (1.0 - unknown)
+        first = found.get(frozenset(hypothesis.named))
+        found[frozenset(hypothesis.named)] = (
+            Answer(hypothesis, float(scores[i]), share, hypothesis.named) if first is None
+            else replace(first, probability=first.probability + share))
+    return list(found.values())
 
 
 def best(hypotheses: Sequence[Hypothesis], settings: Settings) -> Hypothesis:
@@ -240,7 +291,7 @@ def confusable(hypotheses: Sequence[Hypothesis], settings: Settings) -> list[lis
     top, score = best(hypotheses, settings), _Scores(hypotheses, settings)
     limit = score(top) + settings.verdict.confusable
     groups: list[list[str]] = []
-    for effect in top.effects:
+    for effect in top.named:
         rest = set(top.effects) - {effect}
         others = sorted((score(h), next(iter(set(h.effects) - rest)))
                         for h in hypotheses

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 UNKNOWN, NONE = 'unknown', 'none'
-VERDICTS = ('no_gap', 'explained', 'partly_explained', 'unknown_effect')
+VERDICTS = ('no_gap', 'too_few_to_judge', 'explained', 'partly_explained', 'unknown_effect')
 LARGEST_SET = 5             # ids in a confusable set that is still informative
 SUM_ERROR = 0.01            # allowed in the sum of the probabilities
 

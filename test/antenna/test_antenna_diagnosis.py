@@ -178,7 +178,7 @@ def test_confusability_knows_what_one_elevation_cannot_tell() -> None:
     tests = {name: planned(BUILT_IN['triangle'], 6.0, 100.0) for name in ('a',)}
     found = confusability_of(tests, load(), threads=1)
     at = {effect: i for i, effect in enumerate(found.effects)}
-    assert found.alike[at['axis.gravity_imbalance'], at['axis.wind_steady']] > 0.99
+    assert found.alike[at['axis.gravity_imbalance'], at['axis.wind_steady']] > found.limit
     assert found.alike[at['motor_1.torque_constant'], at['encoder.cyclic_error']] < 0.5
     assert math.isfinite(found.detectable[at['axis.viscous_friction']])
     assert any({'axis.gravity_imbalance', 'axis.wind_steady'} <= set(group)

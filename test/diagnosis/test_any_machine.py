@@ -16,6 +16,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from antenna_drive.diagnosis import (
     diagnose, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point,
@@ -23,6 +24,7 @@ from antenna_drive.diagnosis import (
 from antenna_drive.diagnosis.diagnosis import share_text
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 TIME = np.arange(0.0, 10.0, 0.02)
 NOISE = 0.01
@@ -92,6 +94,82 @@ def test_what_no_effect_does_is_unknown() -> None:
 def test_two_effects_at_once_are_both_named() -> None:
     result = diagnose(Body({'thermometer.gain.size': 0.2, 'heater.step.size': 0.5})).result
     assert set(result['which'][0]['effects']) == {'thermometer.gain', 'heater.step'}
+
+
+def test_three_effects_at_once_are_all_named() -> None:
+    result = diagnose(Body({'thermometer.gain.size': 0.2, 'heater.step.size': 0.5,
+                            'air.draught.size': 0.3})).result
+    assert set(result['which'][0]['effects']) == {
+        'thermometer.gain', 'heater.step', 'air.draught'}
+
+
+def test_an_effect_that_the_catalogue_lacks_is_unknown() -> None:
+    body = Body({'heater.step.size': -0.3})
+    whole, withheld = (diagnose(machine).result for machine in (
+        body, body.without(['heater.step'])))
+    unknown = [next(e['probability'] for e in result['which'] if e['effects'] == ['unknown'])
+               for result in (whole, withheld)]
+    assert unknown[1] > unknown[0] + 0.5
+    assert 'heater.step' in body.effects, 'the machine itself stays as it is'
+
+
+def noisier(body: Body, level: float, corner_hz: float, seed: int = 9) -> Body:
+    """Return a body whose thermometers have slow noise beside their own."""
+    random = np.random.default_rng(seed)
+    pole = float(np.exp(-2.0 * np.pi * corner_hz * 0.02))
+    for experiment in body.experiments:
+        drive = random.normal(size=(TIME.size + 500, 2)) * np.sqrt(1.0 - pole ** 2)
+        experiment.measured[:] += level * NOISE * lfilter([1.0], [1.0, -pole], drive, axis=0)[500:]
+    return body
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_slow_noise_that_no_sheet_tells_is_no_gap(seed: int) -> None:
+    result = diagnose(noisier(Body({}), 2.0, 0.5, seed)).result
+    assert result['verdict'] == 'no_gap'
+    assert result['remains']['near']['noise'] > 1.02 * NOISE
+
+
+def test_an_effect_is_named_beside_slow_noise() -> None:
+    result = diagnose(noisier(Body({'heater.step.size': -0.3}), 2.0, 0.5)).result
+    top = result['which'][0]
+    assert top['effects'] == ['heater.step']
+    low, high = top['parameters']['heater.step.size']['ci95']
+    assert low < -0.3 < high
+
+
+def test_no_gap_says_what_could_hide() -> None:
+    """Twice the size that could hide is found."""
+    hidden = {item['effect']: item['size'] for item in diagnose(Body({})).result['could_hide']}
+    assert set(hidden) == {'thermometer.gain', 'heater.step', 'air.draught'}
+    for name, size in hidden.items():
+        found = diagnose(Body({f'{name}.size': 2.0 * size})).result['which'][0]
+        assert found['effects'] == [name]
+
+
+def short(body: Body, count: int) -> Body:
+    body.experiments = tuple(
+        replace(e, measured=np.where(np.arange(TIME.size)[:, np.newaxis] % (TIME.size // count),
+                                     np.nan, e.measured)) for e in body.experiments)
+    return body
+
+
+def test_few_samples_are_too_few_to_judge() -> None:
+    assert diagnose(short(Body({}), 20)).result['verdict'] == 'too_few_to_judge'
+
+
+def test_few_samples_far_from_the_model_are_no_agreement() -> None:
+    result = diagnose(short(Body({}, odd=0.3), 20)).result
+    assert result['verdict'] not in ('no_gap', 'too_few_to_judge')
+
+
+def test_what_remains_is_said_in_the_unit_of_the_signal() -> None:
+    body = Body({}, odd=0.2)
+    remains = diagnose(body, limits={'behind': 0.05, 'near': 0.05}).result['remains']
+    assert remains['behind']['beyond_noise'] == pytest.approx(0.2 / np.sqrt(2.0), rel=0.2)
+    assert remains['behind']['unit'] == 'K'
+    assert remains['behind']['matters']
+    assert not remains['near']['matters']
 
 
 def test_a_diagnosis_says_itself_in_one_line() -> None:

@@ -83,8 +83,8 @@ def test_an_effect_lies_in_its_part_its_signal_and_its_regime() -> None:
     none = problem.fit(problem.start(problem.machine.nuisances, {}), 10)
     number = effect.forms[0].parameters[0]
     best = problem.fit(problem.start((*problem.machine.nuisances, number), {}), 10)
-    answers = [Answer(Hypothesis(('left.step',), effect.forms, best), 0.0, 0.9),
-               Answer(Hypothesis((), (), none), 9.0, 0.1)]
+    answers = [Answer(Hypothesis(('left.step',), effect.forms, best), 0.0, 0.9, ('left.step',)),
+               Answer(Hypothesis((), (), none), 9.0, 0.1, ())]
     found = of_effects(problem, answers, none, best)
     assert (found[0]['component'], found[0]['signal'], found[0]['regime']) == (
         'left', 'seen left', 'second half')

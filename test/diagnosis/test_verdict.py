@@ -15,15 +15,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
-from antenna_drive.diagnosis.elimination import backward_elimination
+from antenna_drive.diagnosis.elimination import backward_elimination, forward_selection
 from antenna_drive.diagnosis.hypothesis import Hypothesis, penalty
 from antenna_drive.diagnosis.least_squares import FitState
 from antenna_drive.diagnosis.machine import FloatArray, Form, Parameter
 from antenna_drive.diagnosis.residual_statistics import fast_power, power, slow_excess
 from antenna_drive.diagnosis.settings import DEFAULT
-from antenna_drive.diagnosis.verdict import best, LackOfFit, rank, unknown_probability
+from antenna_drive.diagnosis.verdict import (
+    also_seen, best, decide, LackOfFit, rank, unknown_probability,
+)
 from antenna_drive.machines.antenna.gust import gust_form, KNOT_S, knots
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -110,13 +113,50 @@ def test_one_effect_in_two_places_needs_less_proof_than_two_effects() -> None:
     assert rank([none, single, pair], 0.0, DEFAULT)[0].hypothesis is single
 
 
-def test_what_is_far_below_the_noise_is_no_gap() -> None:
-    """A machine whose form differs from the model's by little raises no alarm."""
-    none = fitted((), 16000.0)
-    within = fitted(('motor.gain',), 16000.0 * (1.0 - 0.8 * SETTINGS.form_error))
-    beyond = fitted(('motor.gain',), 16000.0 * (1.0 - 3.0 * SETTINGS.form_error))
-    assert rank([none, within], 0.0, DEFAULT)[0].hypothesis is none
-    assert rank([none, beyond], 0.0, DEFAULT)[0].hypothesis is beyond
+@pytest.mark.parametrize('noise_cost', [1e3, 1e6])
+def test_the_price_of_an_effect_does_not_grow_with_the_samples(noise_cost: float) -> None:
+    price = DEFAULT.penalty.effect + DEFAULT.penalty.parameter
+    none = fitted((), noise_cost)
+    little, much = (fitted(('motor.gain',), noise_cost - gain * price) for gain in (0.9, 1.1))
+    assert rank([none, little], 0.0, DEFAULT)[0].effects == ()
+    assert rank([none, much], 0.0, DEFAULT)[0].effects == ('motor.gain',)
+
+
+def within_tolerance(hypothesis: Hypothesis, *effects: str) -> Hypothesis:
+    """Return a hypothesis whose values of some effects a healthy machine may have."""
+    forms = tuple(
+        Form('', (replace(form.parameters[0], tolerance=2.0 * (effect in effects)),))
+        for effect, form in zip(hypothesis.effects, hypothesis.forms, strict=True))
+    return replace(hypothesis, forms=forms)
+
+
+def test_an_effect_within_its_tolerance_is_not_named() -> None:
+    none = fitted((), 20000.0)
+    small = within_tolerance(fitted(('motor.gain',), 19000.0), 'motor.gain')
+    answers = rank([none, small], 0.05, DEFAULT)
+    assert [answer.effects for answer in answers] == [()]
+    assert answers[0].probability == pytest.approx(0.95)
+    decision = decide([none, small], LackOfFit(0.0, 0.0), DEFAULT)
+    assert decision.word == 'no_gap'
+    assert also_seen([none, small], DEFAULT) == [
+        {'effect': 'motor.gain', 'gain': 1000.0, 'share': 1.0, 'within_tolerance': True}]
+
+
+def test_a_partner_within_its_tolerance_leaves_the_first_effect_alone() -> None:
+    none, single = fitted((), 20000.0), fitted(('axis.inertia',), 5000.0)
+    pair = within_tolerance(fitted(('axis.inertia', 'motor.gain'), 3000.0), 'motor.gain')
+    first = rank([none, single, pair], 0.05, DEFAULT)[0]
+    assert first.effects == ('axis.inertia',)
+    assert first.probability == pytest.approx(0.95, abs=1e-3)
+
+
+def test_a_small_partner_is_listed_apart() -> None:
+    none, single = fitted((), 20000.0), fitted(('axis.inertia',), 1000.0)
+    pair = fitted(('axis.inertia', 'motor.gain'), 900.0)
+    assert rank([none, single, pair], 0.0, DEFAULT)[0].effects == ('axis.inertia',)
+    [seen] = also_seen([none, single, pair], DEFAULT)
+    assert seen == {'effect': 'motor.gain', 'gain': 100.0, 'within_tolerance': False,
+                    'share': pytest.approx(100.0 / 19000.0)}
 
 
 class Ends:
@@ -133,6 +173,14 @@ class Ends:
         rest = tuple(e for e in hypothesis.effects if e != effect)
         self.asked.append(rest)
         return fitted(rest, self.ends[rest])
+
+    def with_another(self, hypothesis: Hypothesis) -> list[Hypothesis]:
+        return [fitted(more, cost) for more, cost in self.ends.items()
+                if set(hypothesis.effects) < set(more)]
+
+    def judged_by(self, best: Hypothesis,
+                  hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        return list(hypotheses)
 
 
 def test_a_fit_of_the_offsets_that_got_stuck_raises_no_alarm() -> None:
@@ -164,3 +212,11 @@ def test_a_strong_effect_is_not_doubted() -> None:
     fits = Ends({('a',): 16000.0})
     backward_elimination(fits, [fitted((), 160000.0), fitted(('a',), 16000.0)], DEFAULT)
     assert not fits.asked
+
+
+def test_effects_are_added_until_none_is_worth_its_price() -> None:
+    fits = Ends({('a', 'b', 'c'): 9000.0, ('a', 'b', 'c', 'd'): 8990.0, ('a', 'b', 'e'): 19990.0})
+    found, end = forward_selection(
+        fits, [fitted((), 90000.0), fitted(('a', 'b'), 20000.0)], fitted(('a', 'b'), 20000.0),
+        DEFAULT)
+    assert end.effects == best(found, DEFAULT).effects == ('a', 'b', 'c')

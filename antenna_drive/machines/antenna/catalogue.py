@@ -14,6 +14,9 @@
 """
 The catalogue: every effect that the drive may have and its model lacks, each at its neutral value.
 
+An effect has a tolerance (`healthy`): a size that a machine in good order may have. Where the test
+sheet or the configuration gives a tolerance for the same number, the larger of the two counts.
+
 A new effect takes one term in `physics` (with a neutral default in `parameters.sets`) and one
 entry here. An entry declares what its parameters do: see `modifiers`.
 """
@@ -70,19 +73,20 @@ def _form(*parameters: AntennaParameter, name: str = '') -> Form:
 
 
 def _number(name: str, unit: str, low: float, high: float, step: float, modifier: Modifier,
-            start: float = 0.0) -> AntennaParameter:
+            start: float = 0.0, healthy: float = 0.0) -> AntennaParameter:
     return AntennaParameter(name, unit, low, high, step, start=start, is_shape=start != 0.0,
-                            on_readings=isinstance(modifier, ReadingModifier), modifier=modifier)
+                            on_readings=isinstance(modifier, ReadingModifier), modifier=modifier,
+                            tolerance=healthy)
 
 
 def _stribeck(unit_rates: Iterable[float], torque: tuple[float, float], rate: tuple[float, float],
-              owners: Sequence[str]) -> tuple[Form, ...]:
+              owners: Sequence[str], healthy: float) -> tuple[Form, ...]:
     """Return forms of Stribeck friction that begin at several rates [rad/s]."""
     def at(name: str) -> list[str]:
         return [f'{owner}.stribeck_{name}' for owner in owners]
 
     return tuple(_form(
-        _number('torque', 'N m', 0.0, *torque, add(*at('torque'))),
+        _number('torque', 'N m', 0.0, *torque, add(*at('torque')), healthy=healthy),
         _number('rate', 'rad/s', *rate, 0.02 * start, set_to(*at('rate')), start=start),
         _number('shape', '1', 0.3, 2.5, 0.05, set_to(*at('shape')), start=1.0),
         name=f'from {start:g} rad/s') for start in unit_rates)
@@ -96,28 +100,30 @@ def _motor_effects(into: _Catalogue, component: str, motors: tuple[str, ...]) ->
              'lubricant or seals drag the more, the faster the motor turns',
              'current grows with the rate, in both directions',
              _form(_number('torque_per_rate', 'N m s/rad', 0.0, 0.5, 2e-3,
-                           add(*at('motor.viscous_friction'))),
+                           add(*at('motor.viscous_friction')), healthy=1e-3),
                    _number('flow_index', '1', *_FLOW_INDEX, set_to(*at('motor.flow_index')),
                            start=1.0)))
     into.add(component, 'stribeck_friction',
              'the lubricating film breaks down at creep and friction rises',
              'more current, and stick-slip, close to standstill',
-             *_stribeck((0.5, 2.0, 8.0), (20.0, 0.05), (0.02, 40.0), at('motor')))
+             *_stribeck((0.5, 2.0, 8.0), (20.0, 0.05), (0.02, 40.0), at('motor'), 0.05))
     into.add(component, 'coulomb_friction', 'bearings or brake rub harder or less than assumed',
              'current offset that changes sign with the direction',
-             _form(_number('torque', 'A', -0.069, 3.0, 0.01, add(*at('motor.coulomb_torque')))))
+             _form(_number('torque', 'A', -0.069, 3.0, 0.01, add(*at('motor.coulomb_torque')),
+                           healthy=2e-3)))
     into.add(component, 'friction_asymmetry', 'a seal or brush rubs more in one direction',
              'current level differs between the directions',
-             _form(_number('share', '1', -8.0, 8.0, 0.05, add(*at('motor.friction_asymmetry')))))
+             _form(_number('share', '1', -8.0, 8.0, 0.05, add(*at('motor.friction_asymmetry')),
+                           healthy=0.05)))
     into.add(component, 'load_dependent_friction',
              'tooth and bearing friction grow with the transmitted torque',
              'current grows by a share of the gear torque, against the direction of motion',
              _form(_number('share', '1', 0.0, 0.6, 5e-3,
-                           add(*at('motor.load_dependent_friction')))))
+                           add(*at('motor.load_dependent_friction')), healthy=5e-3)))
     into.add(component, 'torque_ripple', 'slots and poles of the motor modulate its torque',
              'rate and current vary with the angle of the rotor',
              wave('N m', 10.0, 0.02, WaveShape('torque_ripple', tuple(at('motor')), motors[0]),
-                  MOTOR_ORDERS))
+                  MOTOR_ORDERS, healthy=0.02))
     # nobody knows whether the amplifier was trimmed to the motor as it is or as it should be
     into.add(component, 'torque_constant', 'weak or hot magnets, a wrong winding',
              'more or less current for the same motion',
@@ -133,7 +139,7 @@ def _motor_effects(into: _Catalogue, component: str, motors: tuple[str, ...]) ->
              _form(_number('change', 'ohm', -0.4, 3.0, 4e-3,
                            add(*at('armature.resistance_change'))), name='of the winding'),
              _form(_number('trimmed_change', '1', -0.8, 3.0, 5e-3,
-                           scale(*at('armature.resistance'))),
+                           scale(*at('armature.resistance')), healthy=0.02),
                    name='of the winding, the amplifier trimmed to it'))
     into.add(component, 'amplifier_gain', 'amplifier 1 set or drifted to another gain',
              'stiffer or softer rate loop: currents at reversals',
@@ -144,9 +150,11 @@ def _motor_effects(into: _Catalogue, component: str, motors: tuple[str, ...]) ->
     into.add(component, 'amplifier_dead_zone',
              'crossover distortion, or a comparator in front of amplifier 1',
              'no answer to small rate errors or demands, hunting at low rates',
-             _form(_number('half_width', 'V', 0.0, 0.5, 1e-3, add(*at('amplifier.dead_zone'))),
+             _form(_number('half_width', 'V', 0.0, 0.5, 1e-3, add(*at('amplifier.dead_zone')),
+                           healthy=1e-3),
                    name='in front of amplifier 1'),
-             _form(_number('crossover', 'A', 0.0, 2.0, 5e-3, add(*at('amplifier.crossover'))),
+             _form(_number('crossover', 'A', 0.0, 2.0, 5e-3, add(*at('amplifier.crossover')),
+                           healthy=0.01),
                    name='crossover of amplifier 2'))
     into.add(component, 'current_limit', 'limiter set lower or higher than assumed',
              'current clipped at another level while it saturates',
@@ -164,17 +172,19 @@ def _gearbox_effects(into: _Catalogue, m: int) -> None:
              _form(_number('change', '1', -0.8, 4.0, 5e-3, scale(f'{gearbox}.stiffness'))))
     into.add(component, 'hysteresis', 'friction within the gear train as it winds up',
              'torque lags behind the wind-up at each change of direction',
-             _form(_number('torque', 'N m', 0.0, 10.0, 0.02, add(f'{gearbox}.hysteresis')),
+             _form(_number('torque', 'N m', 0.0, 10.0, 0.02, add(f'{gearbox}.hysteresis'),
+                           healthy=0.02),
                    _number('angle', 'rad', 2e-3, 0.5, 2e-3, set_to(f'{gearbox}.hysteresis_angle'),
                            start=0.03), name='the same at any load'),
-             _form(_number('share', '1', 0.0, 0.9, 4e-3, add(f'{gearbox}.hysteresis_share')),
+             _form(_number('share', '1', 0.0, 0.9, 4e-3, add(f'{gearbox}.hysteresis_share'),
+                           healthy=5e-3),
                    _number('share_angle', 'rad', 2e-3, 0.5, 2e-3,
                            set_to(f'{gearbox}.hysteresis_angle'), start=0.03),
                    name='a share of the load'))
     into.add(component, 'transmission_error', 'eccentric or uneven teeth',
              'rate and current vary with the angle of the shaft, while the teeth touch',
              wave('rad', 0.3, 5e-4, WaveShape('transmission_error', (gearbox,), motor),
-                  MOTOR_ORDERS))
+                  MOTOR_ORDERS, healthy=5e-4))
 
 
 def _share_effects(into: _Catalogue) -> None:
@@ -214,21 +224,23 @@ def _axis_effects(into: _Catalogue) -> None:
              _form(_number('change', '1', -0.9, 3.0, 5e-3, scale(f'{axis}.coulomb_torque'))))
     into.add(component, 'viscous_friction', 'cold grease', 'both currents grow with the rate',
              _form(_number('torque_per_rate', 'N m s/rad', 0.0, 1e9, 1e5,
-                           add(f'{axis}.viscous_friction')),
+                           add(f'{axis}.viscous_friction'), healthy=2e5),
                    _number('flow_index', '1', *_FLOW_INDEX, set_to(f'{axis}.flow_index'),
                            start=1.0)))
     into.add(component, 'stribeck_friction', 'the film of the axis bearing breaks down at creep',
              'stick-slip of the axis, both currents rise close to standstill',
-             *_stribeck((4e-5, 2e-4, 8e-4), (6e5, 1e3), (2e-6, 3e-3), [axis]))
+             *_stribeck((4e-5, 2e-4, 8e-4), (6e5, 1e3), (2e-6, 3e-3), [axis], 3e3))
     into.add(component, 'position_dependent_friction', 'an uneven rail or bearing',
              'both currents vary with the elevation, against the direction of motion',
-             wave('1', 0.9, 5e-3, WaveShape('friction_wave', (axis,), 'axis'), _RAIL_ORDERS))
+             wave('1', 0.9, 5e-3, WaveShape('friction_wave', (axis,), 'axis'), _RAIL_ORDERS,
+                  healthy=0.01))
     into.add(component, 'gravity_imbalance', 'counterweight too light or too heavy',
              'both currents shifted, by the cosine of the elevation',
-             _form(_number('torque', 'N m', -1e6, 1e6, 500.0, add(f'{axis}.gravity_torque'))))
+             _form(_number('torque', 'N m', -1e6, 1e6, 500.0, add(f'{axis}.gravity_torque'),
+                           healthy=1e3)))
     into.add(component, 'wind_steady', 'a steady wind on the dish', 'both currents shifted',
              _form(_number('torque', 'N m', -1e6, 1e6, 500.0,
-                           add(f'{axis}.steady_wind_torque'))))
+                           add(f'{axis}.steady_wind_torque'), healthy=1e3)))
     into.add(component, 'inertia', 'other counterweight, subreflector or instruments',
              'currents at every change of rate, and the frequencies of the modes',
              _form(_number('change', '1', -0.6, 2.0, 5e-3, scale(f'{axis}.inertia_hub'))))
@@ -248,7 +260,7 @@ def _axis_effects(into: _Catalogue) -> None:
     into.add(component, 'extra_mode', 'a part of the structure that the model takes for rigid',
              'an oscillation that the model does not have',
              *(_form(_number('inertia', 'kg m^2', 0.0, 8e6, 2e4,
-                             set_to(f'{axis}.mode_inertias.{EXTRA_MODE}')),
+                             set_to(f'{axis}.mode_inertias.{EXTRA_MODE}'), healthy=2e4),
                      _number('frequency', 'Hz', 0.85 * hertz, 1.18 * hertz, 0.005 * hertz,
                              set_to(f'{axis}.mode_frequencies.{EXTRA_MODE}'), start=hertz),
                      _number('damping', '1', 0.0, 0.2, 2e-3,
@@ -257,7 +269,7 @@ def _axis_effects(into: _Catalogue) -> None:
     into.add(component, 'bull_gear_backlash', 'worn bull gear: both pinions have more play',
              'longer crossing of both gaps at a reversal',
              _form(_number('half_gap', 'rad', -0.1, 0.6, 1e-3, add(
-                 'motor_1.gearbox.half_gap', 'motor_2.gearbox.half_gap'))))
+                 'motor_1.gearbox.half_gap', 'motor_2.gearbox.half_gap'), healthy=3e-3)))
 
 
 def _sensor_effects(into: _Catalogue, encoder_digit: float) -> None:
@@ -265,7 +277,8 @@ def _sensor_effects(into: _Catalogue, encoder_digit: float) -> None:
         tach, current, motor = f'tach_{m}', f'current_{m}', f'motor_{m}'
         into.add(tach, 'gain', 'the tachometer gives more or less volts per rate',
                  'this motor runs slower or faster than its partner, currents wind up',
-                 _form(_number('change', '1', -0.3, 0.3, 5e-4, add(f'{motor}.tachometer.gain'))))
+                 _form(_number('change', '1', -0.3, 0.3, 5e-4, add(f'{motor}.tachometer.gain'),
+                               healthy=3e-3)))
         into.add(tach, 'offset', 'drift of the tachometer or its amplifier',
                  'a constant rate error, currents wind up against each other',
                  _form(_number('offset', 'rad/s', -5.0, 5.0, 0.02,
@@ -273,24 +286,25 @@ def _sensor_effects(into: _Catalogue, encoder_digit: float) -> None:
         into.add(tach, 'ripple', 'commutator or coupling of the tachometer',
                  'reading varies with the angle of the rotor, more at higher rate',
                  wave('1', 0.3, 2e-4, WaveShape('ripple', (f'{motor}.tachometer',), motor),
-                      MOTOR_ORDERS))
+                      MOTOR_ORDERS, healthy=1e-3))
         channel = CURRENT_1 + m - 1
         into.add(current, 'gain', 'shunt or amplifier of the ammeter', 'reading scaled',
                  _form(_number('change', '1', -0.5, 0.5, 1e-3,
                                ReadingGain(channel, (f'{motor}.ammeter.gain',)))))
         into.add(current, 'offset', 'drift of the ammeter', 'reading shifted',
                  _form(_number('offset', 'A', -1.0, 1.0, 1e-3,
-                               ReadingZero(channel, (f'{motor}.ammeter.offset',)))))
+                               ReadingZero(channel, (f'{motor}.ammeter.offset',)),
+                               healthy=0.02)))
     into.add('encoder', 'quantisation', 'bits of the encoder are lost', 'steps in the angle',
              _quantisation(encoder_digit))
     into.add('encoder', 'cyclic_error', 'eccentric scale or uneven interpolation',
              'the angle varies with itself',
              wave('rad', 1e-3, 1e-6, WaveShape('cyclic_error', ('plant.encoder',), 'axis'),
-                  _ENCODER_ORDERS, on_readings=True))
+                  _ENCODER_ORDERS, on_readings=True, healthy=2e-6))
     into.add('encoder', 'offset', 'the encoder was mounted or zeroed otherwise',
              'the angle shifted',
              _form(_number('offset', 'rad', -0.1, 0.1, 1e-6,
-                           ReadingZero(ENCODER, ('plant.encoder.offset',)))))
+                           ReadingZero(ENCODER, ('plant.encoder.offset',)), healthy=2e-5)))
     into.add('bias_voltage', 'gain', 'divider of the voltmeter', 'reading scaled',
              _form(_number('change', '1', -0.5, 0.5, 1e-3, ReadingGain(
                  BIAS, ('torque_share.circuit.voltmeter_gain',)))))
@@ -333,9 +347,9 @@ def catalogue(durations_s: Sequence[float] = (), encoder_digit: float = 0.0) -> 
              'both currents vary with time, by no angle or rate', gust.gust_form(durations_s))
     into.add('loop', 'delay', 'a computer or a network in the command or in the rate loop',
              'everything comes late, or the rate loop rings',
-             _form(_number('time', 's', 0.0, 0.2, 5e-4, add('test_signal.delay')),
+             _form(_number('time', 's', 0.0, 0.2, 5e-4, add('test_signal.delay'), healthy=5e-4),
                    name='of the command'),
              _form(_number('error_time', 's', 0.0, 0.05, 2e-4, add(
-                 'motor_1.amplifier.delay', 'motor_2.amplifier.delay')),
+                 'motor_1.amplifier.delay', 'motor_2.amplifier.delay'), healthy=2e-4),
                  name='of the rate error'))
     return dict(into)

@@ -26,9 +26,10 @@ Examples
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from antenna_drive.diagnosis import DEFAULT, diagnose, Diagnosis, Progress, Settings
+from antenna_drive.errors import UserError
 from antenna_drive.machines.antenna.corrected import correct, Corrected
 from antenna_drive.machines.antenna.machine import AntennaMachine
 from antenna_drive.parameters.sets import Drive
@@ -37,7 +38,8 @@ from antenna_drive.recording.recording import Recording
 
 def diagnose_recordings(recordings: Mapping[str, Recording], drive: Drive,
                         progress: Progress = lambda share, doing: None, threads: int = 2,
-                        settings: Settings = DEFAULT) -> Diagnosis:
+                        settings: Settings = DEFAULT, without: Sequence[str] = (),
+                        limits: Mapping[str, float] | None = None) -> Diagnosis:
     """
     Say where a real drive and its model part, which effect is behind it, and how far it goes.
 
@@ -53,13 +55,25 @@ def diagnose_recordings(recordings: Mapping[str, Recording], drive: Drive,
         how many simulations at once
     settings
         thresholds
+    without
+        effects that the catalogue shall lack
+    limits
+        for some signals, the remainder beyond noise from which it matters
 
     Raises
     ------
     UserError : a recording cannot be used; the message says which and why
 
     """
-    return diagnose(AntennaMachine(recordings, drive, threads), progress, threads, settings)
+    machine = AntennaMachine(recordings, drive, threads)
+    for effect in without:
+        if effect not in machine.effects:
+            raise UserError(f'{effect}: no such effect; docs/diagnosis.md lists the catalogue')
+    for signal in limits or ():
+        if signal not in machine.experiments[0].channels:
+            raise UserError(f'{signal}: no such signal; there are '
+                            + ', '.join(machine.experiments[0].channels))
+    return diagnose(machine.without(without), progress, threads, settings, limits)
 
 
 def corrected(drive: Drive, diagnosis: Diagnosis) -> Corrected:

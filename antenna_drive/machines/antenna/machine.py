@@ -40,6 +40,7 @@ from antenna_drive.machines.antenna.excitation import (
 from antenna_drive.machines.antenna.field_test import (
     CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, prepared, TACH_1, TACH_2, UNITS,
 )
+from antenna_drive.machines.antenna.late_readings import dense, PARTS, read_at
 from antenna_drive.machines.antenna.modifiers import (
     ADD, AntennaParameter, change, Modifier, ReadingModifier, RunModifier, RunSetup,
     SensorReadings,
@@ -54,11 +55,11 @@ from antenna_drive.recording.recording import Recording
 import numpy as np
 
 _TIME_SCALES = TimeScales(start_s=1.5, scan_s=8.0, pulse_s=0.15, response_s=1.5, block_s=1.0)
-LONGEST_STEP = 2.5e-3
+LONGEST_STEP = 2.65e-3
 # A search looks at this much of a test [s]. It and derivatives take longer steps, whose error is
 # a tenth of the noise.
 TRUNCATED_S = 15.0
-LOW_FIDELITY_STEP = 5.3e-3
+LOW_FIDELITY_STEP = 5.6e-3
 # A wave of the motors' angle turns by at most this much in a step [rad], down to a shortest
 # step [s].
 WAVE_STEP = 0.9
@@ -72,7 +73,7 @@ _STIFF = ('hysteresis', 'hysteresis_share')
 # Places inside the gap, as shares of half the gap, at which each motor may start.
 _STARTS = np.linspace(-0.95, 0.95, 13)
 # Runs that are kept, and tables of steps: a test has one for each bias voltage and each wave.
-_KEPT_RUNS = 120
+_KEPT_RUNS = 60
 _KEPT_PLANS = 24
 
 
@@ -161,7 +162,7 @@ class AntennaMachine(Machine):
         """Return the tests, with the noise of readings that move as at a point."""
         found = []
         for k, test in enumerate(self._tests):
-            out = self._run(self._job(k, point, math.inf))
+            out = self._run(self._job(k, point, math.inf))[::PARTS]
             # the machine may move faster than the model without effects: the readings tell
             slope = np.fmax(np.abs(out[:, :, 1]), np.abs(test.slope))
             noise = test.sensors.noise(out[:, :, 0], slope, test.jitter)
@@ -356,11 +357,12 @@ class AntennaMachine(Machine):
         plan = self._plan(job.experiment, run, Longest(longest, SHORTEST_STEP, WAVE_STEP, turns))
         if disturbance is not None:
             plan = _disturbed(plan, run, *disturbance)
-        samples = int(np.count_nonzero(test.time - test.time[0] < job.until))
-        if samples == test.time.size:
+        time = dense(test.time)
+        samples = int(np.count_nonzero(time - time[0] < job.until))
+        if samples == time.size:
             return batch.run(record, plan)
         steps = int(np.argmax(plan.keep == samples - 1))
-        out = np.full((test.time.size, len(CHANNELS), 2), np.nan)
+        out = np.full((time.size, len(CHANNELS), 2), np.nan)
         out[:samples] = batch.run(record, batch.Schedule(plan.steps[:steps],
                                                          plan.keep[:steps + 1]))
         return out
@@ -369,11 +371,11 @@ class AntennaMachine(Machine):
         """Return the steps of a run."""
         test = self._tests[k]
         if run.delay:
-            plan = schedule(test.command, run.bias, test.time, longest, run.delay)
+            plan = schedule(test.command, run.bias, dense(test.time), longest, run.delay)
         else:
             plan = self._kept((k, longest, run.bias), lambda: with_bias(self._kept(
                 (k, longest, test.bias),
-                lambda: schedule(test.command, test.bias, test.time, longest)), run.bias))
+                lambda: schedule(test.command, test.bias, dense(test.time), longest)), run.bias))
         return plan if run.gust is None else with_torque(plan, *gust.course(run.gust))
 
     def _kept(self, key: tuple[int, Longest, Bias],
@@ -391,16 +393,19 @@ class AntennaMachine(Machine):
     def _read(self, k: int, out: FloatArray, point: Point) -> FloatArray:
         """Return the readings of a run, with the errors of sensors that nothing feeds back."""
         time = self._tests[k].time
-        readings = SensorReadings(time - time[0], out[:, :, 0].copy(), out[:, :, 1])
+        readings = SensorReadings()
         for name, value in point.items():
             item = self._modifiers[name]
             if item.on_readings and item.experiment in (None, k) and value:
                 assert isinstance(item.modifier, ReadingModifier)
                 item.modifier.apply_to_readings(readings, value)
-        values, digit = readings.values, readings.digit
-        values *= readings.gain
+        digit = readings.digit
+        wanted = time + readings.clock_rate * (time - time[0])
+        for begin, end, late in readings.responses:
+            wanted[(time >= begin) & (time < end)] -= late
+        values = read_at(dense(time), out, wanted, readings.late) * readings.gain
         for shape, parts in readings.waves.items():
-            values[:, ENCODER] += shape.along(out[:, ENCODER, 0], parts)
+            values[:, ENCODER] += shape.along(values[:, ENCODER], parts)
         values += readings.zero
         if digit > 0.0 and self._digit:
             # whatever lies within the digit that was read would have been read
@@ -421,8 +426,9 @@ def _tolerated(effect: Effect, tolerances: Sequence[AntennaParameter]) -> Effect
     def tolerated(item: Parameter) -> Parameter:
         assert isinstance(item, AntennaParameter)
         modifier: Modifier = item.modifier
-        return replace(item, tolerance=min(
-            (allowed.get((path, modifier.how), 0.0) for path in modifier.fields), default=0.0))
+        same_number = min(
+            (allowed.get((path, modifier.how), 0.0) for path in modifier.fields), default=0.0)
+        return replace(item, tolerance=max(item.tolerance, same_number))
 
     return replace(effect, forms=tuple(
         replace(form, parameters=tuple(tolerated(p) for p in form.parameters))

@@ -77,24 +77,24 @@ class RunSetup:
 @dataclass
 class SensorReadings:
     """
-    SensorReadings as parameters modify them.
+    What parameters do to the readings of a run.
 
     Attributes
     ----------
-    time : since the first sample, shape (n,) [s]
-    values, slopes : of every channel and their time derivatives, shape (n, 6)
-    gain, zero : of every channel, shape (6,)
+    gain, zero, late : of every channel; the last is by how much earlier it is read [s]; shape (6,)
+    clock_rate : share by which the recorder's clock is slow
+    responses : begin and end of responses that come later, and by how much [s]
     digit : of the encoder [rad]; 0 for none
     turn : share of a digit by which the encoder's rounding is off its middle
     waves : parts of each wave of the encoder
 
     """
 
-    time: FloatArray
-    values: FloatArray
-    slopes: FloatArray
     gain: FloatArray = field(default_factory=lambda: np.ones(len(CHANNELS)))
     zero: FloatArray = field(default_factory=lambda: np.zeros(len(CHANNELS)))
+    late: FloatArray = field(default_factory=lambda: np.zeros(len(CHANNELS)))
+    clock_rate: float = 0.0
+    responses: list[tuple[float, float, float]] = field(default_factory=list)
     digit: float = 0.0
     turn: float = 0.0
     waves: dict[WaveShape, list[float]] = field(default_factory=dict)
@@ -200,25 +200,40 @@ class ClockShift(ReadingModifier):
     """Reads every channel later."""
 
     def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.values += value * readings.slopes
+        readings.late -= value
 
 
 @dataclass(frozen=True)
 class ChannelDelay(ReadingModifier):
-    """Reads one channel earlier than its time stamps say, to first order."""
+    """Reads one channel earlier than its time stamps say."""
 
     channel: int
 
     def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.values[:, self.channel] -= value * readings.slopes[:, self.channel]
+        readings.late[self.channel] += value
 
 
 @dataclass(frozen=True)
 class ClockRate(ReadingModifier):
-    """Lets the recorder's clock run slow by a share of the time, to first order."""
+    """Lets the recorder's clock run slow by a share of the time."""
 
     def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.values += value * readings.time[:, np.newaxis] * readings.slopes
+        readings.clock_rate += value
+
+
+@dataclass(frozen=True)
+class JumpTime(ReadingModifier):
+    """
+    Lets the command jump later, and with it all that follows until the next jump.
+
+    Between the samples of a recorded command nobody knows when it jumped.
+    """
+
+    begin: float
+    end: float
+
+    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
+        readings.responses.append((self.begin, self.end, value))
 
 
 @dataclass(frozen=True)

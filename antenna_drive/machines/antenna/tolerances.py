@@ -17,13 +17,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
+from itertools import pairwise
 import math
 
+from antenna_drive.machines.antenna.excitation import RecordedCommand
 from antenna_drive.machines.antenna.field_test import (
     BIAS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, TACH_1, TACH_2,
 )
 from antenna_drive.machines.antenna.modifiers import (
-    add, AntennaParameter, ChannelDelay, ClockRate, ClockShift, Modifier, ReadingGain,
+    add, AntennaParameter, ChannelDelay, ClockRate, ClockShift, JumpTime, Modifier, ReadingGain,
     ReadingModifier, ReadingZero, scale, SupplyGain,
 )
 from antenna_drive.recording.sheet import Tolerances
@@ -50,6 +52,13 @@ TOLERANT_DRIVE = (
 )
 
 
+# What instruments of the kind have when somebody looks after them: tachometers and servo
+# amplifiers of a drive, transducers and the logger of a test.
+USUAL = Tolerances(tach_zero_rad_s=0.01, amplifier_zero_V=1e-3, recorder_gain=0.01,
+                   current_zero_A=0.02, bias_zero_V=0.03, channel_delay_samples=1.0,
+                   clock_ppm=100.0)
+# A jump of the command is felt for about this time [s].
+_FELT_S = 5.0
 # The recorded channels with the number of the configuration that is their recorder's gain.
 _RECORDED = (('current_1', 'motor_1.ammeter.gain'), ('current_2', 'motor_2.ammeter.gain'),
              ('tach_1', ''), ('tach_2', ''), ('encoder', ''),
@@ -98,19 +107,27 @@ def _of_the_machine(test: FieldTest, tolerance: float) -> Iterator[AntennaParame
         yield relative(name)
 
 
+def allowed(tests: Sequence[FieldTest]) -> Tolerances:
+    """Return the greatest tolerances that the sheets of some tests give, or else usual ones."""
+    def greatest(name: str) -> float:
+        given = [value for value in (getattr(test.tolerances, name) for test in tests)
+                 if value is not None]
+        return max(given, default=getattr(USUAL, name))
+
+    return Tolerances(**{item.name: greatest(item.name) for item in fields(Tolerances)})
+
+
 def _of_zeros_and_recorders(tests: Sequence[FieldTest]) -> Iterator[AntennaParameter]:
-    """Yield what the sheets allow beyond the parameters: zeros in the loop, gains, delays."""
-    given = Tolerances(**{item.name: max(
-        (getattr(test.tolerances, item.name) or 0.0 for test in tests)) for item in
-        fields(Tolerances)})
+    """Yield what may be off beyond the parameters: zeros in the loop, gains, delays."""
+    given = allowed(tests)
     period = max(test.period for test in tests)
     for m in (1, 2):
         motor = f'motor_{m}'
-        for allowed, unit, path in (
+        for size, unit, path in (
                 (given.tach_zero_rad_s, 'rad/s', f'{motor}.tachometer.offset'),
                 (given.amplifier_zero_V, 'V', f'{motor}.amplifier.offset')):
-            if allowed:
-                yield _within(f'offset:{path}', unit, allowed, add(path))
+            if size:
+                yield _within(f'offset:{path}', unit, size, add(path))
     for channel, (name, field) in enumerate(_RECORDED):
         if given.recorder_gain and channel != ENCODER:
             yield _within(f'gain:{name}', '1', given.recorder_gain,
@@ -134,7 +151,16 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
     yield AntennaParameter(f'clock:{test.name}', 's', -0.01, 0.01, 1e-4, 1e-3, experiment=k,
                            on_readings=True, modifier=ClockShift())
 
-    given = test.tolerances
+    if isinstance(test.command, RecordedCommand):
+        jumps = test.command.jumps
+        # of those before a window the last ones alone are still felt in it
+        jumps = jumps[(jumps > test.time[0] - _FELT_S) & (jumps < test.time[-1])]
+        half = 0.5 * test.period
+        for begin, end in pairwise([*jumps, math.inf]):
+            yield _within(f'jump:{test.name}:{begin:.3f}', 's', half,
+                          JumpTime(float(begin) - half, float(end) - half), k)
+
+    given = allowed([test])
     if given.clock_ppm:
         yield _within(f'clock_rate:{test.name}', '1', 1e-6 * given.clock_ppm, ClockRate(), k)
 
@@ -148,13 +174,11 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
     wide = 1.0 if test.known_start else 50.0
     yield zero(ENCODER, 'encoder', 'rad', 4e-5 * wide, 2e-6, 1e-5 * wide)
     sensors = test.sensors
-    for channel, name, unit, noise, allowed in (
-            (CURRENT_1, 'current_1', 'A', sensors.current_noise, given.current_zero_A),
-            (CURRENT_2, 'current_2', 'A', sensors.current_noise, given.current_zero_A),
-            (TACH_1, 'tach_1', 'rad/s', sensors.tach_noise, None),
-            (TACH_2, 'tach_2', 'rad/s', sensors.tach_noise, None),
-            (BIAS, 'bias_voltage', 'V', sensors.bias_noise, given.bias_zero_V)):
-        if allowed is None:
-            yield zero(channel, name, unit, 2.0 * noise, noise, 0.7 * noise)
-        elif allowed:
-            yield zero(channel, name, unit, allowed, 0.3 * allowed, allowed / math.sqrt(3.0))
+    for channel, name, unit, size in (
+            (CURRENT_1, 'current_1', 'A', given.current_zero_A),
+            (CURRENT_2, 'current_2', 'A', given.current_zero_A),
+            (TACH_1, 'tach_1', 'rad/s', 2.0 * sensors.tach_noise),
+            (TACH_2, 'tach_2', 'rad/s', 2.0 * sensors.tach_noise),
+            (BIAS, 'bias_voltage', 'V', given.bias_zero_V)):
+        if size:
+            yield zero(channel, name, unit, size, 0.3 * size, size / math.sqrt(3.0))

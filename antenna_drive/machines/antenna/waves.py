@@ -100,7 +100,7 @@ class Wave(Form):
 
 
 def wave(unit: str, limit: float, step: float, shape: WaveShape, orders: tuple[float, ...],
-         on_readings: bool = False) -> Wave:
+         on_readings: bool = False, healthy: float = 0.0) -> Wave:
     """
     Return the form of a wave whose order is not chosen yet.
 
@@ -114,6 +114,8 @@ def wave(unit: str, limit: float, step: float, shape: WaveShape, orders: tuple[f
         cycles per revolution to look for
     on_readings
         True if nothing feeds the wave back
+    healthy
+        amplitude of each part that a machine in good order may have
 
     """
     made = _ReadingWavePart if on_readings else _WavePart
@@ -124,7 +126,8 @@ def wave(unit: str, limit: float, step: float, shape: WaveShape, orders: tuple[f
                                (limit, unit, step))
         return AntennaParameter(name, unit_, -bound, bound, step_,
                                 on_readings=on_readings, is_shape=index > 1,
-                                modifier=made(shape, index))
+                                modifier=made(shape, index),
+                                tolerance=healthy if index < 2 else 0.0)
 
     return Wave('', tuple(part(index) for index in range(len(_PARTS))), shape=shape,
                 orders=orders)

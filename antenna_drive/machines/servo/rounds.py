@@ -140,7 +140,7 @@ def lacking(tests: Sequence[ServoLog], effort: Effort, without: Sequence[str] = 
         trials = [_Trial.of(c, structure, fit.values, parts, scale) for c in likeliest]
         rounds.append({
             'withheld_mrad': 1e3 * judged,
-            'ranked': [{'effects': list(answer.hypothesis.effects),
+            'ranked': [{'effects': list(answer.effects),
                         'probability': answer.probability} for answer in ranking.answers[:6]],
             'confusable': ranking.confusable,
             'tried': [{'effects': list(c.effects), 'forms': [f.name for f in c.forms],

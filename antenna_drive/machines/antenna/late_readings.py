@@ -1,0 +1,89 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Readings at other times than the simulation's.
+
+Recorders read some channels late, and their clocks are off. A run therefore keeps its outputs at
+some times between the samples, too, and a reading is interpolated between them by values and
+slopes. To first order alone, a delay of 7 ms at 5 Hz is off by 2 percent of the signal.
+"""
+
+from __future__ import annotations
+
+from antenna_drive.diagnosis import FloatArray
+from antenna_drive.physics.compiling import compiled
+import numpy as np
+
+PARTS = 3
+
+
+def dense(time: FloatArray) -> FloatArray:
+    """Return times with others between them, shape (PARTS (n - 1) + 1,) [s]."""
+    places = np.arange(PARTS * (time.size - 1) + 1) / PARTS
+    found = np.interp(places, np.arange(time.size), time)
+    found[::PARTS] = time
+    return found
+
+
+def read_at(time: FloatArray, out: FloatArray, wanted: FloatArray, late: FloatArray,
+            ) -> FloatArray:
+    """
+    Return readings at other times.
+
+    Parameters
+    ----------
+    time
+        of the outputs, increasing, shape (n,) [s]
+    out
+        values and slopes of every channel, shape (n, c, 2)
+    wanted
+        times, shape (m,) [s]
+    late
+        by how much earlier each channel is read, shape (c,) [s]
+
+    Returns
+    -------
+    shape (m, c); before the first output the machine stands still, after the last it goes on
+
+    """
+    found = np.empty((wanted.size, late.size))
+    _read_at(time, out, wanted, late, found)
+    return found
+
+
+@compiled
+def _read_at(time: FloatArray, out: FloatArray, wanted: FloatArray, late: FloatArray,
+             found: FloatArray) -> None:
+    last = time.size - 1
+    for c in range(late.size):
+        i = 0
+        for j in range(wanted.size):
+            t = wanted[j] - late[c]
+            if t <= time[0]:
+                found[j, c] = out[0, c, 0]
+                continue
+            if t >= time[last]:
+                found[j, c] = out[last, c, 0] + (t - time[last]) * out[last, c, 1]
+                continue
+            while time[i + 1] < t:
+                i += 1
+            while time[i] > t:
+                i -= 1
+            # the cubic with these values and slopes at both ends (Hermite)
+            h = time[i + 1] - time[i]
+            s = (t - time[i]) / h
+            r = 1.0 - s
+            found[j, c] = (
+                r * r * ((1.0 + 2.0 * s) * out[i, c, 0] + s * h * out[i, c, 1])
+                + s * s * ((1.0 + 2.0 * r) * out[i + 1, c, 0] - r * h * out[i + 1, c, 1]))

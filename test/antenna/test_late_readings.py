@@ -1,0 +1,94 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Readings at other times: against scipy's interpolation, and commands that jump later."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from antenna_drive.diagnosis import FloatArray
+from antenna_drive.machines.antenna.excitation import RecordedCommand
+from antenna_drive.machines.antenna.field_test import ENCODER
+from antenna_drive.machines.antenna.late_readings import dense, PARTS, read_at
+from antenna_drive.machines.antenna.machine import AntennaMachine
+from antenna_drive.parameters import load
+from antenna_drive.recording.recording import Channel, Recording
+import numpy as np
+import pytest
+from scipy.interpolate import CubicHermiteSpline
+
+RATE_HZ = 100.0
+DEGREE = np.pi / 180.0
+
+
+def test_between_outputs_it_is_the_cubic_of_values_and_slopes() -> None:
+    random = np.random.default_rng(0)
+    time = np.cumsum(random.uniform(0.005, 0.02, 300))
+    out = random.normal(size=(300, 6, 2))
+    wanted = np.linspace(time[3], time[-4], 500)
+    late = random.uniform(-0.01, 0.01, 6)
+    found = read_at(time, out, wanted, late)
+    for c in range(6):
+        exact = CubicHermiteSpline(time, out[:, c, 0], out[:, c, 1])(wanted - late[c])
+        np.testing.assert_allclose(found[:, c], exact, atol=1e-12)
+
+
+def test_a_fast_signal_is_read_late_without_loss() -> None:
+    """A tenth of a turn between two samples; the first order would be off by a fifth of it."""
+    samples = np.arange(0.0, 1.0, 0.01)
+    time, omega, late = dense(samples), 2.0 * np.pi * 10.0, 0.007
+    out = np.stack([np.sin(omega * time), omega * np.cos(omega * time)], axis=-1)[:, np.newaxis]
+    found = read_at(time, out, samples, np.array([late]))[2:, 0]
+    exact = np.sin(omega * (samples - late))[2:]
+    first_order = (np.sin(omega * samples) - late * omega * np.cos(omega * samples))[2:]
+    np.testing.assert_allclose(found, exact, atol=1e-5)
+    assert np.abs(first_order - exact).max() > 0.05
+
+
+def test_dense_times_hold_the_samples() -> None:
+    time = np.array([0.0, 0.1, 0.4])
+    assert (dense(time)[::PARTS] == time).all()
+    assert np.diff(dense(time)) == pytest.approx([0.1 / 3.0] * 3 + [0.1] * 3)
+
+
+def stepping(jump_s: float) -> tuple[AntennaMachine, FloatArray]:
+    """Return a drive whose command jumps at a time that its samples do not tell."""
+    time = np.arange(0.0, 4.0, 1.0 / RATE_HZ)
+    command = np.where(time < jump_s, 0.0, 0.05 * DEGREE)
+    zero = np.zeros_like(time)
+    stamps = np.round(1e9 * time).astype(np.int64)
+    recording = Recording({name: Channel('rad/s', stamps, values) for name, values in (
+        ('test_signal/rate_command', command), ('motor_1/tach_rate', zero))})
+    return AntennaMachine({'step': recording}, load(), threads=1), time
+
+
+def test_a_jump_between_two_samples_moves_the_whole_response() -> None:
+    """A later jump, simulated, is the earlier one's response read later."""
+    machine, time = stepping(2.001)
+    test = machine._tests[0]
+    assert isinstance(test.command, RecordedCommand)
+    [jump] = [item for item in machine.nuisances if item.name.startswith('jump:')]
+    assert jump.high == pytest.approx(0.5 / RATE_HZ)
+    shift = 0.8 * jump.high
+    moved, _ = stepping(2.001)
+    moved._tests = [replace(test, command=replace(
+        test.command, time=test.command.time + shift, jumps=test.command.jumps + shift))]
+    moved._plans.clear()
+    moved._runs.clear()
+    exact, found = moved.predict({}, 0), machine.predict({jump.name: shift}, 0)
+    plain = machine.predict({}, 0)
+    for c in range(exact.shape[1]):
+        off, gap = np.abs(found - exact)[:, c].max(), np.abs(plain - exact)[:, c].max()
+        assert off <= 0.12 * gap + 1e-9 or c == ENCODER, f'{c}: {off} of {gap}'
+    assert np.abs(found - exact)[:, ENCODER].max() < 1e-7

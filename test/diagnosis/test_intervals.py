@@ -1,0 +1,84 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Intervals of fitted values, against covariances in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from antenna_drive.diagnosis import Form, Hypothesis, Parameter
+from antenna_drive.diagnosis.intervals import covariance, values_with_intervals
+from antenna_drive.diagnosis.least_squares import FitState
+from antenna_drive.diagnosis.settings import DEFAULT
+import numpy as np
+import pytest
+
+SETTINGS = DEFAULT.interval
+CHANGE = Parameter('part.effect.change', '1', -0.9, 0.9, 0.005)
+TOLERANCE = Parameter('tolerance', '1', -0.02, 0.02, 0.006, prior_sigma=0.02 / 3.0 ** 0.5)
+OTHER = Parameter('other', '1', -1.0, 1.0, 0.1)
+
+
+def state(columns: list[np.ndarray], parameters: tuple[Parameter, ...]) -> FitState:
+    jacobian = np.stack(columns, axis=1).astype(np.float32)
+    blank = np.zeros(len(jacobian))
+    return FitState(parameters, np.full(len(parameters), 0.01), blank, jacobian,
+                    np.ones(len(jacobian)), 0.0)
+
+
+def test_uncorrelated_values_have_the_textbook_variance() -> None:
+    random = np.random.default_rng(0)
+    one, other = 300.0 * random.normal(size=(2, 4000))
+    exact = replace(SETTINGS, derivative_error=1e-3)
+    found = covariance(state([one, other], (CHANGE, OTHER)), 1.0, exact)
+    assert np.diag(found) == pytest.approx([1.0 / (one @ one), 1.0 / (other @ other)], rel=0.01)
+    doubled = covariance(state([one, other], (CHANGE, OTHER)), 4.0, exact)
+    assert np.diag(doubled) == pytest.approx(4.0 * np.diag(found), rel=0.01)
+
+
+@pytest.mark.parametrize('rounding', [0.0, 0.005, 0.05])
+def test_a_change_is_no_surer_than_the_tolerance_of_its_number(rounding: float) -> None:
+    """Rounded derivatives do not tell the two apart, however many samples there are."""
+    random = np.random.default_rng(1)
+    signal = 3000.0 * random.normal(size=4000)
+    beside = signal * (1.0 + rounding * random.normal(size=4000))
+    found = covariance(state([signal, beside], (CHANGE, TOLERANCE)), 1.0, SETTINGS)
+    assert np.sqrt(found[0, 0]) == pytest.approx(TOLERANCE.prior_sigma, rel=0.05)
+
+
+@pytest.mark.parametrize(('unit', 'share'), [('1', 1.01), ('V', 1.0)])
+def test_a_change_and_a_tolerance_of_one_number_are_told_apart_by_nothing(
+        unit: str, share: float) -> None:
+    """Even if no nuisance stands for the number: a share is one of what is there."""
+    tolerant = replace(CHANGE, unit=unit, tolerance=0.02)
+    fitted = Hypothesis(('part.effect',), (Form('', (tolerant,)),), state(
+        [1e6 * np.random.default_rng(4).normal(size=4000)], (tolerant,)))
+    low, high = values_with_intervals(fitted, 1.0, SETTINGS)[tolerant.name]['ci95']
+    assert high - low == pytest.approx(2.0 * 1.96 * 0.02 / 3.0 ** 0.5 * share, rel=0.01)
+
+
+def test_no_value_is_surer_than_the_model() -> None:
+    random = np.random.default_rng(2)
+    fitted = Hypothesis(('part.effect',), (Form('', (CHANGE,)),),
+                        state([1e6 * random.normal(size=4000)], (CHANGE,)))
+    low, high = values_with_intervals(fitted, 1.0, SETTINGS)[CHANGE.name]['ci95']
+    assert high - low == pytest.approx(2.0 * 1.96 * SETTINGS.model_error * 0.01, rel=0.01)
+
+
+def test_what_the_data_do_not_tell_may_be_anything_within_its_bounds() -> None:
+    unseen = state([np.zeros(100)], (CHANGE,))
+    fitted = Hypothesis(('part.effect',), (Form('', (CHANGE,)),), unseen)
+    low, high = values_with_intervals(fitted, 1.0, SETTINGS)[CHANGE.name]['ci95']
+    assert low < -0.85
+    assert high == CHANGE.high

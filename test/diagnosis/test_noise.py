@@ -1,0 +1,127 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The noise that a recording shows, against processes whose levels and colours are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+
+from antenna_drive.diagnosis import Colour, Experiment, FloatArray
+from antenna_drive.diagnosis.noise import (
+    estimated, Process, same_noise, whitened, with_estimated_noise, with_model_error,
+)
+from antenna_drive.diagnosis.settings import DEFAULT
+import numpy as np
+import pytest
+from scipy.linalg import cholesky, solve_triangular, toeplitz
+from scipy.signal import lfilter
+
+SETTINGS = DEFAULT.noise
+INTERVAL_S = 1.0 / 70.0
+
+
+def pole(corner_hz: float) -> float:
+    return math.exp(-2.0 * math.pi * corner_hz * INTERVAL_S)
+
+
+def drawn(process: Process, count: int, seed: int = 0) -> FloatArray:
+    random = np.random.default_rng(seed)
+    drive = math.sqrt(process.slow * (1.0 - process.pole ** 2))
+    slow = lfilter([drive], [1.0, -process.pole], random.normal(size=count + 500))[500:]
+    return np.asarray(slow + math.sqrt(process.white) * random.normal(size=count))
+
+
+@pytest.mark.parametrize('process', [
+    Process(1.0, 0.0, 0.0), Process(1.3, 5.0, pole(0.6)), Process(0.3, 0.5, pole(5.0)),
+    Process(4.0, 2.0, pole(20.0))])
+def test_level_and_colour_are_found(process: Process) -> None:
+    found = estimated([drawn(process, 20000)], INTERVAL_S, 9.0, SETTINGS)
+    assert found.white == pytest.approx(process.white, rel=0.25, abs=0.05)
+    assert found.white + found.slow == pytest.approx(process.white + process.slow, rel=0.25)
+    innovations = whitened(drawn(process, 20000, seed=1), found.colour)
+    assert np.std(innovations) == pytest.approx(1.0, abs=0.05)
+    for lag in (1, 2, 5, 20):
+        assert np.mean(innovations[lag:] * innovations[:-lag]) == pytest.approx(0.0, abs=0.06)
+
+
+def test_the_filter_is_the_cholesky_factor_of_the_covariance() -> None:
+    """Whitening by the steady filter is what the inverse factor of the covariance does."""
+    process, count = Process(0.8, 3.0, 0.9), 400
+    covariance = toeplitz(process.slow * process.pole ** np.arange(count))
+    covariance += process.white * np.eye(count)
+    z = drawn(process, count)
+    exact = solve_triangular(cholesky(covariance, lower=True), z, lower=True)
+    assert whitened(z, process.colour)[60:] == pytest.approx(exact[60:], abs=1e-6)
+
+
+def test_gaps_and_spikes_change_nothing_far_away() -> None:
+    process = Process(1.0, 4.0, pole(1.0))
+    z = drawn(process, 20000)
+    clean = estimated([z], INTERVAL_S, 9.0, SETTINGS)
+    spoilt, random = z.copy(), np.random.default_rng(3)
+    spoilt[random.integers(0, z.size, 20)] += 200.0
+    spoilt[random.integers(0, z.size, 200)] = np.nan
+    found = estimated([spoilt], INTERVAL_S, 9.0, SETTINGS)
+    assert found.white == pytest.approx(clean.white, rel=0.2)
+    assert found.slow == pytest.approx(clean.slow, rel=0.3)
+    assert np.isnan(whitened(spoilt, found.colour)).sum() == np.isnan(spoilt).sum()
+
+
+def test_what_is_louder_than_noise_may_be_is_no_noise() -> None:
+    """A misfit stays a misfit: both levels are bounded."""
+    found = estimated([drawn(Process(400.0, 900.0, pole(1.0)), 5000)], INTERVAL_S, 2.0, SETTINGS)
+    assert found.white == SETTINGS.greatest_level ** 2
+    assert found.slow == 2.0
+
+
+def test_too_few_samples_tell_no_noise() -> None:
+    z = drawn(Process(4.0, 0.0, 0.0), SETTINGS.least_samples - 1)
+    assert estimated([z], INTERVAL_S, 9.0, SETTINGS) == Process(1.0, 0.0, 0.0)
+
+
+def experiment(measured: FloatArray) -> Experiment:
+    shape = (measured.size, 2)
+    time = np.asarray(INTERVAL_S * np.arange(measured.size), np.float64)
+    return Experiment('test', time, ('rate', 'angle'),
+                      ('rad/s', 'rad'), np.stack([measured, measured], axis=1),
+                      np.full(shape, 0.5), quantised=('angle',))
+
+
+def test_noise_of_an_experiment_is_taken_by_channel() -> None:
+    z = drawn(Process(4.0, 0.0, 0.0), 5000)
+    item = experiment(np.zeros(5000))
+    residual = np.stack([0.5 * z, 0.5 * z], axis=1)
+    [found] = with_estimated_noise([item], [residual], SETTINGS)
+    assert found.colours[0].level == pytest.approx(2.0, rel=0.05)
+    assert found.colours[1] == Colour(), 'a quantised reading has no noise of its own'
+    assert not same_noise(found, item, SETTINGS)
+    assert same_noise(found, replace(found), SETTINGS)
+
+
+def test_a_models_error_does_not_vanish_with_the_sampling_rate() -> None:
+    """Sampled ten times as often, a slow signal tells hardly more of a model that is wrong."""
+    def information(rate: float) -> float:
+        time = np.arange(0.0, 30.0, 1.0 / rate)
+        motion = 100.0 * np.sin(2.0 * np.pi * time / 10.0)
+        item = replace(experiment(motion), time=time)
+        [planned] = with_model_error([item], SETTINGS)
+        return float(np.sum(whitened(motion / 0.5, planned.colours[0]) ** 2))
+
+    def plain(rate: float) -> float:
+        time = np.arange(0.0, 30.0, 1.0 / rate)
+        return float(np.sum((200.0 * np.sin(2.0 * np.pi * time / 10.0)) ** 2))
+
+    assert plain(700.0) / plain(70.0) == pytest.approx(10.0, rel=0.01)
+    assert information(700.0) / information(70.0) < 2.0
