@@ -194,16 +194,17 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
     decision = evidence.decide(settings)
     lack = decision.lack
     places: Sequence[unknown_input.Place] = ()
+    located: Sequence[localisation.Located] = ()
     if decision.word in ('unknown_effect', 'partly_explained'):
         progress(0.95, 'where an unknown input may act')
         located, places = localisation.of_the_unknown(problem, none.state, lack)
-    if decision.word != 'unknown_effect':
+    if decision.word in ('explained', 'partly_explained'):
         located = localisation.of_effects(problem, decision.answers, none.state, best.state)
     left = problem.noise_level(best.state.residual) ** 2
     result = {
         'verdict': decision.word,
         'statements': verdict.statements(decision, best),
-        'where': located,
+        'where': list(located),
         'which': verdict.which(decision, settings.verdict, lambda answer: values_with_intervals(
             answer, left, settings.interval)),
         'also_seen': verdict.also_seen(hypotheses, settings),

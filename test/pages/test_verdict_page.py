@@ -44,6 +44,12 @@ FULL: dict[str, Any] = {
         {'effects': ['unknown'], 'probability': 0.1, 'parameters': {}},
         {'effects': ['none'], 'probability': 0.0, 'parameters': {}}],
     'confusable': [['motors.friction', 'dial.gain']],
+    'also_seen': [{'effect': HOSTILE, 'gain': 40.0, 'share': 0.012, 'within_tolerance': False}],
+    'could_hide': [{'effect': HOSTILE, 'size': 0.00317, 'unit': 'V'},
+                   {'effect': 'dial.gain', 'size': None, 'unit': '1'}],
+    'remains': {HOSTILE: {'unit': 'V', 'rms': 0.0456, 'noise': 0.01, 'beyond_noise': 0.0445,
+                          'matters': True},
+                'dial': {'unit': 'V', 'too_few_to_judge': 12}},
     'how_far': {'before': 9.0, 'after': 1.25, 'held_out': HOSTILE,
                 'explained_fraction': {'value': 0.9, 'ci95': [0.8, 0.95]},
                 'per_signal': {HOSTILE: {
@@ -112,7 +118,9 @@ def test_everything_is_said_and_nothing_is_taken_for_html(browser: Page, tmp_pat
                   'cannot tell apart: motors.friction, dial.gain', 'reversal 40 %',
                   f'{HOSTILE} dial 30 %', f'{HOSTILE} depends on rate (20 % of its residual)',
                   'Turn it by hand.', '3 s of computing', 'a bent needle',
-                  f'data that was not fitted: {HOSTILE}.'):
+                  f'data that was not fitted: {HOSTILE}.', 'matters',
+                  'could be and still hide here', 'dial 12 samples: too few to judge',
+                  f'not worth a name: {HOSTILE} (1.2 % of the gap).'):
         assert words in text, words
     assert 'Hold one rate.' not in text and '0.0 % none' not in text
     # every text of the made-up recording's that can be seen, and the script's data
