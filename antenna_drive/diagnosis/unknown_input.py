@@ -33,6 +33,7 @@ from functools import partial
 
 from antenna_drive.diagnosis.least_squares import LeastSquares, prior_precision
 from antenna_drive.diagnosis.machine import Experiment, FloatArray, TimeScales
+from antenna_drive.diagnosis.noise import whitened
 import numpy as np
 from scipy import linalg
 
@@ -145,6 +146,8 @@ def _responses(experiment: Experiment, change: FloatArray, shift: float,
     end = float(experiment.time[-1]) - 2.0 * scales.pulse_s
     for start, sign in _starts(shift, end, scales):
         first, last = np.searchsorted(experiment.time, [start, start + scales.response_s])
+        if first == last:
+            continue  # before the first sample
         response = np.zeros_like(change)
         response[first:last] = sign * (change[first:last] - change[first])
         found.append(response.ravel())
@@ -154,10 +157,13 @@ def _responses(experiment: Experiment, change: FloatArray, shift: float,
 def _pulses_of_reading(experiment: Experiment, channel: int, scales: TimeScales) -> FloatArray:
     """Return pulses of a reading itself, one in each column, shape (n c, pulses)."""
     rise = scales.pulse_s
-    starts = np.arange(0.0, float(experiment.time[-1]) - 2.0 * rise, rise)
+    starts = np.arange(float(experiment.time[0]), float(experiment.time[-1]) - 2.0 * rise, rise)
+    pulses = np.maximum(0.0, 1.0 - np.abs(experiment.time[:, np.newaxis] - starts - rise) / rise)
+    if experiment.colours:
+        colour = experiment.colours[channel]
+        pulses = np.array([whitened(pulse, colour) for pulse in pulses.T]).T
     columns = np.zeros((*experiment.measured.shape, starts.size))
-    columns[:, channel, :] = np.maximum(
-        0.0, 1.0 - np.abs(experiment.time[:, np.newaxis] - starts - rise) / rise)
+    columns[:, channel, :] = pulses
     return columns.reshape(-1, starts.size)
 
 
