@@ -69,6 +69,8 @@ def whitened(z: FloatArray, colour: Colour) -> FloatArray:
     """
     found = np.full(z.size, np.nan)
     there = np.isfinite(z)
+    if there.all():
+        return _innovations(z, colour.pole, colour.gain) / colour.level
     if not there.any():
         return found
     places = np.arange(z.size)

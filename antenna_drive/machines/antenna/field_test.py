@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 import math
 from typing import Any
 
@@ -29,6 +30,7 @@ from antenna_drive.machines.antenna.field_recording import (
     BIAS, CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldRecording, Note, TACH_1, TACH_2, UNITS,
 )
 from antenna_drive.machines.antenna.inference import completed
+from antenna_drive.machines.antenna.late_readings import dense
 from antenna_drive.machines.antenna.sensors import jitter_of, SensorModel
 from antenna_drive.machines.antenna.sheet_settings import as_the_sheet_says
 from antenna_drive.machines.antenna.suitability import check
@@ -88,6 +90,11 @@ class FieldTest:
     period: float
     tolerances: sheets.Tolerances
     known_start: bool = True
+
+    @cached_property
+    def output_times(self) -> FloatArray:
+        """Return the times at which a run keeps its outputs: the samples and some between [s]."""
+        return dense(self.time)
 
     def until(self, end: float) -> FieldTest:
         """Return the first part of the test, of this length [s]."""

@@ -40,7 +40,7 @@ from antenna_drive.machines.antenna.excitation import (
 from antenna_drive.machines.antenna.field_test import (
     CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, prepared, TACH_1, TACH_2, UNITS,
 )
-from antenna_drive.machines.antenna.late_readings import dense, PARTS, read_at
+from antenna_drive.machines.antenna.late_readings import PARTS, read_at
 from antenna_drive.machines.antenna.modifiers import (
     ADD, AntennaParameter, change, Modifier, ReadingModifier, RunModifier, RunSetup,
     SensorReadings,
@@ -357,7 +357,7 @@ class AntennaMachine(Machine):
         plan = self._plan(job.experiment, run, Longest(longest, SHORTEST_STEP, WAVE_STEP, turns))
         if disturbance is not None:
             plan = _disturbed(plan, run, *disturbance)
-        time = dense(test.time)
+        time = test.output_times
         samples = int(np.count_nonzero(time - time[0] < job.until))
         if samples == time.size:
             return batch.run(record, plan)
@@ -371,11 +371,11 @@ class AntennaMachine(Machine):
         """Return the steps of a run."""
         test = self._tests[k]
         if run.delay:
-            plan = schedule(test.command, run.bias, dense(test.time), longest, run.delay)
+            plan = schedule(test.command, run.bias, test.output_times, longest, run.delay)
         else:
             plan = self._kept((k, longest, run.bias), lambda: with_bias(self._kept(
                 (k, longest, test.bias),
-                lambda: schedule(test.command, test.bias, dense(test.time), longest)), run.bias))
+                lambda: schedule(test.command, test.bias, test.output_times, longest)), run.bias))
         return plan if run.gust is None else with_torque(plan, *gust.course(run.gust))
 
     def _kept(self, key: tuple[int, Longest, Bias],
@@ -403,7 +403,7 @@ class AntennaMachine(Machine):
         wanted = time + readings.clock_rate * (time - time[0])
         for begin, end, late in readings.responses:
             wanted[(time >= begin) & (time < end)] -= late
-        values = read_at(dense(time), out, wanted, readings.late) * readings.gain
+        values = read_at(self._tests[k].output_times, out, wanted, readings.late) * readings.gain
         for shape, parts in readings.waves.items():
             values[:, ENCODER] += shape.along(values[:, ENCODER], parts)
         values += readings.zero
