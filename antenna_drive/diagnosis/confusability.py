@@ -25,7 +25,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from antenna_drive.diagnosis.least_squares import FitState, LeastSquares, prior_precision
+from antenna_drive.diagnosis.least_squares import FitState, LeastSquares, proper_precision
 from antenna_drive.diagnosis.machine import FloatArray, Machine
 from antenna_drive.diagnosis.noise import with_model_error
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
@@ -119,7 +119,7 @@ def visibility(problem: LeastSquares, state: FitState,
 
     """
     machine, settings = problem.machine, problem.settings
-    factor = linalg.cho_factor(state.hessian + np.diag(prior_precision(state.parameters)))
+    factor = linalg.cho_factor(state.hessian + np.diag(proper_precision(state.parameters)))
     ids, units, sizes, remainders = [], [], [], []
     price = settings.penalty.effect + settings.penalty.parameter
     for i, effect in enumerate(machine.effects.values()):

@@ -210,7 +210,7 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         'also_seen': verdict.also_seen(hypotheses, settings),
         'confusable': decision.confusable,
         'how_far': reach,
-        'could_hide': could_hide(problem, best.state) if decision.word == 'no_gap' else [],
+        'could_hide': could_hide(problem, none.state) if decision.word == 'no_gap' else [],
         'remains': remains(problem, best.state, limits),
         'residual_tests': residual_tests(problem, best.state, lack),
         'may_enter_at': [vars(place) for place in places if place.evidence > 0.0],

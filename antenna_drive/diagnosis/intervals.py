@@ -25,7 +25,7 @@ from __future__ import annotations
 from typing import Any
 
 from antenna_drive.diagnosis.hypothesis import Hypothesis
-from antenna_drive.diagnosis.least_squares import FitState, prior_precision
+from antenna_drive.diagnosis.least_squares import FitState, proper_precision
 from antenna_drive.diagnosis.machine import FloatArray, Parameter
 from antenna_drive.diagnosis.settings import IntervalSettings
 import numpy as np
@@ -51,11 +51,8 @@ def covariance(state: FitState, left: float, settings: IntervalSettings) -> Floa
     scale = np.sqrt(np.maximum(np.diag(known), 1e-30))
     values, vectors = np.linalg.eigh(known / np.outer(scale, scale))
     sure = np.maximum(values - settings.derivative_error ** 2, 0.0)
-    prior = prior_precision(state.parameters)
-    # whatever the data say, a value lies within its bounds
-    bounds = np.array([12.0 / (p.high - p.low) ** 2 for p in state.parameters])
-    precision = np.where(prior > 0.0, prior, bounds)
-    total = np.outer(scale, scale) * ((vectors * sure) @ vectors.T) + np.diag(precision)
+    total = np.outer(scale, scale) * ((vectors * sure) @ vectors.T)
+    total += np.diag(proper_precision(state.parameters))
     unit = np.sqrt(np.diag(total))
     return np.asarray(np.linalg.inv(total / np.outer(unit, unit)) / np.outer(unit, unit))
 

@@ -465,6 +465,13 @@ def prior_precision(parameters: Sequence[Parameter]) -> FloatArray:
                      for p in parameters])
 
 
+def proper_precision(parameters: Sequence[Parameter]) -> FloatArray:
+    """Return the prior precision; without a prior that of an even spread within the bounds."""
+    prior = prior_precision(parameters)
+    even = np.array([12.0 / (p.high - p.low) ** 2 for p in parameters])
+    return np.where(prior > 0.0, prior, even)
+
+
 def _updated(jacobian: Jacobian, errors: Sequence[FloatArray],
              directions: Sequence[FloatArray]) -> Jacobian:
     """Return a Jacobian with Broyden's rank-one updates."""

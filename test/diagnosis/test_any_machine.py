@@ -147,6 +147,21 @@ def test_no_gap_says_what_could_hide() -> None:
         assert found['effects'] == [name]
 
 
+def test_what_could_hide_is_said_beside_an_effect_within_its_tolerance() -> None:
+    """Its shape has no prior, and nothing in the data tells it."""
+    body = Body({'heater.step.size': 0.05})
+    heater = body.effects['heater.step']
+    tolerant = replace(heater.forms[0].parameters[0], tolerance=0.1)
+    shape = Parameter('heater.step.shape', '1', 0.5, 2.0, 0.1, start=1.0, is_shape=True)
+    body.effects = {**body.effects, 'heater.step': replace(
+        heater, forms=(Form('', (tolerant, shape)),))}
+    result = diagnose(body).result
+    assert result['verdict'] == 'no_gap'
+    assert [item['effect'] for item in result['also_seen']] == ['heater.step']
+    hidden = {item['effect']: item['size'] for item in result['could_hide']}
+    assert hidden['heater.step'] >= 0.1
+
+
 def short(body: Body, count: int) -> Body:
     body.experiments = tuple(
         replace(e, measured=np.where(np.arange(TIME.size)[:, np.newaxis] % (TIME.size // count),
