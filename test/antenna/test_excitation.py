@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from antenna_drive.machines.antenna.excitation import SheetCommand
+from antenna_drive.machines.antenna.excitation import RecordedCommand, SheetCommand
 from antenna_drive.recording.sheet import parse_sheet
 from antenna_drive.trial.sheet import CaseSheet
 from antenna_drive.trial.waveform import command, corners
@@ -79,3 +79,24 @@ def test_a_jump_counts_at_its_own_time() -> None:
     assert waveform is not None
     jumps = np.array([0.3 * k for k in range(100)])     # 0.3, 0.6, 0.8999999999999999 ...
     assert SheetCommand(waveform)(jumps) == pytest.approx(np.tile([1.0, -1.0], 50))
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_a_corner_between_samples_is_where_its_lines_meet(seed: int) -> None:
+    """Slews at 78 Hz, with stamps that err as a recorder's do."""
+    random = np.random.default_rng(seed)
+    time = np.sort(np.arange(0.0, 40.0, 1.0 / 78.0) + random.uniform(-3e-4, 3e-4, 3120))
+    knots = np.cumsum(random.uniform(0.5, 3.0, 24))
+    rates = random.uniform(-5e-3, 5e-3, 24)
+    found = RecordedCommand.of(time, np.interp(time, knots, rates))
+    fine = np.arange(1.0, 39.0, 1e-3)
+    exact = np.interp(fine, knots, rates)
+    plain = np.abs(np.interp(fine, time, np.interp(time, knots, rates)) - exact).max()
+    assert np.abs(found(fine) - exact).max() < 0.15 * plain
+    assert found(time) == pytest.approx(np.interp(time, knots, rates), abs=1e-12)
+
+
+def test_a_curve_has_no_corners() -> None:
+    time = np.arange(0.0, 20.0, 0.01)
+    curve = np.sin(2.0 * np.pi * 0.7 * time)
+    assert RecordedCommand.of(time, curve).time.size == time.size

@@ -43,6 +43,9 @@ _PLACES = np.array([0.1, 0.5, 0.9])
 _NO_BITS = np.ones(1)   # no test sheet has a pseudo-random sequence
 # A sample is a corner of a command if it bends there by this many times more than beside it.
 _CORNER = 4.0
+# Lines are straight if they bend by at most this share of the corner between them. A corner is on
+# a sample if it is this near to it, as a share of the interval.
+_STRAIGHT, _ON_A_SAMPLE = 0.05, 0.01
 # Regular jumps repeat after one, two or four of them, at least this many times.
 _CYCLES, _FEWEST_CYCLES = (1, 2, 4), 4
 _PARABOLA = np.linalg.inv(np.vander(_PLACES, 3, increasing=True))
@@ -142,8 +145,20 @@ class RecordedCommand:
         slopes[smooth] = np.stack([np.gradient(value, time)[:-1], np.gradient(value, time)[1:]],
                                   axis=1)[smooth]
         # the three pieces of an interval with a jump: the middle one is the jump
-        return cls(times[order], values[order], np.insert(
-            np.where(large[:, np.newaxis], 0.0, slopes), np.repeat(k, 2), 0.0, axis=0), jumps)
+        pieces = np.insert(
+            np.where(large[:, np.newaxis], 0.0, slopes), np.repeat(k, 2), 0.0, axis=0)
+        return cls(times[order], values[order], pieces, jumps)._with_corners(time, value)
+
+    def _with_corners(self, time: FloatArray, value: FloatArray) -> RecordedCommand:
+        """Return the command with a corner wherever straight lines meet between two samples."""
+        k, at, before, after = _corners(time, value)
+        piece = np.searchsorted(self.time, time[k], side='right') - 1
+        slope = self.slope.copy()
+        slope[piece] = before[:, np.newaxis]
+        return replace(
+            self, time=np.insert(self.time, piece + 1, at),
+            value=np.insert(self.value, piece + 1, value[k] + before * (at - time[k])),
+            slope=np.insert(slope, piece + 1, np.stack([after, after], axis=1), axis=0))
 
     def __call__(self, time: FloatArray) -> FloatArray:
         """Return the rate command [rad/s] at these times [s]."""
@@ -177,6 +192,31 @@ def _smooth(time: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
     padded = np.pad(bend, 2)
     corner = bend > _CORNER * np.maximum(padded[:-4], padded[4:])
     return ~(corner[1:] | corner[:-1])
+
+
+def _corners(time: FloatArray, value: FloatArray,
+             ) -> tuple[NDArray[np.int64], FloatArray, FloatArray, FloatArray]:
+    """
+    Return where two straight lines meet between two samples.
+
+    Returns
+    -------
+    the number of the sample before each corner, the time of the corner [s], and the slopes before
+    and after it, shape (m,) each
+
+    """
+    slope = np.diff(value) / np.diff(time)
+    k = np.arange(2, slope.size - 2)
+    before, after = slope[k - 1], slope[k + 1]
+    bend = np.abs(after - before)
+    straight = np.maximum(np.abs(before - slope[k - 2]), np.abs(slope[k + 2] - after))
+    width = time[k + 1] - time[k]
+    with np.errstate(divide='ignore', invalid='ignore'):
+        share = (slope[k] - after) / (before - after)
+    # a corner on a sample is known as it is
+    found = ((straight < _STRAIGHT * bend)
+             & (share > _ON_A_SAMPLE) & (share < 1.0 - _ON_A_SAMPLE))
+    return k[found], (time[k] + share * width)[found], before[found], after[found]
 
 
 def regular_times(after: FloatArray, before: FloatArray) -> FloatArray:
