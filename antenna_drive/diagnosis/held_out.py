@@ -29,12 +29,12 @@ from typing import Any
 
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.least_squares import (
-    FitState, Jacobian, LeastSquares, prior_precision, weighted_product,
+    FitState, Jacobian, LeastSquares, prior_precision, weighted_product, with_initial_conditions,
 )
 from antenna_drive.diagnosis.machine import FloatArray, Form, Parameter
 from antenna_drive.diagnosis.settings import Settings
 from antenna_drive.diagnosis.training import (
-    covariance, Fixed, Part, settled, Slopes, trained, with_initial_conditions,
+    covariance, Fixed, Part, settled, Slopes, trained,
 )
 import numpy as np
 
@@ -256,7 +256,8 @@ class _Judge:
     def second_half(self, k: int) -> _Fold:
         """Judge on the second half of a test what the first half has taught."""
         machine, whole = self._problem.machine, self._problem.experiments[k]
-        first = (whole.time < whole.time[-1] / 2.0)[:, np.newaxis]
+        middle = 0.5 * (whole.time[0] + whole.time[-1])  # a window may begin later than its run
+        first = (whole.time < middle)[:, np.newaxis]
         part, testing = (
             Part(machine, [k], [replace(whole, measured=np.where(used, whole.measured, np.nan))])
             for used in (first, ~first))

@@ -428,6 +428,17 @@ def least_cost(problem: LeastSquares, trials: Sequence[dict[str, float]], experi
     return least, best
 
 
+def with_initial_conditions(problem: LeastSquares, point: dict[str, float]) -> dict[str, float]:
+    """Return a point with the initial conditions that fit the first moments best."""
+    until = problem.machine.time_scales.start_s
+    for k in range(len(problem.experiments)):
+        trials = problem.machine.initial_conditions(k)
+        if trials:
+            _, point = least_cost(
+                problem, [point, *({**point, **trial} for trial in trials)], k, until)
+    return point
+
+
 def transposed_product(jacobian: Jacobian, vector: FloatArray) -> FloatArray:
     """Return the product of the transposed Jacobian and a vector, shape (m,)."""
     return np.asarray(jacobian.T @ vector.astype(np.float32), np.float64)

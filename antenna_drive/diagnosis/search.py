@@ -34,7 +34,9 @@ from functools import partial
 from typing import Any
 
 from antenna_drive.diagnosis.hypothesis import Hypothesis
-from antenna_drive.diagnosis.least_squares import FitState, Jacobian, least_cost, LeastSquares
+from antenna_drive.diagnosis.least_squares import (
+    FitState, Jacobian, LeastSquares, with_initial_conditions,
+)
 from antenna_drive.diagnosis.machine import Parameter
 from antenna_drive.diagnosis.noise import same_noise, with_estimated_noise
 from antenna_drive.diagnosis.screening import (
@@ -100,7 +102,7 @@ class Search:
     def _nuisances_alone(self) -> Hypothesis:
         """Fit the nuisances alone; the misfit counts as noise."""
         iterations = self.settings.iterations
-        point = self._with_initial_conditions({})
+        point = with_initial_conditions(self.problem, {})
         first = self.problem.start(self.machine.nuisances, point)
         self.problem = self._at_noise(self.problem.noise_level(first.residual))
         state = self.problem.start(self.machine.nuisances, point,
@@ -109,7 +111,7 @@ class Search:
         for _ in range(self.settings.first_passes):
             before, cost = self.problem.scale, state.cost
             self.problem = self._at_noise(min(before, self.problem.noise_level(state.residual)))
-            point = self._with_initial_conditions(state.point())
+            point = with_initial_conditions(self.problem, state.point())
             state = self.problem.fit(self.problem.start(self.machine.nuisances, point), iterations)
             if self.problem.scale > self.settings.sharper * before and (
                     before > 1.0 or cost - state.cost < self.settings.first_gain * cost):
@@ -136,16 +138,6 @@ class Search:
             found = self._sorted(partial(
                 self._refitted, problem, shared, self.settings.iterations), finalists)
         return found
-
-    def _with_initial_conditions(self, point: dict[str, float]) -> dict[str, float]:
-        """Return the point with the initial conditions that fit the first moments best."""
-        until = self.machine.time_scales.start_s
-        for k in range(len(self.problem.experiments)):
-            trials = self.machine.initial_conditions(k)
-            if trials:
-                _, point = least_cost(
-                    self.problem, [point, *({**point, **trial} for trial in trials)], k, until)
-        return point
 
     # -- single effects ------------------------------------------------------------------------
 
@@ -205,7 +197,7 @@ class Search:
 
     def _settled(self, hypothesis: Hypothesis) -> Hypothesis:
         """Fit with a fresh Jacobian."""
-        point = self._with_initial_conditions(hypothesis.state.point())
+        point = with_initial_conditions(self.problem, hypothesis.state.point())
         state = self.problem.start(hypothesis.state.parameters, point)
         return replace(hypothesis, state=self.problem.fit(
             state, self.settings.settling_iterations))

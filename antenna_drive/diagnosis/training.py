@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import math
 
 from antenna_drive.diagnosis.least_squares import (
-    FitState, Jacobian, least_cost, LeastSquares, prior_precision,
+    FitState, Jacobian, LeastSquares, prior_precision, with_initial_conditions,
 )
 from antenna_drive.diagnosis.machine import (
     Experiment, FloatArray, Machine, Parameter, Point, TimeScales,
@@ -189,17 +189,6 @@ def settled(problem: LeastSquares, state: FitState, settings: Settings) -> FitSt
         if before - state.cost < max(search.settled, search.final_gain * before):
             break
     return state
-
-
-def with_initial_conditions(problem: LeastSquares, point: dict[str, float]) -> dict[str, float]:
-    """Return a point with the initial conditions that fit the first moments best."""
-    until = problem.machine.time_scales.start_s
-    for k in range(len(problem.experiments)):
-        trials = problem.machine.initial_conditions(k)
-        if trials:
-            _, point = least_cost(
-                problem, [point, *({**point, **trial} for trial in trials)], k, until)
-    return point
 
 
 def covariance(problem: LeastSquares, state: FitState) -> FloatArray:
