@@ -56,7 +56,7 @@ class _Run:
         self.complete: deque[int] = deque()
         self.next: int | None = None
         self.heard: set[str] = set()
-        # the newest step that anybody had sent when every unit was heard: older ones are memories
+        # the conductor's newest step when every unit was heard: what is older are memories
         self.newest: int | None = None
 
     def has_begun(self, over: bool) -> bool:
@@ -156,7 +156,10 @@ class Follower:
         frames[unit] = frame
         run.heard.add(unit)
         if run.newest is None and len(run.heard) == len(self._lengths):
-            run.newest = max(run.steps)
+            # A unit goes one step ahead of the conductor. The conductor may be waiting for the
+            # follower, so the unit's last step need not become complete before this one begins.
+            run.newest = max(number - (self._conductor not in of_step)
+                             for number, of_step in run.steps.items())
         if len(frames) == len(self._lengths):
             run.complete.append(number)
 

@@ -99,6 +99,17 @@ def test_memories_with_a_gap_are_followed_from_behind_it() -> None:
     assert follower.lost == 10, 'a gap behind the beginning is a loss'
 
 
+def test_a_drive_that_waits_for_its_follower_is_followed() -> None:
+    follower = Follower(LENGTHS, 'test_signal')
+    # The units have made step 1; the conductor sends it when the follower has taken step 0.
+    for unit, number in (('motor_1', 0), ('motor_1', 1), ('plant', 0), ('plant', 1),
+                         ('test_signal', 0)):
+        follower.receive(unit, frame(unit, number))
+    assert [step.number for step in follower.steps()] == [0]
+    follower.receive('test_signal', frame('test_signal', 1))
+    assert [step.number for step in follower.steps()] == [1]
+
+
 def test_memories_of_a_drive_that_has_ended_are_kept() -> None:
     follower = Follower(LENGTHS, 'test_signal')
     for unit in UNITS:
