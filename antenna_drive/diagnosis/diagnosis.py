@@ -22,6 +22,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
+from statistics import fmean
 import time
 from typing import Any
 
@@ -32,7 +33,7 @@ from antenna_drive.diagnosis.elimination import backward_elimination, forward_se
 from antenna_drive.diagnosis.evidence import Evidence
 from antenna_drive.diagnosis.held_out import held_out
 from antenna_drive.diagnosis.hypothesis import Hypothesis
-from antenna_drive.diagnosis.intervals import values_with_intervals
+from antenna_drive.diagnosis.intervals import inflation, values_with_intervals
 from antenna_drive.diagnosis.lack_of_fit import lack_of_fit, remains, residual_tests
 from antenna_drive.diagnosis.least_squares import LeastSquares
 from antenna_drive.diagnosis.machine import Machine
@@ -187,10 +188,13 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         search, *backward_elimination(search, search.run(), settings), settings)
     # the noise is that of the motion that was found
     problem = search.whole
-    none = hypotheses[0]
+    none, best = hypotheses[0], best.with_jacobian(problem)
     progress(0.9, 'withheld data')
     reach = held_out(problem, none, best, threads)
-    evidence = _evidence(problem, hypotheses, best, reach['explained_fraction']['ci95'][1])
+    inflated = dict(zip((p.name for p in best.state.parameters),
+                        inflation(problem, best.state).tolist(), strict=True))
+    evidence = _evidence(problem, hypotheses, best, reach['explained_fraction']['ci95'][1],
+                         fmean([inflated[p.name] for p, _ in best.values] or [1.0]))
     decision = evidence.decide(settings)
     lack = decision.lack
     places: Sequence[unknown_input.Place] = ()
@@ -200,14 +204,13 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         located, places = localisation.of_the_unknown(problem, none.state, lack)
     if decision.word in ('explained', 'partly_explained'):
         located = localisation.of_effects(problem, decision.answers, none.state, best.state)
-    left = problem.noise_level(best.state.residual) ** 2
     result = {
         'verdict': decision.word,
         'statements': verdict.statements(decision, best),
         'where': list(located),
         'which': verdict.which(decision, settings.verdict, lambda answer: values_with_intervals(
-            answer, left, settings.interval)),
-        'also_seen': verdict.also_seen(hypotheses, settings),
+            answer, lambda name: inflated.get(name, evidence.inflation), settings.interval)),
+        'also_seen': verdict.also_seen(hypotheses, settings, evidence.inflation),
         'confusable': decision.confusable,
         'how_far': reach,
         'could_hide': could_hide(problem, none.state) if decision.word == 'no_gap' else [],
@@ -223,10 +226,10 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
 
 
 def _evidence(problem: LeastSquares, hypotheses: Sequence[Hypothesis], best: Hypothesis,
-              explained: float | None) -> Evidence:
+              explained: float | None, inflated: float) -> Evidence:
     """Return the fits with what each leaves; only that of the best has converged."""
     top = verdict.best(hypotheses, problem.settings)
     raw = problem.residuals({})
     return Evidence(hypotheses, [
         lack_of_fit(problem, raw, best if h is top else h, explained if h.named else None)
-        for h in hypotheses])
+        for h in hypotheses], inflated)

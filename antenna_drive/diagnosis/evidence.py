@@ -37,22 +37,24 @@ class Evidence:
     ----------
     hypotheses : everything that was fitted, the nuisances alone among them
     lacks : what each of them leaves
+    inflation : of the cost's differences, see `intervals.inflation`
 
     """
 
     hypotheses: Sequence[Hypothesis]
     lacks: Sequence[LackOfFit]
+    inflation: float = 1.0
 
     def decide(self, settings: Settings) -> Decision:
         """Decide with these thresholds, on what the best hypothesis leaves under them."""
-        best = verdict.best(self.hypotheses, settings)
+        best = verdict.best(self.hypotheses, settings, self.inflation)
         lack = next(lack for h, lack in zip(self.hypotheses, self.lacks, strict=True)
                     if h is best)
-        return verdict.decide(self.hypotheses, lack, settings)
+        return verdict.decide(self.hypotheses, lack, settings, self.inflation)
 
     def as_data(self) -> list[dict[str, Any]]:
         """Return the evidence as plain data, for the JSON."""
-        return [{'effects': list(h.effects), 'cost': h.cost,
+        return [{'effects': list(h.effects), 'cost': h.cost, 'inflation': self.inflation,
                  'forms': [_form_data(form, h.state.point()) for form in h.forms],
                  'lack_of_fit': asdict(lack)}
                 for h, lack in zip(self.hypotheses, self.lacks, strict=True)]
@@ -68,7 +70,8 @@ class Evidence:
 
         """
         return cls([_hypothesis(item) for item in data],
-                   [LackOfFit(**item['lack_of_fit']) for item in data])
+                   [LackOfFit(**item['lack_of_fit']) for item in data],
+                   data[0].get('inflation', 1.0) if data else 1.0)
 
 
 def _form_data(form: Form, point: Mapping[str, float]) -> dict[str, Any]:

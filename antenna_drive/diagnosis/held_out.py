@@ -25,17 +25,17 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 import math
+from statistics import fmean
 from typing import Any
 
 from antenna_drive.diagnosis.hypothesis import Hypothesis
+from antenna_drive.diagnosis.intervals import covariance, inflation
 from antenna_drive.diagnosis.least_squares import (
     FitState, Jacobian, LeastSquares, prior_precision, weighted_product, with_initial_conditions,
 )
 from antenna_drive.diagnosis.machine import FloatArray, Form, Parameter
 from antenna_drive.diagnosis.settings import Settings
-from antenna_drive.diagnosis.training import (
-    covariance, Fixed, Part, settled, Slopes, trained,
-)
+from antenna_drive.diagnosis.training import Fixed, Part, settled, Slopes, trained
 import numpy as np
 
 _TURNS = ('each recording in turn, with the effect as the others have it; offsets within the '
@@ -163,7 +163,7 @@ class _Judge:
         """Take the derivatives at the model as configured and at both optima."""
         self._problem = problem
         self._settings: Settings = problem.settings
-        none, best = (_with_jacobian(problem, h) for h in (none, best))
+        none, best = (h.with_jacobian(problem) for h in (none, best))
         self._none, self._best = none, best
         self._without, self._with = (Slopes.of(problem, h.state) for h in (none, best))
         self._start: dict[str, float] = {}
@@ -192,12 +192,27 @@ class _Judge:
                               self._settings.held_out.iterations)
         if unaided.cost < (1.0 + self._settings.search.doubtful) * found.cost:
             unaided = settled(problem, unaided, self._settings)
+            found = min(found, self._added(problem, part, unaided), key=lambda s: s.cost)
         return problem, unaided, found
+
+    def _added(self, problem: LeastSquares, part: Part, unaided: FitState) -> FitState:
+        """
+        Fit the effects on top of a fit without them.
+
+        A fit of everything at once may bend the nuisances to what a ripple does, and stop there.
+        """
+        own = part.parameters([p for p in self._best.state.parameters if p.name in self._effects])
+        point = {**unaided.point(), **self._start}
+        state = problem.start_from(unaided.parameters, unaided.jacobian, own, point)
+        return settled(problem, problem.fit(state, self._settings.held_out.iterations),
+                       self._settings)
 
     def _undetermined(self, problem: LeastSquares, unaided: FitState, found: FitState,
                       ) -> tuple[dict[str, str], FloatArray]:
         """Return the reasons why effects cannot be judged, by id, and the fit's covariance."""
-        spread = covariance(problem, found)
+        own = [v for p, v in zip(found.parameters, inflation(problem, found), strict=True)
+               if p.name in self._effects]
+        spread = covariance(found, fmean(own or [1.0]), self._settings.interval)
         price = self._settings.penalty.parameter
         gain = unaided.cost - found.cost
         reasons = {}
@@ -317,13 +332,6 @@ class _Judge:
         problem = Fixed(testing, held, self._settings)
         return problem.fit(problem.start(own, dict(begin), slopes.for_part(testing, own)),
                            self._settings.held_out.iterations)
-
-
-def _with_jacobian(problem: LeastSquares, hypothesis: Hypothesis) -> Hypothesis:
-    state = hypothesis.state
-    if state.jacobian.size:
-        return hypothesis
-    return replace(hypothesis, state=problem.start(state.parameters, state.point()))
 
 
 def _shaped(problem: LeastSquares, residual: FloatArray) -> FloatArray:

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
-from antenna_drive.diagnosis.least_squares import FitState
+from antenna_drive.diagnosis.least_squares import FitState, LeastSquares
 from antenna_drive.diagnosis.machine import Form, Parameter, Point
 from antenna_drive.diagnosis.settings import PenaltySettings
 
@@ -71,6 +71,12 @@ class Hypothesis:
     def penalised(self, settings: PenaltySettings) -> float:
         """Return the cost with the penalty of the effects."""
         return self.state.cost + penalty(self.forms, self.state.point(), settings)
+
+    def with_jacobian(self, problem: LeastSquares) -> Hypothesis:
+        """Return the hypothesis with a Jacobian, taken where its fit ended if it has none."""
+        if self.state.jacobian.size:
+            return self
+        return replace(self, state=problem.start(self.state.parameters, self.state.point()))
 
     def without_jacobian(self, keep_hessian: bool = False) -> Hypothesis:
         """Return the hypothesis without its Jacobian, which takes most of the memory."""

@@ -12,7 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Intervals of fitted values, by Laplace's approximation.
+Intervals of fitted values, by Laplace's approximation with a cluster-robust variance.
+
+What a fit leaves is never quite independent noise: a model's own error lasts, an event concerns
+one second. The scores of the likelihood are therefore summed over blocks of time, and the scatter
+of these sums is compared with what independent noise would give (K.-Y. Liang, S. L. Zeger,
+Biometrika 73, 1986).
 
 Difference quotients of a drive that sticks and slips are right to a tenth. A Hessian of them knows
 nothing of directions in which two columns differ by less. There the priors alone count: without
@@ -22,10 +27,11 @@ a difference quotient.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from antenna_drive.diagnosis.hypothesis import Hypothesis
-from antenna_drive.diagnosis.least_squares import FitState, proper_precision
+from antenna_drive.diagnosis.least_squares import FitState, LeastSquares, proper_precision
 from antenna_drive.diagnosis.machine import FloatArray, Parameter
 from antenna_drive.diagnosis.settings import IntervalSettings
 import numpy as np
@@ -33,7 +39,35 @@ import numpy as np
 _TWO_SIDED_95 = 1.96
 
 
-def covariance(state: FitState, left: float, settings: IntervalSettings) -> FloatArray:
+def inflation(problem: LeastSquares, state: FitState) -> FloatArray:
+    """
+    Return the variance of each fitted value over that with independent noise, shape (m,).
+
+    It is 1 at least.
+
+    Parameters
+    ----------
+    problem
+        that was fitted
+    state
+        of a fit that has converged, with its Jacobian
+
+    """
+    jacobian, weight = state.jacobian, state.weight
+    block_s = problem.machine.time_scales.block_s
+    labels = np.concatenate([
+        k * 1e6 + np.repeat(np.floor(e.time / block_s), e.measured.shape[1])
+        for k, e in enumerate(problem.experiments)])
+    starts = np.flatnonzero(np.diff(labels, prepend=-1.0))
+    scores = np.add.reduceat(
+        jacobian * (weight * state.residual).astype(np.float32)[:, np.newaxis], starts, axis=0)
+    spread = covariance(state, 1.0, problem.settings.interval)
+    found = np.sum(np.square(scores.astype(float) @ spread), axis=0)
+    independent = np.sum((state.hessian @ spread) * spread, axis=0)
+    return np.asarray(np.maximum(found / np.maximum(independent, 1e-30), 1.0))
+
+
+def covariance(state: FitState, inflated: float, settings: IntervalSettings) -> FloatArray:
     """
     Return the covariance of fitted values, shape (m, m).
 
@@ -41,13 +75,13 @@ def covariance(state: FitState, left: float, settings: IntervalSettings) -> Floa
     ----------
     state
         of a fit that has converged
-    left
-        mean square of the residual, in variances of the noise; above 1 it widens the intervals
+    inflated
+        variance over that with independent noise, 1 or more
     settings
         thresholds
 
     """
-    known = state.hessian / max(left, 1.0)
+    known = state.hessian / inflated
     scale = np.sqrt(np.maximum(np.diag(known), 1e-30))
     values, vectors = np.linalg.eigh(known / np.outer(scale, scale))
     sure = np.maximum(values - settings.derivative_error ** 2, 0.0)
@@ -57,16 +91,29 @@ def covariance(state: FitState, left: float, settings: IntervalSettings) -> Floa
     return np.asarray(np.linalg.inv(total / np.outer(unit, unit)) / np.outer(unit, unit))
 
 
-def values_with_intervals(hypothesis: Hypothesis, left: float,
+def values_with_intervals(hypothesis: Hypothesis, inflated: Callable[[str], float],
                           settings: IntervalSettings) -> dict[str, Any]:
-    """Return the values of a hypothesis' effects with 95 percent intervals, for the JSON."""
+    """
+    Return the values of a hypothesis' effects with 95 percent intervals, for the JSON.
+
+    Parameters
+    ----------
+    hypothesis
+        whose fit has converged
+    inflated
+        returns the variance of a parameter over that with independent noise
+    settings
+        thresholds
+
+    """
     state = hypothesis.state
-    sigma = np.sqrt(np.diag(covariance(state, left, settings)))
     names = [p.name for p in state.parameters]
     found = {}
     for parameter, value in hypothesis.values:
+        place = names.index(parameter.name)
+        variance = covariance(state, inflated(parameter.name), settings)[place, place]
         half_width = _TWO_SIDED_95 * float(np.hypot(
-            max(sigma[names.index(parameter.name)], _same_number(parameter, value)),
+            max(float(variance) ** 0.5, _same_number(parameter, value)),
             settings.model_error * abs(value)))
         found[parameter.name] = {
             'value': value, 'ci95': [max(value - half_width, parameter.low),

@@ -47,7 +47,8 @@ def lack_of_fit(problem: LeastSquares, raw: FloatArray, best: Hypothesis,
     point = best.state.point()
     implausibility = max((form.implausibility(point) for form in best.forms), default=0.0)
     return LackOfFit(_slow_excess(problem, best.state), _left(problem, raw, best), fast,
-                     fast_left, implausibility, explained, loudest, _enough(problem))
+                     fast_left, implausibility, explained, loudest, _enough(problem),
+                     bool(best.named))
 
 
 def _slow_excess(problem: LeastSquares, state: FitState) -> float:

@@ -178,7 +178,8 @@ class LeastSquares:
     def judged(self, state: FitState) -> FitState:
         """Return a state of a problem with other noise as it is in this one, not fitted."""
         residual = self.residuals(state.point())
-        return replace(state, residual=residual, weight=self.weights(residual),
+        return replace(state.without_jacobian(keep_hessian=True), residual=residual,
+                       weight=self.weights(residual),
                        cost=self._cost(residual, state.x, prior_precision(state.parameters)))
 
     def noise_level(self, residual: FloatArray) -> float:

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import math
 
 from antenna_drive.diagnosis.least_squares import (
-    FitState, Jacobian, LeastSquares, prior_precision, with_initial_conditions,
+    FitState, Jacobian, LeastSquares, with_initial_conditions,
 )
 from antenna_drive.diagnosis.machine import (
     Experiment, FloatArray, Machine, Parameter, Point, TimeScales,
@@ -189,16 +189,3 @@ def settled(problem: LeastSquares, state: FitState, settings: Settings) -> FitSt
         if before - state.cost < max(search.settled, search.final_gain * before):
             break
     return state
-
-
-def covariance(problem: LeastSquares, state: FitState) -> FloatArray:
-    """
-    Return the covariance of a fit's parameters (Laplace), shape (m, m).
-
-    Where more is left than the sensors' noise, it counts as noise.
-    """
-    hessian = state.hessian + np.diag(prior_precision(state.parameters))
-    scale = np.sqrt(np.maximum(np.diag(hessian), 1e-30))
-    level = max(1.0, problem.noise_level(state.residual))
-    return np.asarray(level ** 2 * np.linalg.pinv(hessian / np.outer(scale, scale))
-                      / np.outer(scale, scale))

@@ -15,10 +15,12 @@
 From fitted hypotheses to probabilities, with 'unknown' and 'none' among the answers.
 
 A hypothesis is as probable as exp(-score / temperature). Its score is half a chi-square with
-penalties. Such probabilities are right only as far as the models are, so the temperature is not
-one: it and the other thresholds were set on trials with an independent machine
-(`settings.VerdictSettings`). 'Unknown' is an absolute test of the residual that the best
-hypothesis leaves.
+penalties. Such probabilities are right only as far as the models are. Differences of the cost are
+therefore divided by the inflation of the variance, as in QAIC (K. P. Burnham, D. R. Anderson,
+Model Selection and Multimodel Inference, 2nd edition, 2002, section 2.5), see
+`intervals.inflation`. The temperature is not one either: it and the other thresholds were set on
+trials with an independent machine (`settings.VerdictSettings`). 'Unknown' is an absolute test of
+the residual that the best hypothesis leaves.
 """
 
 from __future__ import annotations
@@ -49,6 +51,7 @@ class LackOfFit:
         without effects
     loudest : signal whose fast part is the loudest
     enough : False if no signal has samples enough to be judged
+    named : False if the hypothesis names nothing that could have closed the gap
 
     """
 
@@ -60,6 +63,7 @@ class LackOfFit:
     explained: float | None = None
     loudest: str = ''
     enough: bool = True
+    named: bool = True
 
 
 @dataclass(frozen=True)
@@ -104,7 +108,8 @@ class Decision:
     confusable: Sequence[Sequence[str]]
 
 
-def decide(hypotheses: Sequence[Hypothesis], lack: LackOfFit, settings: Settings) -> Decision:
+def decide(hypotheses: Sequence[Hypothesis], lack: LackOfFit, settings: Settings,
+           inflation: float = 1.0) -> Decision:
     """
     Conclude from fits.
 
@@ -116,11 +121,13 @@ def decide(hypotheses: Sequence[Hypothesis], lack: LackOfFit, settings: Settings
         what the best of them leaves
     settings
         thresholds
+    inflation
+        of the cost's differences
 
     """
     unknown = unknown_probability(lack, settings.verdict)
-    answers = rank(hypotheses, unknown, settings)
-    named = best(hypotheses, settings).named
+    answers = rank(hypotheses, unknown, settings, inflation)
+    named = best(hypotheses, settings, inflation).named
     top = max(answers, key=lambda answer: answer.probability)
     if unknown > top.probability:
         word = 'unknown_effect'
@@ -129,7 +136,7 @@ def decide(hypotheses: Sequence[Hypothesis], lack: LackOfFit, settings: Settings
     else:
         word = 'explained' if unknown < settings.verdict.partly else 'partly_explained'
     return Decision(word, answers, unknown, lack,
-                    confusable(hypotheses, settings) if named else [])
+                    confusable(hypotheses, settings, inflation) if named else [])
 
 
 def which(decision: Decision, settings: VerdictSettings,
@@ -182,17 +189,20 @@ def statements(decision: Decision, best_hypothesis: Hypothesis) -> dict[str, Any
 class _Scores:
     """The scores of hypotheses, which depend on what the others gain."""
 
-    def __init__(self, hypotheses: Sequence[Hypothesis], settings: Settings) -> None:
-        none = min(h.cost for h in hypotheses if not h.effects)
+    def __init__(self, hypotheses: Sequence[Hypothesis], settings: Settings,
+                 inflation: float) -> None:
+        self._none = none = min(h.cost for h in hypotheses if not h.effects)
         single = min((h.cost for h in hypotheses if len(h.effects) == 1), default=none)
-        self._first_gain = max(none - single, 0.0)
+        self._first_gain = max(none - single, 0.0) / inflation
         self._settings = settings
+        self._inflation = inflation
 
     def __call__(self, hypothesis: Hypothesis) -> float:
         """Return the cost of a hypothesis with all penalties."""
         settings = self._settings.verdict
         count = len(hypothesis.effects)
-        total = hypothesis.penalised(self._settings.penalty)
+        total = hypothesis.penalised(self._settings.penalty) - hypothesis.cost
+        total += self._none + (hypothesis.cost - self._none) / self._inflation
         if count > 1:
             # a second effect must do more than mend the form of the first; the same effect in
             # a second place has the same form and mends nothing
@@ -202,13 +212,14 @@ class _Scores:
         return total
 
 
-def also_seen(hypotheses: Sequence[Hypothesis], settings: Settings) -> list[dict[str, Any]]:
+def also_seen(hypotheses: Sequence[Hypothesis], settings: Settings,
+              inflation: float = 1.0) -> list[dict[str, Any]]:
     """
     Return effects that show and are not worth a name, for the JSON: the greatest gain first.
 
     Each is within its tolerance, or explains a small share of the gap beside what is named.
     """
-    top = best(hypotheses, settings)
+    top = best(hypotheses, settings, inflation)
     gap = max(h.cost for h in hypotheses if not h.effects) - top.cost
     found: dict[str, dict[str, Any]] = {}
     for hypothesis in hypotheses:
@@ -217,10 +228,10 @@ def also_seen(hypotheses: Sequence[Hypothesis], settings: Settings) -> list[dict
             continue
         effect = extra.pop()
         without = min(h.cost for h in hypotheses if set(h.effects) == set(top.named))
-        gain = without - hypothesis.cost
+        gain = (without - hypothesis.cost) / inflation
         if gain > settings.penalty.effect and gain > found.get(effect, {}).get('gain', 0.0):
             found[effect] = {'effect': effect, 'gain': gain,
-                             'share': min(gain / gap, 1.0) if gap > 0.0 else 0.0,
+                             'share': min(inflation * gain / gap, 1.0) if gap > 0.0 else 0.0,
                              'within_tolerance': effect not in hypothesis.named}
     return sorted(found.values(), key=lambda item: -float(item['gain']))
 
@@ -230,8 +241,10 @@ def unknown_probability(lack: LackOfFit, settings: VerdictSettings) -> float:
     def logit(value: float, tipping: float, slope: float) -> float:
         return slope * math.log(max(value / tipping, 1e-3))
 
-    slow = _logistic(logit(lack.slow_excess, settings.slow, settings.slow_slope)
-                     + logit(lack.left, settings.left, settings.left_slope))
+    slow = _logistic(
+        logit(lack.slow_excess, settings.slow, settings.slow_slope)
+        # an effect of another form than the true one leaves little; no effect has no such excuse
+        + (logit(lack.left, settings.left, settings.left_slope) if lack.named else 0.0))
     # a sensor may be noisier than its sheet says; but noise does not shrink with an effect
     fast = (_logistic(logit(lack.fast, settings.fast, settings.fast_slope))
             * _logistic(logit(lack.fast_left, settings.fast_left, settings.fast_left_slope)))
@@ -249,7 +262,8 @@ def _logistic(logit: float) -> float:
     return 1.0 / (1.0 + math.exp(-min(max(logit, -8.0), 8.0)))
 
 
-def rank(hypotheses: Sequence[Hypothesis], unknown: float, settings: Settings) -> list[Answer]:
+def rank(hypotheses: Sequence[Hypothesis], unknown: float, settings: Settings,
+         inflation: float = 1.0) -> list[Answer]:
     """
     Return what the hypotheses name, by score, with probabilities.
 
@@ -261,9 +275,11 @@ def rank(hypotheses: Sequence[Hypothesis], unknown: float, settings: Settings) -
         probability of something else, from `unknown_probability`
     settings
         thresholds
+    inflation
+        of the cost's differences
 
     """
-    score = _Scores(hypotheses, settings)
+    score = _Scores(hypotheses, settings, inflation)
     scores = np.array([score(h) for h in hypotheses])
     weight = np.exp(-(scores - scores.min()) / settings.verdict.temperature)
     weight /= weight.sum()
@@ -277,18 +293,21 @@ def rank(hypotheses: Sequence[Hypothesis], unknown: float, settings: Settings) -
     return list(found.values())
 
 
-def best(hypotheses: Sequence[Hypothesis], settings: Settings) -> Hypothesis:
+def best(hypotheses: Sequence[Hypothesis], settings: Settings,
+         inflation: float = 1.0) -> Hypothesis:
     """Return the hypothesis with the least score."""
-    return min(hypotheses, key=_Scores(hypotheses, settings))
+    return min(hypotheses, key=_Scores(hypotheses, settings, inflation))
 
 
-def confusable(hypotheses: Sequence[Hypothesis], settings: Settings) -> list[list[str]]:
+def confusable(hypotheses: Sequence[Hypothesis], settings: Settings,
+               inflation: float = 1.0) -> list[list[str]]:
     """
     Return groups of effects that the data cannot tell apart, the likeliest of each first.
 
     Effects are in a group if one in the other's place costs hardly more.
     """
-    top, score = best(hypotheses, settings), _Scores(hypotheses, settings)
+    score = _Scores(hypotheses, settings, inflation)
+    top = min(hypotheses, key=score)
     limit = score(top) + settings.verdict.confusable
     groups: list[list[str]] = []
     for effect in top.named:

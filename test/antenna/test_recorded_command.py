@@ -53,7 +53,7 @@ def test_many_jumps_tell_their_times_better_than_each_its_own() -> None:
     for half, start in random.uniform([2.5, 0.0], [3.75, 3.0], (60, 2)):
         true = start + half * np.arange(int(30.0 / half))
         after = PERIOD * np.floor(true / PERIOD)
-        regular.append(np.mean(np.abs(regular_times(after, after + PERIOD) - true)))
+        regular.append(np.mean(np.abs(regular_times(after, after + PERIOD)[0] - true)))
         halfway.append(np.mean(np.abs(after + 0.5 * PERIOD - true)))
     assert np.median(regular) < 0.4 * np.median(halfway)
 
@@ -62,14 +62,46 @@ def test_jumps_that_alternate_between_two_pauses_are_regular() -> None:
     """No time is off by more than the slow beat of the period and the samples leaves open."""
     true = np.cumsum(np.tile([4.7743, 1.5011], 12))
     after = PERIOD * np.floor(true / PERIOD)
-    found = regular_times(after, after + PERIOD)
+    found, regular = regular_times(after, after + PERIOD)
+    assert regular.all()
     assert np.ptp(np.diff(found)[::2]) < 1e-9
     assert np.abs(found - true).max() < 0.3 * PERIOD
 
 
 def test_irregular_jumps_are_taken_halfway() -> None:
     after = np.array([1.0, 2.3, 2.9, 5.1, 5.6, 9.0, 9.2, 12.0])
-    np.testing.assert_allclose(regular_times(after, after + PERIOD), after + 0.5 * PERIOD)
+    found, regular = regular_times(after, after + PERIOD)
+    np.testing.assert_allclose(found, after + 0.5 * PERIOD)
+    assert not regular.any()
+
+
+def test_jumps_on_a_grid_are_regular_though_some_of_its_times_have_none() -> None:
+    """Levels that are drawn at even times repeat now and then: there is no jump to see."""
+    number = np.array([1, 2, 3, 5, 6, 8, 11, 12, 13])
+    true = 0.3713 + 2.0531 * number
+    after = PERIOD * np.floor(true / PERIOD)
+    before = after + PERIOD
+    before[4] += 0.15  # rows are missing here
+    after[4] -= 0.05
+    found, regular = regular_times(after, before)
+    assert regular.all()
+    assert np.abs(found - true).max() < 0.5 * PERIOD
+
+
+def test_a_jump_among_missing_rows_may_come_at_any_time_between() -> None:
+    time = np.arange(0.0, 12.0, PERIOD)
+    true = np.array([1.0, 2.3, 2.9, 5.13, 5.6, 9.0])
+    value = np.where(np.searchsorted(true, time, side='right') % 2, 1e-3, 0.0)
+    there = (time < 5.05) | (time > 5.25)
+    command = RecordedCommand.of(time[there], value[there])
+    np.testing.assert_array_equal(command.slack > 0.0, [0, 0, 0, 1, 0, 0])
+    assert abs(command.jumps[3] - true[3]) < command.slack[3]
+    moved = command.with_jump(3, float(true[3] - command.jumps[3]))
+    places = np.linspace(0.5, 11.9, 4999)
+    beside = np.abs(places[:, np.newaxis] - true).min(axis=1) > PERIOD
+    beside |= np.abs(places - true[3]) < PERIOD
+    wanted = np.where(np.searchsorted(true, places, side='right') % 2, 1e-3, 0.0)
+    np.testing.assert_allclose(moved(places)[beside], wanted[beside], rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize('hertz', [0.3, 2.0, 5.0])

@@ -16,7 +16,7 @@
 from __future__ import annotations
 
 from antenna_drive.machines.antenna.field_recording import CHANNELS, FieldRecording
-from antenna_drive.machines.antenna.samples import spikes
+from antenna_drive.machines.antenna.samples import slips, spikes
 from antenna_drive.parameters import load
 from antenna_drive.recording.recording import Recording
 from field_runs import field_run, SLOW_SQUARE
@@ -88,3 +88,15 @@ def test_missing_rows_are_counted() -> None:
     FieldRecording.of('rec', Recording.from_arrays(time[kept], {
         name: plain[name].values[kept] for name in plain}), notes.append)
     assert f'rec: 8 of {time.size} rows are missing' in notes
+
+
+def test_a_slip_of_a_motor_at_rest_is_found_and_a_drive_that_hunts_is_not_at_rest() -> None:
+    random = np.random.default_rng(3)
+    rates = random.normal(0.0, 0.003, 200)
+    rates[60:75] += np.linspace(0.0, 0.05, 15)
+    found = slips(rates, 0.003)
+    assert found[70:75].all()
+    assert not found[:60].any() and not found[75:].any()
+    hunting = rates + 0.05 * np.sin(np.arange(200.0))
+    assert not slips(hunting, 0.003).any()
+    assert not slips(np.full(9, np.nan), 0.003).any()

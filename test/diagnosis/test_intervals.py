@@ -16,9 +16,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 from antenna_drive.diagnosis import Form, Hypothesis, Parameter
-from antenna_drive.diagnosis.intervals import covariance, values_with_intervals
+from antenna_drive.diagnosis.intervals import covariance, inflation, values_with_intervals
 from antenna_drive.diagnosis.least_squares import FitState
 from antenna_drive.diagnosis.settings import DEFAULT
 import numpy as np
@@ -47,6 +49,20 @@ def test_uncorrelated_values_have_the_textbook_variance() -> None:
     assert np.diag(doubled) == pytest.approx(4.0 * np.diag(found), rel=0.01)
 
 
+@pytest.mark.parametrize('lasts', [1, 25])
+def test_noise_that_lasts_inflates_the_variance_by_its_length(lasts: int) -> None:
+    """So many samples with one and the same noise tell as much as one of them."""
+    random = np.random.default_rng(7)
+    signs, noise = random.choice([-1.0, 1.0], 4000), random.normal(size=4000)
+    column, z = (np.repeat(part, lasts) for part in (signs, noise))
+    fitted = replace(state([column], (CHANGE,)), residual=z)
+    time = np.arange(z.size) / lasts
+    problem: Any = SimpleNamespace(
+        settings=DEFAULT, machine=SimpleNamespace(time_scales=SimpleNamespace(block_s=1.0)),
+        experiments=[SimpleNamespace(time=time, measured=z[:, np.newaxis])])
+    assert inflation(problem, fitted) == pytest.approx([lasts], rel=0.08)
+
+
 @pytest.mark.parametrize('rounding', [0.0, 0.005, 0.05])
 def test_a_change_is_no_surer_than_the_tolerance_of_its_number(rounding: float) -> None:
     """Rounded derivatives do not tell the two apart, however many samples there are."""
@@ -64,7 +80,7 @@ def test_a_change_and_a_tolerance_of_one_number_are_told_apart_by_nothing(
     tolerant = replace(CHANGE, unit=unit, tolerance=0.02)
     fitted = Hypothesis(('part.effect',), (Form('', (tolerant,)),), state(
         [1e6 * np.random.default_rng(4).normal(size=4000)], (tolerant,)))
-    low, high = values_with_intervals(fitted, 1.0, SETTINGS)[tolerant.name]['ci95']
+    low, high = values_with_intervals(fitted, lambda name: 1.0, SETTINGS)[tolerant.name]['ci95']
     assert high - low == pytest.approx(2.0 * 1.96 * 0.02 / 3.0 ** 0.5 * share, rel=0.01)
 
 
@@ -72,13 +88,13 @@ def test_no_value_is_surer_than_the_model() -> None:
     random = np.random.default_rng(2)
     fitted = Hypothesis(('part.effect',), (Form('', (CHANGE,)),),
                         state([1e6 * random.normal(size=4000)], (CHANGE,)))
-    low, high = values_with_intervals(fitted, 1.0, SETTINGS)[CHANGE.name]['ci95']
+    low, high = values_with_intervals(fitted, lambda name: 1.0, SETTINGS)[CHANGE.name]['ci95']
     assert high - low == pytest.approx(2.0 * 1.96 * SETTINGS.model_error * 0.01, rel=0.01)
 
 
 def test_what_the_data_do_not_tell_may_be_anything_within_its_bounds() -> None:
     unseen = state([np.zeros(100)], (CHANGE,))
     fitted = Hypothesis(('part.effect',), (Form('', (CHANGE,)),), unseen)
-    low, high = values_with_intervals(fitted, 1.0, SETTINGS)[CHANGE.name]['ci95']
+    low, high = values_with_intervals(fitted, lambda name: 1.0, SETTINGS)[CHANGE.name]['ci95']
     assert low < -0.85
     assert high == CHANGE.high

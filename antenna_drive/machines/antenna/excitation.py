@@ -16,7 +16,7 @@ What a test did to the drive, from the test sheet or, failing that, from the rec
 
 A sheet's waveform is exact: its jumps are known to the microsecond. A recorded command is a set
 of samples. Between two that differ by more than their neighbours do, a jump is assumed: where the
-regular times of many jumps put it, or else halfway.
+regular times of many jumps put it, or else halfway. Where rows are missing, that may be far off.
 """
 
 from __future__ import annotations
@@ -48,6 +48,13 @@ _CORNER = 4.0
 _STRAIGHT, _ON_A_SAMPLE = 0.05, 0.01
 # Regular jumps repeat after one, two or four of them, at least this many times.
 _CYCLES, _FEWEST_CYCLES = (1, 2, 4), 4
+# Jumps that leave out some times of a grid: at least this many, in intervals so many times shorter
+# than the grid's that no chance puts them there.
+_FEWEST_ON_A_GRID, _GRID_OVER_INTERVAL = 6, 8.0
+# Two sides of a jump, or a jump and a sample, are at least this far apart [s].
+_APART_S = 1e-9
+# An interval between samples longer than this many usual ones lacks rows.
+_LACKS_ROWS = 1.5
 _PARABOLA = np.linalg.inv(np.vander(_PLACES, 3, increasing=True))
 
 
@@ -119,6 +126,8 @@ class RecordedCommand:
     time, value : of the samples, and of both sides of each jump, shape (n,) [s], [rad/s]
     slope : at the two ends of each interval between them, shape (n - 1, 2) [rad/s^2]
     jumps : times at which the command jumps, shape (k,) [s]
+    slack : by how much each jump may be off because rows are missing, shape (k,) [s]; 0 where
+        none are
 
     """
 
@@ -126,6 +135,7 @@ class RecordedCommand:
     value: FloatArray
     slope: FloatArray
     jumps: FloatArray
+    slack: FloatArray
 
     @classmethod
     def of(cls, time: FloatArray, value: FloatArray) -> RecordedCommand:
@@ -135,9 +145,11 @@ class RecordedCommand:
         around = np.maximum(np.r_[change[1:], 0.0], np.r_[0.0, change[:-1]])
         large = (change > 0.05 * np.ptp(value)) & (change > 20.0 * usual) & (change > 4.0 * around)
         k = np.flatnonzero(large)
-        jumps = regular_times(time[k], time[k + 1])
+        jumps, regular = regular_times(time[k], time[k + 1])
+        width = time[k + 1] - time[k]
+        lacking = ~regular & (width > _LACKS_ROWS * np.median(np.diff(time)))
         # two extra samples at each jump keep the lines on their own sides
-        times = np.r_[time, jumps - 1e-9, jumps + 1e-9]
+        times = np.r_[time, jumps - _APART_S, jumps + _APART_S]
         values = np.r_[value, value[k], value[k + 1]]
         order = np.argsort(times, kind='stable')
         slopes = np.tile((np.diff(value) / np.diff(time))[:, np.newaxis], 2)
@@ -147,7 +159,8 @@ class RecordedCommand:
         # the three pieces of an interval with a jump: the middle one is the jump
         pieces = np.insert(
             np.where(large[:, np.newaxis], 0.0, slopes), np.repeat(k, 2), 0.0, axis=0)
-        return cls(times[order], values[order], pieces, jumps)._with_corners(time, value)
+        return cls(times[order], values[order], pieces, jumps,
+                   np.where(lacking, 0.5 * width - _APART_S, 0.0))._with_corners(time, value)
 
     def _with_corners(self, time: FloatArray, value: FloatArray) -> RecordedCommand:
         """Return the command with a corner wherever straight lines meet between two samples."""
@@ -181,7 +194,17 @@ class RecordedCommand:
         last = int(np.searchsorted(self.time, end)) + 1
         inside = (self.jumps > begin) & (self.jumps < end)
         return RecordedCommand(self.time[first:last] - begin, self.value[first:last],
-                               self.slope[first:last - 1], self.jumps[inside] - begin)
+                               self.slope[first:last - 1], self.jumps[inside] - begin,
+                               self.slack[inside])
+
+    def with_jump(self, number: int, later: float) -> RecordedCommand:
+        """Return the command with one of its jumps later [s], by less than its slack."""
+        time, jumps = self.time.copy(), self.jumps.copy()
+        # the two sides of the jump
+        right = int(np.searchsorted(time, jumps[number]))
+        time[right - 1:right + 1] += later
+        jumps[number] += later
+        return replace(self, time=time, jumps=jumps)
 
 
 def _smooth(time: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
@@ -219,7 +242,8 @@ def _corners(time: FloatArray, value: FloatArray,
     return k[found], (time[k] + share * width)[found], before[found], after[found]
 
 
-def regular_times(after: FloatArray, before: FloatArray) -> FloatArray:
+def regular_times(after: FloatArray, before: FloatArray,
+                  ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """
     Return times that lie in intervals: those of a regular sequence, if there is one in all.
 
@@ -230,25 +254,50 @@ def regular_times(after: FloatArray, before: FloatArray) -> FloatArray:
     after, before
         ends of the intervals, shape (n,) [s]
 
+    Returns
+    -------
+    the times, and which of them belong to a regular sequence, shape (n,) each
+
     """
-    found = 0.5 * (after + before)
+    found, regular = 0.5 * (after + before), np.zeros(after.size, dtype=bool)
     # the first jump begins the motion, and may belong to no sequence
-    for first, cycle in product((0, 1), _CYCLES):
-        if after.size - first >= _FEWEST_CYCLES * cycle:
-            fit = _periodic(after[first:], before[first:], cycle)
-            if fit is not None:
-                found[first:] = fit
-                break
-    return found
+    sequences = [(first, cycle, np.arange(after.size - first) // cycle)
+                 for first, cycle in product((0, 1), _CYCLES)
+                 if after.size - first >= _FEWEST_CYCLES * cycle]
+    sequences += [(first, 1, number) for first in (0, 1)
+                  if (number := _on_a_grid(after[first:], before[first:])) is not None]
+    for first, cycle, number in sequences:
+        fit = _periodic(after[first:], before[first:], cycle, number)
+        if fit is not None:
+            found[first:], regular[first:] = fit, True
+            break
+    return found, regular
 
 
-def _periodic(after: FloatArray, before: FloatArray, cycle: int) -> FloatArray | None:
+def _on_a_grid(after: FloatArray, before: FloatArray) -> NDArray[np.int64] | None:
+    """Return the numbers of jumps that leave out some times of a regular sequence, or None."""
+    if after.size < _FEWEST_ON_A_GRID:
+        return None
+    middle = 0.5 * (after + before)
+    period = float(np.diff(middle).min())
+    if period < _GRID_OVER_INTERVAL * float(np.median(before - after)):
+        return None
+    number = np.zeros(after.size, dtype=np.int64)
+    for i in range(1, after.size):
+        number[i] = round((middle[i] - middle[0]) / period)
+        # the farther a jump is, the better it tells the period
+        period = (middle[i] - middle[0]) / number[i]
+    return number
+
+
+def _periodic(after: FloatArray, before: FloatArray, cycle: int, number: NDArray[np.int64],
+              ) -> FloatArray | None:
     """Return the periodic sequence that keeps farthest from the ends of all intervals."""
-    number = np.arange(after.size)
+    place = np.arange(after.size)
     # unknown: time of each jump of the first cycle, period, margin to the ends
     lines = np.zeros((after.size, cycle + 2))
-    lines[number, number % cycle] = 1.0
-    lines[:, cycle] = number // cycle
+    lines[place, place % cycle] = 1.0
+    lines[:, cycle] = number
     lines[:, cycle + 1] = 1.0
     other_end = lines.copy()
     other_end[:, :-1] *= -1.0

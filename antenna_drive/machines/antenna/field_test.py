@@ -31,6 +31,7 @@ from antenna_drive.machines.antenna.field_recording import (
 )
 from antenna_drive.machines.antenna.inference import completed
 from antenna_drive.machines.antenna.late_readings import dense
+from antenna_drive.machines.antenna.samples import slips
 from antenna_drive.machines.antenna.sensors import jitter_of, SensorModel
 from antenna_drive.machines.antenna.sheet_settings import as_the_sheet_says
 from antenna_drive.machines.antenna.suitability import check
@@ -158,6 +159,11 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
     name = recording.name
     time = recording.thinned(window.compared, window.end)
     measured, slope = recording.measured(time)
+    sensors = SensorModel.of(recording.sheet.sensors)
+    rest = time < recording.onset
+    for tach in (TACH_1, TACH_2):
+        measured[rest, tach] = np.where(
+            slips(measured[rest, tach], sensors.tach_noise), np.nan, measured[rest, tach])
     if window.begin > 0.0:
         drive = changed(drive, {'torque_share.circuit.start': 'steady'})
     if not window.known_start:
@@ -170,8 +176,7 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
     test = FieldTest(
         name, record_of(drive), recording.command_between(window.begin, window.compared, time[-1]),
         bias.later(window.begin), time - window.begin, measured, slope,
-        SensorModel.of(recording.sheet.sensors),
-        jitter_of(recording.command, recording.rates.time_s, recording.rates.values),
+        sensors, jitter_of(recording.command, recording.rates.time_s, recording.rates.values),
         recording.period, recording.sheet.tolerances or sheets.Tolerances(), window.known_start)
     if not window.known_start:
         off = measured[:, ENCODER] - test.simulated(_STEP_S)[:, ENCODER]

@@ -35,7 +35,7 @@ from antenna_drive.machines.antenna.catalogue import catalogue, EXTRA_MODE
 from antenna_drive.machines.antenna.diagram import DIAGRAM
 from antenna_drive.machines.antenna.disturbances import DISTURBANCES, DriveDisturbance
 from antenna_drive.machines.antenna.excitation import (
-    Bias, Longest, schedule, with_bias, with_torque,
+    Bias, Longest, RecordedCommand, schedule, with_bias, with_torque,
 )
 from antenna_drive.machines.antenna.field_test import (
     CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, prepared, TACH_1, TACH_2, UNITS,
@@ -370,8 +370,12 @@ class AntennaMachine(Machine):
     def _plan(self, k: int, run: RunSetup, longest: Longest) -> batch.Schedule:
         """Return the steps of a run."""
         test = self._tests[k]
-        if run.delay:
-            plan = schedule(test.command, run.bias, test.output_times, longest, run.delay)
+        command = test.command
+        for number, later in run.late_jumps.items():
+            assert isinstance(command, RecordedCommand)
+            command = command.with_jump(number, later)
+        if run.delay or run.late_jumps:
+            plan = schedule(command, run.bias, test.output_times, longest, run.delay)
         else:
             plan = self._kept((k, longest, run.bias), lambda: with_bias(self._kept(
                 (k, longest, test.bias),

@@ -46,6 +46,7 @@ class RunSetup:
     duration_s : of the test
     bias : source of the bias voltage, where the share circuit is not connected
     gust : torque on the axis at its knots [N m]; None for none
+    late_jumps : by how much jumps of the command come later, by number [s]
     waves : parts of each wave
 
     """
@@ -55,6 +56,7 @@ class RunSetup:
     duration_s: float
     bias: Bias
     gust: FloatArray | None = None
+    late_jumps: dict[int, float] = field(default_factory=dict)
     waves: dict[WaveShape, list[float]] = field(default_factory=dict)
 
     def change(self, path: str, how: str, value: float) -> None:
@@ -234,6 +236,16 @@ class JumpTime(ReadingModifier):
 
     def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
         readings.responses.append((self.begin, self.end, value))
+
+
+@dataclass(frozen=True)
+class UnrecordedJump(RunModifier):
+    """Lets a jump of the command come later, of which the recording lacks the rows."""
+
+    number: int
+
+    def apply(self, run: RunSetup, value: float) -> None:
+        run.late_jumps[self.number] = value
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,12 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Samples that no drive makes: spikes of one sample, which are left out before thinning."""
+"""
+Samples that are left out before a comparison.
+
+No drive makes spikes of one sample. A motor at rest creeps, sticks and slips within its gap; when
+it slips is decided by differences that no model knows.
+"""
 
 from __future__ import annotations
 
@@ -28,6 +33,9 @@ _SCATTERS = 8.0
 _AROUND = 3.0
 # Samples around it, on both sides together.
 _NEIGHBOURHOOD = 20
+# A rate at rest is a slip if it is this many times as far from the median as the scatter. If more
+# than this share of the samples is, the drive does not rest.
+_SLIP, _MOST_SLIPS = 5.0, 0.4
 # Below this many samples nothing can be said.
 _FEWEST = 3 * _NEIGHBOURHOOD
 
@@ -60,3 +68,22 @@ def spikes(values: FloatArray) -> NDArray[np.bool_]:
         around = rank_filter(off, -2, footprint=footprint, mode='reflect')
         found = likely & (off > _AROUND * around)
     return found
+
+
+def slips(rates: FloatArray, noise: float) -> NDArray[np.bool_]:
+    """
+    Return which samples of a motor at rest are slips.
+
+    Parameters
+    ----------
+    rates
+        of the motor while nothing is commanded, shape (n,) [rad/s], NaN where there is none
+    noise
+        standard deviation that the scatter has at least [rad/s]
+
+    """
+    if not np.isfinite(rates).any():
+        return np.zeros(rates.size, dtype=bool)
+    off = np.abs(rates - np.nanmedian(rates))
+    found = off > _SLIP * max(noise, 1.4826 * float(np.nanmedian(off)))
+    return found if np.mean(found) < _MOST_SLIPS else np.zeros(rates.size, dtype=bool)

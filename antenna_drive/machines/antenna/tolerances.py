@@ -26,7 +26,7 @@ from antenna_drive.machines.antenna.field_test import (
 )
 from antenna_drive.machines.antenna.modifiers import (
     add, AntennaParameter, ChannelDelay, ClockRate, ClockShift, JumpTime, Modifier, ReadingGain,
-    ReadingModifier, ReadingZero, scale, SupplyGain,
+    ReadingModifier, ReadingZero, scale, SupplyGain, UnrecordedJump,
 )
 from antenna_drive.recording.sheet import Tolerances
 
@@ -152,13 +152,15 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
                            on_readings=True, modifier=ClockShift())
 
     if isinstance(test.command, RecordedCommand):
-        jumps = test.command.jumps
-        # of those before a window the last ones alone are still felt in it
-        jumps = jumps[(jumps > test.time[0] - _FELT_S) & (jumps < test.time[-1])]
         half = 0.5 * test.period
-        for begin, end in pairwise([*jumps, math.inf]):
-            yield _within(f'jump:{test.name}:{begin:.3f}', 's', half,
-                          JumpTime(float(begin) - half, float(end) - half), k)
+        command = test.command
+        for i, (begin, end) in enumerate(pairwise([*command.jumps.tolist(), math.inf])):
+            name = f'jump:{test.name}:{begin:.3f}'
+            if command.slack[i]:
+                yield _within(name, 's', float(command.slack[i]), UnrecordedJump(i), k)
+            # of those before a window the last ones alone are still felt in it
+            elif test.time[0] - _FELT_S < begin < test.time[-1]:
+                yield _within(name, 's', half, JumpTime(begin - half, end - half), k)
 
     given = allowed([test])
     if given.clock_ppm:
