@@ -180,17 +180,20 @@ class _Judge:
     def _trained(self, part: Part) -> tuple[LeastSquares, FitState, FitState]:
         """Return a part's problem, and its fits without and with the effects."""
         problem = LeastSquares(part, settings=self._settings)
-        found = trained(part, part.parameters(self._best.state.parameters), self._start,
-                        (self._neutral, self._with), self._settings)
+        own = part.parameters(self._best.state.parameters)
+        found = trained(part, own, self._start, [
+            slopes.for_part(part, own) for slopes in (self._neutral, self._with)], self._settings)
         if not self._best.effects:
             return problem, found, found
         # The fit without effects begins where the one with them ended. It is run to its end only
         # where that could matter.
-        own = part.parameters(self._nuisances)
-        columns = [j for j, p in enumerate(found.parameters) if p.name not in self._effects]
-        unaided = problem.fit(problem.start(own, found.point(), found.jacobian[:, columns]),
-                              self._settings.held_out.iterations)
-        if unaided.cost < (1.0 + self._settings.search.doubtful) * found.cost:
+        bare = part.parameters(self._none.state.parameters)
+        unaided = problem.fit(
+            problem.start(bare, found.point(), self._without.for_part(part, bare)),
+            self._settings.held_out.iterations)
+        search = self._settings.search
+        if (unaided.cost < (1.0 + search.doubtful) * found.cost
+                or problem.noise_level(found.residual) > search.wanting):
             unaided = settled(problem, unaided, self._settings)
             found = min(found, self._added(problem, part, unaided), key=lambda s: s.cost)
         return problem, unaided, found
@@ -203,9 +206,9 @@ class _Judge:
         """
         own = part.parameters([p for p in self._best.state.parameters if p.name in self._effects])
         point = {**unaided.point(), **self._start}
-        state = problem.start_from(unaided.parameters, unaided.jacobian, own, point)
-        return settled(problem, problem.fit(state, self._settings.held_out.iterations),
-                       self._settings)
+        state = problem.start_from(
+            part.parameters(self._nuisances), unaided.jacobian, own, point)
+        return trained(part, state.parameters, point, [state.jacobian], self._settings)
 
     def _undetermined(self, problem: LeastSquares, unaided: FitState, found: FitState,
                       ) -> tuple[dict[str, str], FloatArray]:
@@ -235,7 +238,8 @@ class _Judge:
         """Judge on test k what the other tests have taught."""
         machine, count = self._problem.machine, len(self._problem.experiments)
         testing = Part(machine, [k])
-        state = self._fitted(testing, {}, self._none.state.point(), self._without)
+        state = self._fitted(testing, self._none.state.parameters, {}, self._none.state.point(),
+                             self._without)
         # the derivatives at the optimum of all tests may be far off where the effect is not
         bare = LeastSquares(testing, settings=self._settings)
         state = bare.fit(bare.refreshed(state, central=False),
@@ -258,7 +262,7 @@ class _Judge:
             LeastSquares(testing, settings=self._settings), {
                 **{name: value for name, value in found.point().items() if name not in own},
                 **held})
-        state = self._fitted(testing, held, begin, self._with)
+        state = self._fitted(testing, self._nuisances, held, begin, self._with)
         # what a change of the effect leaves once the offsets have followed it
         slope = self._with.for_part(testing, judged)
         cross = weighted_product(state.jacobian, state.weight, slope)
@@ -325,10 +329,10 @@ class _Judge:
             values=found.x[places], low=np.array([p.low for p in judged]),
             high=np.array([p.high for p in judged]), covariance=spread[np.ix_(places, places)])
 
-    def _fitted(self, testing: Part, held: Mapping[str, float], begin: Mapping[str, float],
-                slopes: Slopes) -> FitState:
+    def _fitted(self, testing: Part, nuisances: Sequence[Parameter], held: Mapping[str, float],
+                begin: Mapping[str, float], slopes: Slopes) -> FitState:
         """Fit the nuisances to a withheld test, with some values held."""
-        own = testing.parameters(self._nuisances)
+        own = testing.parameters(nuisances)
         problem = Fixed(testing, held, self._settings)
         return problem.fit(problem.start(own, dict(begin), slopes.for_part(testing, own)),
                            self._settings.held_out.iterations)

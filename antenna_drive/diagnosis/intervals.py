@@ -28,6 +28,7 @@ a difference quotient.
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 from typing import Any
 
 from antenna_drive.diagnosis.hypothesis import Hypothesis
@@ -112,9 +113,9 @@ def values_with_intervals(hypothesis: Hypothesis, inflated: Callable[[str], floa
     for parameter, value in hypothesis.values:
         place = names.index(parameter.name)
         variance = covariance(state, inflated(parameter.name), settings)[place, place]
-        half_width = _TWO_SIDED_95 * float(np.hypot(
-            max(float(variance) ** 0.5, _same_number(parameter, value)),
-            settings.model_error * abs(value)))
+        half_width = _TWO_SIDED_95 * math.hypot(
+            float(variance) ** 0.5, _same_number(parameter, value),
+            settings.model_error * value)
         found[parameter.name] = {
             'value': value, 'ci95': [max(value - half_width, parameter.low),
                                      min(value + half_width, parameter.high)],
@@ -123,5 +124,9 @@ def values_with_intervals(hypothesis: Hypothesis, inflated: Callable[[str], floa
 
 
 def _same_number(parameter: Parameter, value: float) -> float:
-    """Return the standard deviation that the tolerance of the same number adds to a change."""
+    """
+    Return the standard deviation that the tolerance of the same number adds to a change.
+
+    The effect has taken over what the tolerance would account for.
+    """
     return parameter.tolerance / 3.0 ** 0.5 * (abs(1.0 + value) if parameter.unit == '1' else 1.0)

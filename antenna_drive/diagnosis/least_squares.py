@@ -480,7 +480,8 @@ def prior_precision(parameters: Sequence[Parameter]) -> FloatArray:
 def proper_precision(parameters: Sequence[Parameter]) -> FloatArray:
     """Return the prior precision; without a prior that of an even spread within the bounds."""
     prior = prior_precision(parameters)
-    even = np.array([12.0 / (p.high - p.low) ** 2 for p in parameters])
+    # one that is held has no width
+    even = np.array([12.0 / max(p.high - p.low, 1e-30) ** 2 for p in parameters])
     return np.where(prior > 0.0, prior, even)
 
 

@@ -419,6 +419,27 @@ class Machine(ABC):
         """
         return dict(point)
 
+    def take_over(self, point: Point, forms: Sequence[Form]) -> tuple[dict[str, float], set[str]]:
+        """
+        Return a point at which effects alone stand for their numbers.
+
+        A nuisance may stand for the very number that an effect changes. Both together are not
+        determined, so the nuisance is held at zero, and the effect takes over its value.
+
+        Parameters
+        ----------
+        point
+            nuisances and effects
+        forms
+            of the effects
+
+        Returns
+        -------
+        the point, and the names of the nuisances that are held at zero; by default none are
+
+        """
+        return dict(point), set()
+
     def regimes(self, experiment: int) -> Regimes:
         """Return the regime of motion of each sample; by default there is one regime."""
         return Regimes(('whole test',),

@@ -384,7 +384,9 @@ class Search:
         gone = hypothesis.effects.index(effect)
         names = {p.name for p in hypothesis.forms[gone].parameters}
         state, values = hypothesis.state, hypothesis.state.point()
-        own: list[Parameter] = [p for p in state.parameters if p.name not in names]
+        free = {p.name: p for p in self.machine.nuisances}
+        own: list[Parameter] = [
+            free.get(p.name, p) for p in state.parameters if p.name not in names]
         point = self.machine.absorb({p.name: values[p.name] for p in own},
                                     {name: values[name] for name in names})
         bare = replace(state, parameters=tuple(own), x=np.array([point[p.name] for p in own]))
@@ -414,9 +416,12 @@ class Search:
                   hypothesis: Hypothesis) -> Hypothesis:
         """Fit a hypothesis to another problem, with shared derivatives."""
         courses = [form for form in hypothesis.forms if form.name in shared.courses]
+        point, held = self.machine.take_over(hypothesis.state.point(), hypothesis.forms)
+        nuisances = [replace(p, low=0.0, high=0.0) if p.name in held else p
+                     for p in self.machine.nuisances]
         state = problem.start_from(
-            (*self.machine.nuisances, *(p for form in courses for p in form.parameters)),
+            (*nuisances, *(p for form in courses for p in form.parameters)),
             np.column_stack([shared.nuisances, *(shared.courses[f.name] for f in courses)]),
             [p for form in hypothesis.forms if form not in courses for p in form.parameters],
-            hypothesis.state.point())
+            point)
         return replace(hypothesis, state=problem.fit(state, iterations))

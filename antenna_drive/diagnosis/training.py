@@ -137,7 +137,7 @@ class Slopes:
 
 
 def trained(part: Part, parameters: Sequence[Parameter], point: Mapping[str, float],
-            slopes: Sequence[Slopes], settings: Settings) -> FitState:
+            slopes: Sequence[Jacobian], settings: Settings) -> FitState:
     """
     Fit parameters to a part of the tests, from a point far from the optimum to the end.
 
@@ -154,7 +154,7 @@ def trained(part: Part, parameters: Sequence[Parameter], point: Mapping[str, flo
     point
         where the fit begins
     slopes
-        derivatives for the beginning, and for what follows
+        derivatives for the beginning, and for what follows, shape (n, m) each
     settings
         thresholds
 
@@ -172,7 +172,7 @@ def trained(part: Part, parameters: Sequence[Parameter], point: Mapping[str, flo
         if number == 1:
             # what was taken for the place in a gap may have been the effect
             at = with_initial_conditions(problem, at)
-        given = slopes[min(number, len(slopes) - 1)].for_part(part, parameters)
+        given = slopes[min(number, len(slopes) - 1)]
         state = problem.fit(problem.start(parameters, at, given / np.float32(scale)),
                             options.iterations)
         at = state.point()

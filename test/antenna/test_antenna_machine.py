@@ -90,3 +90,23 @@ def test_a_source_of_bias_that_is_off_gives_as_much_more() -> None:
         expected = np.where(drive.experiments[0].time < 1.0, 0.0, 6.0 * (1.0 + share))
         away = np.abs(drive.experiments[0].time - 1.0) > 1e-9
         assert shown[away, BIAS] == pytest.approx(expected[away], abs=1e-12)
+
+
+def test_an_effect_takes_over_the_tolerance_of_its_own_number(model: AntennaMachine) -> None:
+    """The readings stay; of an effect in both motors neither tolerance is its number."""
+    for effect, path in (('axis.coulomb_friction', 'plant.axis.coulomb_torque'),
+                         ('torque_share.filter_1_gain', 'torque_share.filter_1.gain'),
+                         ('motors.amplifier_gain', '')):
+        form = model.effects[effect].forms[0]
+        size = form.sizes[0].name
+        point = {**dict.fromkeys((p.name for p in model.nuisances), 0.0), **form.start, size: 0.1}
+        if path:
+            point[f'offset:{path}'] = 0.015
+        taken, held = model.take_over(point, [form])
+        assert held == ({f'offset:{path}'} if path else set())
+        assert all(taken[name] == 0.0 for name in held)
+        before, after = (model.simulate([at])[0] for at in (point, taken))
+        for experiment, a, b in zip(model.experiments, before, after, strict=True):
+            assert a is not None and b is not None
+            # roundings may move where a motor sticks
+            assert np.median(np.abs(a - b) / experiment.noise) < 1e-6

@@ -98,3 +98,15 @@ def test_what_the_data_do_not_tell_may_be_anything_within_its_bounds() -> None:
     low, high = values_with_intervals(fitted, lambda name: 1.0, SETTINGS)[CHANGE.name]['ci95']
     assert low < -0.85
     assert high == CHANGE.high
+
+
+def test_a_nuisance_that_is_held_adds_nothing_to_the_intervals_of_others() -> None:
+    random = np.random.default_rng(3)
+    column = 300.0 * random.normal(size=4000)
+    held = replace(TOLERANCE, low=0.0, high=0.0)
+    beside = covariance(state([column, np.zeros(4000)], (CHANGE, held)), 1.0, SETTINGS)
+    alone = covariance(state([column], (CHANGE,)), 1.0, SETTINGS)
+    assert beside[0, 0] == pytest.approx(alone[0, 0])
+    bare = replace(held, prior_sigma=0.0)
+    assert np.isfinite(covariance(
+        state([column, np.zeros(4000)], (CHANGE, bare)), 1.0, SETTINGS)).all()

@@ -277,10 +277,24 @@ class AntennaMachine(Machine):
                 tolerance = self._tolerance_of.get((path, modifier.how))
                 if tolerance is None or tolerance.name not in result:
                     continue
-                both = (result[tolerance.name] + value if modifier.how == ADD else
-                        (1.0 + result[tolerance.name]) * (1.0 + value) - 1.0)
+                both = _together(result[tolerance.name], value, modifier.how)
                 result[tolerance.name] = min(max(both, tolerance.low), tolerance.high)
         return result
+
+    def take_over(self, point: Point, forms: Sequence[Form]) -> tuple[dict[str, float], set[str]]:
+        """Return a point at which effects of one number alone stand for it."""
+        result, held = dict(point), set()
+        for item in (p for form in forms for p in form.sizes):
+            assert isinstance(item, AntennaParameter)
+            modifier = item.modifier
+            tolerance = self._tolerance_of.get((''.join(modifier.fields[:1]), modifier.how))
+            if tolerance is None or tolerance.modifier.fields != modifier.fields:
+                continue
+            both = _together(result[item.name], result.get(tolerance.name, 0.0), modifier.how)
+            result[item.name] = min(max(both, item.low), item.high)
+            result[tolerance.name] = 0.0
+            held.add(tolerance.name)
+        return result, held
 
     # -- running -------------------------------------------------------------------------------
 
@@ -420,6 +434,11 @@ class AntennaMachine(Machine):
         elif digit > 0.0:
             values[:, ENCODER] = digit * np.floor(values[:, ENCODER] / digit + 0.5)
         return values
+
+
+def _together(one: float, other: float, how: str) -> float:
+    """Return two changes of one number as one."""
+    return one + other if how == ADD else (1.0 + one) * (1.0 + other) - 1.0
 
 
 def _tolerated(effect: Effect, tolerances: Sequence[AntennaParameter]) -> Effect:
