@@ -55,9 +55,10 @@ class _Fold:
     ----------
     name : of the test
     time : shape (n,) [s]
-    noise : of its readings, shape (n, c)
-    before : residuals without the effects, shape (n, c); NaN where nothing is judged
-    after : with those effects that can be judged; None if none can
+    gap_before : measured minus predicted without the effects, in the readings' own units, shape
+        (n, c); NaN where nothing is judged
+    before : the same in standard deviations of the noise, whitened
+    gap_after, after : with those effects that can be judged; None if none can
     judged : ids of these
     reasons : why the others cannot be judged, by id
     spread : change of `after` with each of the judged effects' numbers, shape (n c, m)
@@ -68,8 +69,9 @@ class _Fold:
 
     name: str
     time: FloatArray
-    noise: FloatArray
+    gap_before: FloatArray
     before: FloatArray
+    gap_after: FloatArray | None = None
     after: FloatArray | None = None
     judged: tuple[str, ...] = ()
     reasons: Mapping[str, str] = field(default_factory=dict)
@@ -103,7 +105,7 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis,
     counted = [fold for fold in folds if fold.after is not None] or folds
     known = counted[0].after is not None
     before = [fold.before for fold in counted]
-    after = [fold.before if fold.after is None else fold.after for fold in counted]
+    after = [_after(fold) for fold in counted]
     fraction: float | None = None
     interval: list[float | None] = [None, None]
     if known:
@@ -114,7 +116,7 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis,
         'explained_fraction': {
             'value': fraction, 'ci95': interval, 'bounds': list(BOUNDS),
             'reason': None if known else _reason(folds), 'interval': _INTERVAL},
-        'per_signal': _per_signal(problem, counted, after, known or not best.effects),
+        'per_signal': _per_signal(problem, counted, known or not best.effects),
         'held_out': _HALVES if single else _TURNS,
         'folds': [{'withheld': fold.name, 'judged': list(fold.judged),
                    'cannot_be_judged': dict(fold.reasons)} for fold in folds],
@@ -135,24 +137,19 @@ def _rms(residuals: Iterable[FloatArray]) -> float:
     return float(np.sqrt(np.nanmean(np.concatenate([np.ravel(z) for z in residuals]) ** 2)))
 
 
-def _per_signal(problem: LeastSquares, folds: Sequence[_Fold], after: Sequence[FloatArray],
-                known: bool) -> dict[str, Any]:
+def _per_signal(problem: LeastSquares, folds: Sequence[_Fold], known: bool) -> dict[str, Any]:
     """Return the rms of each signal, in standard deviations and in its own unit."""
     found = {}
     first = problem.experiments[0]
+    parts = {'before': [fold.before for fold in folds], 'after': list(map(_after, folds)),
+             'before_in_unit': [fold.gap_before for fold in folds],
+             'after_in_unit': [fold.gap_before if fold.gap_after is None else fold.gap_after
+                               for fold in folds]}
     for c, (channel, unit) in enumerate(zip(first.channels, first.units, strict=True)):
-        if not any(np.isfinite(fold.before[:, c]).any() for fold in folds):
-            continue
-
-        def rms(parts: Sequence[FloatArray], own_unit: bool, c: int = c) -> float:
-            return _rms(z[:, c] * (fold.noise[:, c] if own_unit else 1.0)
-                        for z, fold in zip(parts, folds, strict=True))
-
-        before = [fold.before for fold in folds]
-        found[channel] = {
-            'before': rms(before, False), 'after': rms(after, False) if known else None,
-            'unit': unit, 'before_in_unit': rms(before, True),
-            'after_in_unit': rms(after, True) if known else None}
+        if any(np.isfinite(fold.before[:, c]).any() for fold in folds):
+            found[channel] = {'unit': unit, **{
+                name: _rms(z[:, c] for z in zs) if known or name.startswith('before') else None
+                for name, zs in parts.items()}}
     return found
 
 
@@ -244,7 +241,7 @@ class _Judge:
         bare = LeastSquares(testing, settings=self._settings)
         state = bare.fit(bare.refreshed(state, central=False),
                          self._settings.held_out.iterations)
-        fold = self._fold(k, bare.residuals_of(state, 0))
+        fold = self._fold(k, _gap(testing, state.point()), bare.residuals_of(state, 0))
         if not self._best.effects:
             return fold
         part = Part(machine, [i for i in range(count) if i != k])
@@ -269,7 +266,8 @@ class _Judge:
         follow = np.linalg.lstsq(state.hessian + np.diag(prior_precision(state.parameters)),
                                  cross, rcond=None)[0]
         after = LeastSquares(testing, settings=self._settings).residuals_of(state, 0)
-        return self._with_spread(replace(fold, after=after), judged, found, spread,
+        fold = replace(fold, gap_after=_gap(testing, {**held, **state.point()}), after=after)
+        return self._with_spread(fold, judged, found, spread,
                                  slope - state.jacobian @ follow.astype(np.float32))
 
     def second_half(self, k: int) -> _Fold:
@@ -282,7 +280,8 @@ class _Judge:
             for used in (first, ~first))
         problem, unaided, found = self._trained(part)
         own = LeastSquares(testing, settings=self._settings)
-        fold = self._fold(k, _shaped(own, own.residuals(unaided.point())))
+        fold = self._fold(k, _gap(testing, unaided.point()),
+                          _shaped(own, own.residuals(unaided.point())))
         if not self._best.effects:
             return fold
         reasons, spread = self._undetermined(problem, unaided, found)
@@ -295,17 +294,18 @@ class _Judge:
                     if effect in reasons for p in form.sizes}
         point = {**found.point(), **dict.fromkeys(left_out, 0.0)}
         residual = own.residuals(point)
-        return self._with_spread(replace(fold, after=_shaped(own, residual)), judged, found,
-                                 spread, own.jacobian(point, judged, residual, False))
+        fold = replace(fold, gap_after=_gap(testing, point), after=_shaped(own, residual))
+        return self._with_spread(fold, judged, found, spread,
+                                 own.jacobian(point, judged, residual, False))
 
     def _judged(self, reasons: Mapping[str, str]) -> list[Parameter]:
         """Return the numbers of the effects that can be judged."""
         return [p for effect, form in zip(self._best.effects, self._best.forms, strict=True)
                 if effect not in reasons for p in form.parameters]
 
-    def _fold(self, k: int, before: FloatArray) -> _Fold:
+    def _fold(self, k: int, gap: FloatArray, before: FloatArray) -> _Fold:
         experiment = self._problem.experiments[k]
-        return _Fold(experiment.name, experiment.time, experiment.noise, before)
+        return _Fold(experiment.name, experiment.time, gap, before)
 
     def _with_spread(self, fold: _Fold, judged: Sequence[Parameter], found: FitState,
                      spread: FloatArray, slope: Jacobian) -> _Fold:
@@ -319,7 +319,7 @@ class _Judge:
                     reasons[effect] = 'the withheld data do not show it'
         judged = self._judged(reasons)
         if not judged:
-            return replace(fold, after=None, reasons=reasons)
+            return replace(fold, gap_after=None, after=None, reasons=reasons)
         names = [p.name for p in found.parameters]
         places = [names.index(p.name) for p in judged]
         return replace(
@@ -336,6 +336,11 @@ class _Judge:
         problem = Fixed(testing, held, self._settings)
         return problem.fit(problem.start(own, dict(begin), slopes.for_part(testing, own)),
                            self._settings.held_out.iterations)
+
+
+def _gap(part: Part, point: Mapping[str, float]) -> FloatArray:
+    """Return measured minus predicted of a single test, shape (n, c)."""
+    return part.experiments[0].measured - part.predict(point, 0)
 
 
 def _shaped(problem: LeastSquares, residual: FloatArray) -> FloatArray:
@@ -391,8 +396,8 @@ def _bootstrapped(folds: Sequence[_Fold],
 
 
 def _after(fold: _Fold) -> FloatArray:
-    assert fold.after is not None
-    return fold.after
+    """Return what is left, which is everything if nothing can be judged."""
+    return fold.before if fold.after is None else fold.after
 
 
 def _changes(fold: _Fold, block_s: float, random: np.random.Generator,

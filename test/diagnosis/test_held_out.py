@@ -20,7 +20,8 @@ from dataclasses import replace
 from typing import Any
 
 from antenna_drive.diagnosis import (
-    Effect, Experiment, FloatArray, Form, Hypothesis, LeastSquares, Machine, Parameter, Point,
+    Colour, Effect, Experiment, FloatArray, Form, Hypothesis, LeastSquares, Machine, Parameter,
+    Point,
 )
 from antenna_drive.diagnosis.held_out import block_sums, explained_fraction, held_out
 from hypothesis import given, strategies as st
@@ -153,6 +154,18 @@ def test_each_signal_is_told_in_its_own_unit() -> None:
     assert signal['unit'] == 'm'
     assert signal['after_in_unit'] == pytest.approx(0.1 * signal['after'])
     assert signal['before_in_unit'] == pytest.approx(0.1 * signal['before'])
+
+
+def test_its_own_unit_tells_the_gap_itself_whatever_the_colour_of_the_noise() -> None:
+    """The whitened ramp is much smaller than the ramp; what a user sees is the ramp."""
+    machine = Ramp([0.5, 0.5])
+    slow = Colour(pole=0.98, gain=0.5, level=2.0)
+    machine.experiments = tuple(replace(e, colours=(slow,)) for e in machine.experiments)
+    signal = judged(machine)['per_signal']['y']
+    assert signal['before'] < 10.0
+    # a zero that is fitted to the whitened ramp is not its mean: the ramp from 0 to 10 m
+    assert 10.0 / np.sqrt(12.0) < signal['before_in_unit'] < 10.0 / np.sqrt(3.0)
+    assert signal['after_in_unit'] == pytest.approx(0.1, rel=0.1)
 
 
 def test_a_half_that_does_not_show_the_effect_teaches_nothing() -> None:
