@@ -25,6 +25,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from antenna_drive.emulator.kernels import of_unit
 from antenna_drive.emulator.unit import FloatArray, Unit
 from antenna_drive.emulator.units import BlockUnit, inner_steps, SourceUnit
 from antenna_drive.physics import signal_generator
@@ -58,12 +59,13 @@ class Form(NamedTuple):
 
 @cache
 def _advance_block(block: Block) -> Any:
-    step = block.step
+    # The function that the unit calls itself: its physics is not compiled a second time.
+    step = of_unit(block).step
 
     @inner
     def advance(k: int, h: float, u: FloatArray, y: FloatArray, memory: Any) -> None:
         p, x, mode, work, steps = memory
-        step(x, mode, u, p[0], h, steps, work, y)
+        step(x, mode, u, p, h, steps, work, y)
 
     return advance
 

@@ -232,7 +232,7 @@ def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], wiring: str,
     wired = find(wiring)
     with told_while_compiling(node):
         unit = make(node.get_name(), wired, config, given)
-    drive_node = DriveNode(node, unit, overrides, config, fed_by_topic, wiring, wired.outputs)
+        drive_node = DriveNode(node, unit, overrides, config, fed_by_topic, wiring, wired.outputs)
     ending.by(drive_node.stop)
     if not ending.asked:
         drive_node.spin()
