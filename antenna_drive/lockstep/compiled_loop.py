@@ -27,6 +27,7 @@ from __future__ import annotations
 from collections import namedtuple
 from typing import Any
 
+from antenna_drive.lockstep.delays import count
 from antenna_drive.lockstep.frame import HEADER, LATEST_BIRTH
 from antenna_drive.lockstep.inbox import DEPTH
 from antenna_drive.physics.block import rows
@@ -52,7 +53,7 @@ Word = rows('asked', 'step', 'last_step', 'slack', 'every', 'pause', 'late', 'pe
             'frame_in', 'frame_out', 'frame_to', 'size_out', 'clock', 'brief_ns')
 
 # Floating-point numbers, on the clock of time.monotonic() [s].
-Time = rows('run', 'step_s', 'factor', 'start', 'first_step', 'lead', 'now', 'until')
+Time = rows('run', 'step_s', 'factor', 'start', 'first_step', 'lead', 'now', 'until', 'worst')
 
 # Addresses of C functions.
 Call = rows('take', 'publish', 'clear', 'add_subscription', 'add_guard', 'wait', 'copy',
@@ -75,7 +76,7 @@ _LONGEST_WAIT_S = 0.1
 
 State = namedtuple('State', (
     'words', 'times', 'calls', 'peers', 'order', 'frames', 'held', 'used', 'sources', 'numbers',
-    'outgoing', 'clock', 'incoming', 'stamps', 'u', 'y'))
+    'outgoing', 'clock', 'incoming', 'delays', 'stamps', 'u', 'y'))
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -251,8 +252,12 @@ def put_out(s: Any) -> int:
         s.stamps[step] = _read_clock(s)
     status = call_c(s.calls[Call.publish], (
         w[Word.publisher], w[Word.outgoing], np.int64(0)))
-    if t[Time.factor] > 0.0 and t[Time.now] - _due(s, step) > t[Time.step_s] / t[Time.factor]:
-        w[Word.late] += 1
+    if t[Time.factor] > 0.0:
+        after = t[Time.now] - _due(s, step)
+        count(s.delays, after + t[Time.lead])
+        if after > t[Time.step_s] / t[Time.factor]:
+            w[Word.late] += 1
+            t[Time.worst] = max(t[Time.worst], after)
     if status != _RCL_OK:
         w[Word.status] = status
         return PUBLISH_FAILED

@@ -32,6 +32,7 @@ from antenna_drive.emulator.unit import FloatArray, Unit
 from antenna_drive.lockstep import compiled_loop as loop
 from antenna_drive.lockstep.compiled_loop import Call, Peer, Time, Word
 from antenna_drive.lockstep.compiled_unit import Form, form_of
+from antenna_drive.lockstep.delays import empty_counts
 from antenna_drive.lockstep.frame import HEADER
 from antenna_drive.lockstep.inbox import DEPTH, Frame
 from antenna_drive.lockstep.member import Conductor, Member, SLACK
@@ -128,8 +129,8 @@ def _state(peers: int, stepping: int, longest: int, length: int, inputs: int,
         held=np.zeros((peers, DEPTH), np.int64), used=np.zeros(peers),
         sources=np.zeros((inputs, 2), np.int64), numbers=np.zeros(longest),
         outgoing=np.zeros(length), clock=np.zeros(2, np.int64),
-        incoming=np.zeros(loop.MESSAGE_WORDS, np.int64), stamps=np.zeros(stamps),
-        u=np.zeros((inputs, 2)), y=outputs)
+        incoming=np.zeros(loop.MESSAGE_WORDS, np.int64), delays=empty_counts(),
+        stamps=np.zeros(stamps), u=np.zeros((inputs, 2)), y=outputs)
 
 
 class Exchange:
@@ -270,6 +271,7 @@ class Exchange:
         t[Time.run] = member.run
         t[Time.step_s] = member.step_s
         t[Time.until] = time.monotonic() + limit_s
+        t[Time.worst] = 0.0
         t[Time.factor] = 0.0
         if pace is not None:
             t[Time.factor] = pace.factor
@@ -292,7 +294,9 @@ class Exchange:
         member, s = self._member, self._s
         inbox, step = member.inbox, int(s.words[Word.step])
         if pace is not None:
-            pace.late_steps += int(s.words[Word.late])
+            pace.add_late(int(s.words[Word.late]), float(s.times[Time.worst]))
+            pace.delays.counts += s.delays
+            s.delays[:] = 0
         for peer, held, frames, length in zip(
                 self._peers, s.held.tolist(), s.frames, self._lengths):
             inbox.slots[peer][:] = [

@@ -29,6 +29,7 @@ from antenna_drive.lockstep.member import Conductor, Member
 from antenna_drive.lockstep.pace import LEAD_S, Pace
 from antenna_drive.lockstep.rcl_channel import RclChannel, Unusable
 from antenna_drive.lockstep.readings import ChangeRecord, READING_QOS, Readings
+from antenna_drive.lockstep.realtime import lock_memory, schedule_first_in_first_out
 from antenna_drive.lockstep.report import Report
 from antenna_drive.lockstep.ros_link import FrameLink
 from antenna_drive.lockstep.serving import Serving
@@ -49,11 +50,16 @@ LEAD = Entry('s', 0.0, 1.0, 'how long before it is due a step may be made')
 STEP = Entry('s', 1e-5, 0.1, 'macro-step')
 EXCHANGE = Entry('', description='auto: the compiled exchange where it can be used; '
                  'python: the exchange in Python', choices=('auto', 'python'))
+PRIORITY = Entry('1', 0, 99, 'real-time priority (SCHED_FIFO) of the lock-step, 0: none',
+                 whole=True)
+MEMORY = Entry('', description='locked: all memory of the node stays in RAM (mlockall)',
+               choices=('pageable', 'locked'))
 DURATION = Entry('s', 0.0, 1e9, 'simulated time after which the run ends, 0: never')
 
 # The parameters of a node itself, beside the settings of its unit.
-OWN_PARAMETERS = ('config', 'wiring', 'exchange', 'publish_rate', 'run.step', 'run.pace',
-                  'run.lead', 'run.duration', 'run.observers')
+OWN_PARAMETERS = ('config', 'wiring', 'exchange', 'publish_rate', 'realtime.priority',
+                  'realtime.memory', 'run.step', 'run.pace', 'run.lead', 'run.duration',
+                  'run.observers')
 
 
 class DriveNode:
@@ -89,6 +95,7 @@ class DriveNode:
         Raises
         ------
         ParameterError : an override is not allowed, or no parameter has that name
+        UserError : real-time scheduling or locked memory was asked for, and is not to be had
 
         """
         self._node = node
@@ -100,7 +107,9 @@ class DriveNode:
         settings: dict[str, tuple[Entry, Value]] = {
             name: item for name, item in unit.settings().items() if name not in fed_by_topic}
         rate_hz = overrides.number('publish_rate', PUBLISH_RATE, 100.0)
-        exchange = overrides.get('exchange', EXCHANGE, 'python')
+        exchange = overrides.get('exchange', EXCHANGE, 'auto')
+        priority = overrides.get('realtime.priority', PRIORITY, 0)
+        memory = overrides.get('realtime.memory', MEMORY, 'pageable')
         self._pace: Pace | None = None
         self._member = self._make_member(birth, overrides)
         own = overrides.own
@@ -127,6 +136,10 @@ class DriveNode:
         self._said_end = False
         self._channel: RclChannel | None = None
         self._exchange = self._make_exchange() if exchange == 'auto' else None
+        if memory == 'locked':
+            lock_memory()
+        if priority:
+            schedule_first_in_first_out(int(priority))  # type: ignore[arg-type]
 
     def _make_exchange(self) -> Exchange | None:
         """Make the compiled exchange, or say once why there is none."""
@@ -215,6 +228,7 @@ class DriveNode:
                 if self._quiet or not self._gather():
                     self._wait_for_anything()
         finally:
+            self._report.ended()
             serving.close()
             self._exchange = None
             if self._channel is not None:
@@ -357,6 +371,7 @@ class DriveNode:
             self._report.waiting(now)
         if isinstance(member, Conductor) and member.ended and not self._said_end:
             self._said_end = True
+            self._report.ended()
             self._hello()
         ready = self._link.wait(member.wanted(), timeout)
         for peer in ready:

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from antenna_drive.lockstep.delays import PERCENTILES
 from antenna_drive.lockstep.diagnostics import diagnostics
 from antenna_drive.lockstep.exchange import Exchange
 from antenna_drive.lockstep.member import Conductor, Member
@@ -60,6 +61,7 @@ class Report:
         self._told = False
         self._fault_told = ''
         self._next_s = 0.0
+        self._ended_run = 0.0
         self.last_change = ''
         self.refused_values = 0
         self.exchange: Exchange | None = None
@@ -84,6 +86,16 @@ class Report:
         if not self._told and not fault and self._waits_long(now):
             self._node.get_logger().warning(f'{self._waits_for()}')
             self._told = True
+
+    def ended(self) -> None:
+        """Say once for each run how its steps came, if this node paced it."""
+        member, pace = self._member, self._pace
+        if pace is None or member.run in (0.0, self._ended_run):
+            return
+        self._ended_run = member.run
+        kept = pace.summary()
+        self._node.get_logger().info(
+            f'run {member.run:.0f} ends at step {member.step}' + (f'; {kept}' if kept else ''))
 
     def stands_still(self, now: float) -> bool:
         """Tell at `now` [s] whether the node has made no step for a while."""
@@ -154,6 +166,9 @@ class Report:
         if self._pace is not None:
             values.append(('pace', repr(self._pace.factor)))
             values.append(('late steps', str(self._pace.late_steps)))
+            values.append(('latest step [ms]', f'{1e3 * self._pace.worst_s:.3g}'))
+            values += [(f'delay p{percent:g} [ms]', f'{1e3 * delay_s:.3g}') for percent, delay_s
+                       in zip(PERCENTILES, self._pace.delays.percentiles() or ())]
         values.append(('exchange', 'compiled' if self.exchange else 'Python'))
         if self.exchange:
             values.append(('compiled steps', str(self.exchange.steps)))

@@ -16,6 +16,7 @@
 from __future__ import annotations
 
 import ctypes
+import time
 
 from antenna_drive.emulator.unit import Signal
 from antenna_drive.emulator.units import BlockUnit, build, SourceUnit
@@ -109,6 +110,8 @@ def test_the_loop_counts_late_steps_and_returns_when_it_is_asked() -> None:
     drive.exchange.listen()
     assert drive.exchange.run(pace=pace, limit_s=60.0) == compiled_loop.LAST_STEP
     assert pace.late_steps == 5
+    assert pace.delays.counts.sum() == 5
+    assert 0.0 < pace.worst_s < time.monotonic()
 
 
 def test_what_is_not_there_is_named() -> None:
