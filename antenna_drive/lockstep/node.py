@@ -148,7 +148,7 @@ class DriveNode:
             if form is None:
                 raise Unusable('the unit is in plain Python')
             compile_ahead(self._unit)
-            self._channel = RclChannel(self._node, self._link)
+            self._channel = RclChannel(self._node, self._link, self._readings)
             self._report.exchange = Exchange(self._member, form, self._channel, self._stamps())
         except Unusable as reason:
             self._node.get_logger().info(f'the exchange runs in Python: {reason}')
@@ -261,9 +261,6 @@ class DriveNode:
 
     def _made(self, exchange: Exchange, before: int) -> None:
         """Do what is due after the steps that the compiled exchange has made since `before`."""
-        member = self._member
-        if not member.fault:
-            self._publish_readings(exchange.outputs)
         self._stepped()
 
     def _give_up(self, exchange: Exchange, reason: int) -> None:

@@ -26,8 +26,8 @@ import pytest
 
 # Threads that are there when the class changes have it, and those that they start have not.
 PROGRAM = """
-import os, threading
 from antenna_drive.lockstep.realtime import schedule_first_in_first_out
+import os, threading
 end = threading.Event()
 there = threading.Thread(target=end.wait)
 there.start()
