@@ -114,12 +114,16 @@ def _loop_of(form: Form) -> Any:
 
 
 def compile_ahead(unit: Unit) -> None:
-    """Compile a unit's loop now, not in its first step; nothing for a unit without one."""
-    import numba
+    """
+    Compile a unit's loop and call it once, so that its first step takes no longer than others.
+
+    The call makes no step. A unit without a compiled form has no loop.
+    """
     form = form_of(unit)
     if form is not None:
-        state = _state(1, 1, 1, 1, 0, len(unit.inputs), form.outputs, 0)
-        _loop_of(form).compile((numba.typeof(state), numba.typeof(form.memory(1e-3))))
+        state = _state(0, 0, 1, 1, 0, len(unit.inputs), form.outputs, 0)
+        # it returns at once: step 0 is the last
+        _loop_of(form)(state, form.memory(1e-3))
 
 
 def _state(peers: int, stepping: int, longest: int, length: int, readings: int, inputs: int,

@@ -304,9 +304,10 @@ class DriveNode:
                                                     changes)
 
     def _publish(self, outputs: FloatArray) -> None:
-        self._link.publish(self._member.message())
         if self._member.step == 0:
+            # Before the frame: it takes tens of milliseconds, and nobody waits for a step yet.
             self._begun()
+        self._link.publish(self._member.message())
         self._publish_readings(outputs)
         self._stepped()
 
