@@ -22,6 +22,7 @@ from antenna_drive.lockstep.diagnostics import diagnostics
 from antenna_drive.lockstep.exchange import Exchange
 from antenna_drive.lockstep.member import Conductor, Member
 from antenna_drive.lockstep.pace import Pace
+from antenna_drive.lockstep.partner_link import PartnerLink
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
@@ -65,6 +66,7 @@ class Report:
         self.last_change = ''
         self.refused_values = 0
         self.exchange: Exchange | None = None
+        self.partner: PartnerLink | None = None
 
     def stepped(self) -> None:
         """Note that the node has gone on."""
@@ -88,14 +90,15 @@ class Report:
             self._told = True
 
     def ended(self) -> None:
-        """Say once for each run how its steps came, if this node paced it."""
-        member, pace = self._member, self._pace
-        if pace is None or member.run in (0.0, self._ended_run):
+        """Say once for each run how its steps and its partner's answers came."""
+        member = self._member
+        if member.run in (0.0, self._ended_run):
             return
         self._ended_run = member.run
-        kept = pace.summary()
-        self._node.get_logger().info(
-            f'run {member.run:.0f} ends at step {member.step}' + (f'; {kept}' if kept else ''))
+        told = [source.summary() for source in (self._pace, self.partner) if source is not None]
+        if told:
+            self._node.get_logger().info('; '.join(filter(None, (
+                f'run {member.run:.0f} ends at step {member.step}', *told))))
 
     def stands_still(self, now: float) -> bool:
         """Tell at `now` [s] whether the node has made no step for a while."""
@@ -139,6 +142,8 @@ class Report:
                         f'{refused - self._refused_before} frames refused')
             if self._waits_long(now):
                 return DiagnosticStatus.WARN, self._waits_for()
+            if self.partner is not None and self.partner.trouble():
+                return DiagnosticStatus.WARN, self.partner.trouble()
             if doubled:
                 return (DiagnosticStatus.WARN,
                         f'more than one publisher of {", ".join(doubled)} frames')
@@ -172,5 +177,7 @@ class Report:
         values.append(('exchange', 'compiled' if self.exchange else 'Python'))
         if self.exchange:
             values.append(('compiled steps', str(self.exchange.steps)))
+        if self.partner is not None:
+            values += self.partner.values()
         values.append(('last change', self.last_change))
         return values
