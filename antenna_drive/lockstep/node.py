@@ -282,9 +282,11 @@ class DriveNode:
         """
         member, pace = self._member, self._pace
         exchange.listen()
-        if (self._stop or self._quiet or self.tuning.pending or not member.steady()
+        if (self._stop or self._quiet or not member.steady()
                 or pace is not None and pace.factor > 0.0 and not pace.begun):
             return False
+        if self.tuning.pending:
+            self._apply_changes()
         before = member.step
         if self._partner is not None:
             exchange.pauses = [self._partner.next_step()]

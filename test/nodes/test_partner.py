@@ -54,7 +54,7 @@ def test_a_partner_is_followed_missed_and_replayed(on_miss: str, exchange: str) 
             [sys.executable, '-m', 'pointing_partner.pointing'],
             env={**os.environ, 'PYTHONPATH': os.pathsep.join([str(EXAMPLE), *sys.path])})
         try:
-            watch.until(lambda: number(watch, 'answers') > 20, 'answers')
+            watch.until(lambda: bool(recorder.runs) and len(recorder.schedule()) > 20, 'answers')
             watch.until(lambda: bool(watch.value('test_signal', 'round trip p99.9 [ms]')),
                         'a round trip')
         finally:
