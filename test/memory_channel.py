@@ -40,11 +40,14 @@ class MemoryChannel:
     ----------
     arrived : the frames of each peer that wait to be taken
     waits : how often the loop has waited
+    readings : row, scale and publisher of each reading
+    read_out : publisher and message of every reading that the loop has published
 
     """
 
     def __init__(self, layout: FrameLayout, layouts: Mapping[str, FrameLayout],
-                 publish: Callable[[Frame], None]) -> None:
+                 publish: Callable[[Frame], None],
+                 readings: Sequence[tuple[int, float, int]] = ()) -> None:
         self._layout = layout
         self._layouts = dict(layouts)
         self._publish = publish
@@ -53,6 +56,8 @@ class MemoryChannel:
             peer: _FIRST_SUBSCRIPTION + row for row, peer in enumerate(layouts)}
         self.publisher, self.guard, self.wait_set = _PUBLISHER, _GUARD, _WAIT_SET
         self.allocator: Sequence[int] = (0,) * 5
+        self.readings = readings
+        self.read_out: list[tuple[int, bytes]] = []
         self.incoming = np.zeros(MESSAGE_WORDS, np.int64)
         self.waits = 0
         library = ctypes.CDLL(None)
@@ -82,8 +87,11 @@ class MemoryChannel:
         return 0
 
     def _published(self, publisher: int, message: int, *others: int) -> int:
-        assert publisher == _PUBLISHER
-        frame = self._layout.decode(ctypes.string_at(*_words(message, 2)))
+        content = ctypes.string_at(*_words(message, 2))
+        if publisher != _PUBLISHER:
+            self.read_out.append((publisher, content))
+            return 0
+        frame = self._layout.decode(content)
         assert frame is not None
         self._publish(frame)
         return 0

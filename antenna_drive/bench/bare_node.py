@@ -15,18 +15,18 @@
 The bare exchange: the drive's frames on the drive's graph, without any processing.
 
 Each process takes one frame of each peer without reading it, and publishes a constant frame of its
-own. There is no physics, run, step number, check, parameter or report. The process uses the same
-low level of rclpy as the lock-step, with one wait set for its lifetime.
+own. There is no physics, run, step number, pace, check, parameter or report. The process uses the
+same low level of rclpy as the lock-step, with one wait set for its lifetime.
 
-python -m antenna_drive.bench.bare_node UNIT FILE LAST STEP_S PACE --ros-args ...
+python -m antenna_drive.bench.bare_node UNIT FILE LAST KIND --ros-args ...
+
+KIND is `python` for a loop in Python, `compiled` for that of `bare_loop`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 import signal
 import sys
-import time
 from typing import Any
 
 from antenna_drive.bench.stamps import Stamps
@@ -47,55 +47,46 @@ def peers_of(unit: str) -> list[str]:
 def main() -> int:
     """Exchange frames up to step LAST, then wait for the end."""
     import rclpy
-    from rclpy.impl.implementation_singleton import rclpy_implementation as implementation
+    from antenna_drive.bench import bare_loop
+    from antenna_drive.lockstep.rcl_channel import RclChannel
+    from antenna_drive.lockstep.readings import Readings
+    from antenna_drive.lockstep.ros_link import FrameLink
     from rclpy.node import Node
     from rclpy.signals import SignalHandlerOptions
 
-    unit, path, last, step_s, pace, *arguments = sys.argv[1:]
+    unit, path, last, kind, *arguments = sys.argv[1:]
     rclpy.init(args=[unit, *arguments], signal_handler_options=SignalHandlerOptions.NO)
     node = Node(unit, enable_rosout=False, start_parameter_services=False)
-    publish, takes = _topics(node, unit)
-    context = node.context.handle
-    assert context is not None
-    wait_set = implementation.WaitSet(1, 0, 0, 0, 0, 0, context)
+    link = FrameLink(node, {peer: FrameLayout(OUTPUTS[peer]) for peer in peers_of(unit)})
     stamps = Stamps(path, int(last))
-    frame = FrameLayout(OUTPUTS[unit])
-    message = frame.encode(1.0, 1, 1e-3, bytes(16 * len(OUTPUTS[unit])))
-    period = float(step_s) / float(pace) if float(pace) > 0.0 and unit == TEST_SIGNAL else 0.0
+    message = FrameLayout(OUTPUTS[unit]).encode(1.0, 1, 1e-3, bytes(16 * len(OUTPUTS[unit])))
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if kind == 'compiled':
+        bare_loop.compile_ahead()
+        channel = RclChannel(node, link, Readings(node, (), 0.0, False))
     stamps.note(0)
-    publish(message)
-    _exchange(int(last), message, publish, takes, wait_set, stamps, period)
+    link.publish(message)
+    if kind == 'compiled':
+        bare_loop.exchange(int(last), message, channel, stamps)
+    else:
+        _exchange(int(last), message, node, link, stamps)
     signal.pause()
     return 0
 
 
-def _topics(node: Any, unit: str) -> tuple[Callable[[bytes], None], list[Any]]:
-    from antenna_drive.lockstep.ros_link import FRAME_QOS
+def _exchange(last: int, message: bytes, node: Any, link: Any, stamps: Stamps) -> None:
+    from rclpy.impl.implementation_singleton import rclpy_implementation as implementation
     from std_msgs.msg import Float64MultiArray
 
-    publisher = node.create_publisher(Float64MultiArray, f'{unit}/frame', FRAME_QOS)
-    subscriptions = [node.create_subscription(
-        Float64MultiArray, f'{peer}/frame', lambda message: None, FRAME_QOS, raw=True)
-        for peer in peers_of(unit)]
-    return publisher.handle.publish_raw, [item.handle for item in subscriptions]
-
-
-def _exchange(last: int, message: bytes, publish: Callable[[bytes], None], takes: list[Any],
-              wait_set: Any, stamps: Stamps, period: float) -> None:
-    from std_msgs.msg import Float64MultiArray
-
+    publisher, _, subscriptions = link.handles()
+    publish, takes = publisher.publish_raw, list(subscriptions.values())
+    wait_set = implementation.WaitSet(1, 0, 0, 0, 0, 0, node.context.handle)
     for step in range(1, last + 1):
         for handle in takes:
             while handle.take_message(Float64MultiArray, True) is None:
                 wait_set.clear_entities()
                 wait_set.add_subscription(handle)
                 wait_set.wait(_NEVER_NS)
-        if period:
-            if step == 1:
-                stamps.due_s = time.monotonic()
-            while (rest := stamps.due_s + step * period - time.monotonic()) > 0.0:
-                time.sleep(rest)
         stamps.note(step)
         publish(message)
 

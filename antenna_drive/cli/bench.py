@@ -15,7 +15,7 @@
 Measure speed: headline figures are ratios of two interleaved measurements in one run.
 
 Groups:
-  transport   five processes against the bare exchange of the same frames
+  transport   five processes against bare exchanges of the same frames, in Python and compiled
   simulation  one process against solve_ivp, python-control, PathSim and Drake at equal accuracy,
               and against the same loop in C
   batch       many variants on all cores, in an executor of the caller
@@ -30,6 +30,7 @@ For example:
   antenna-drive bench --quick
   antenna-drive bench --json bench.json
   antenna-drive bench --only simulation --json -
+  antenna-drive bench --only transport --paced 480 --json -     (a quarter of an hour at most)
 """
 
 from __future__ import annotations
@@ -51,6 +52,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help=f'one of {", ".join(GROUPS)}; may be repeated (default: all)')
     parser.add_argument('--repetitions', type=int, default=5, metavar='N',
                         help='number of measurements for each median (default: %(default)s)')
+    parser.add_argument('--paced', type=float, metavar='S',
+                        help='duration of the run at real-time pace [s]; a tenth of it is added '
+                        'with half the macro-step (default: 600, 15 with --quick)')
     add_json_option(parser)
 
 
@@ -58,9 +62,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Measure, and print the table or write the JSON; always 0."""
     from antenna_drive.bench import suite
 
-    check_options(arguments, repetitions=Entry('', 1, whole=True))
+    check_options(arguments, repetitions=Entry('', 1, whole=True), paced=Entry('s', 1.0, 1e5))
     result = suite.measure(arguments.only or GROUPS, arguments.repetitions, arguments.quick,
-                           _say)
+                           _say, {'transport': {'paced_s': arguments.paced}})
     give(result, arguments.json, suite.table(result))
     return 0
 

@@ -31,15 +31,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Step every unit once, alone and in the compiled loop."""
+    """Step every unit once, alone and in the compiled loop; compile the exchange of its node."""
     from antenna_drive.emulator.run import Emulator
     from antenna_drive.emulator.wiring import UNITS
+    from antenna_drive.lockstep.exchange import compile_ahead
     from antenna_drive.parameters import load
 
     with Progress('compiling', len(UNITS) + 1) as progress:
         emulator = Emulator(load())
         for number, (name, unit) in enumerate(emulator.units.items()):
             unit.step(0, emulator.now[emulator.rows_read(name)])
+            compile_ahead(unit)
             progress.update(number + 1)
         emulator.restart()
         emulator.advance(1)

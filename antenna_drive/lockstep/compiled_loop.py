@@ -27,6 +27,7 @@ from __future__ import annotations
 from collections import namedtuple
 from typing import Any
 
+from antenna_drive.lockstep.delays import count
 from antenna_drive.lockstep.frame import HEADER, LATEST_BIRTH
 from antenna_drive.lockstep.inbox import DEPTH
 from antenna_drive.physics.block import rows
@@ -45,14 +46,15 @@ REASONS = ('', 'stepped', 'limit', 'foreign frame', 'frame missing', 'last step'
            'take failed', 'publish failed')
 _GO_ON = 0
 
-# Whole numbers. `asked` is set by other threads to end the loop; `pause` is the step after which
-# it returns; `peer` is who sent the frame that the loop does not take in.
+# Whole numbers. `asked` is set by other threads to end the loop; `every` is after how many steps
+# readings are published; `pause` is the step after which it returns; `peer` is who sent the frame
+# that the loop does not take in.
 Word = rows('asked', 'step', 'last_step', 'slack', 'every', 'pause', 'late', 'peer', 'status',
-            'publisher', 'subscription', 'guard', 'wait_set', 'incoming', 'outgoing',
-            'frame_in', 'frame_out', 'frame_to', 'size_out', 'clock', 'brief_ns')
+            'publisher', 'guard', 'wait_set', 'incoming', 'outgoing', 'frame_in', 'frame_out',
+            'frame_to', 'size_out', 'clock', 'brief_ns', 'value', 'stamp')
 
 # Floating-point numbers, on the clock of time.monotonic() [s].
-Time = rows('run', 'step_s', 'factor', 'start', 'first_step', 'lead', 'now', 'until')
+Time = rows('run', 'step_s', 'factor', 'start', 'first_step', 'lead', 'now', 'until', 'worst')
 
 # Addresses of C functions.
 Call = rows('take', 'publish', 'clear', 'add_subscription', 'add_guard', 'wait', 'copy',
@@ -62,9 +64,15 @@ Call = rows('take', 'publish', 'clear', 'add_subscription', 'add_guard', 'wait',
 # it makes every step.
 Peer = rows('subscription', 'prefix', 'prefix_size', 'length', 'stepping')
 
+# Of each reading: the row of its value in the outputs, TIME for the simulated time; its publisher,
+# its message, and where the number is in the message.
+Reading = rows('row', 'publisher', 'message', 'place')
+TIME = -1
+
 # rcl_serialized_message_t as words: address, length and capacity of the bytes, their allocator.
 MESSAGE_WORDS = 8
 _BYTES, _SIZE = 0, 1
+_NANOSECONDS = 1_000_000_000
 
 _RCL_OK = 0
 _TAKE_FAILED = 401  # RCL_RET_SUBSCRIPTION_TAKE_FAILED: there is no message
@@ -75,7 +83,8 @@ _LONGEST_WAIT_S = 0.1
 
 State = namedtuple('State', (
     'words', 'times', 'calls', 'peers', 'order', 'frames', 'held', 'used', 'sources', 'numbers',
-    'outgoing', 'clock', 'incoming', 'stamps', 'u', 'y'))
+    'outgoing', 'clock', 'incoming', 'readings', 'scales', 'value', 'stamp', 'delays',
+    'stamps', 'u', 'y'))
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -222,6 +231,25 @@ def read_inputs(s: Any) -> None:
         s.u[n, 1] = s.frames[peer, slot, column + 1]
 
 
+@inner
+def _publish_readings(s: Any) -> None:
+    """Publish what `readings.Readings` publishes; one that fails is missed by nobody."""
+    w = s.words
+    for n in range(s.readings.shape[0]):
+        row = s.readings[n, Reading.row]
+        if row == TIME:
+            # seconds and nanoseconds, four bytes each, the seconds first
+            time_ns = np.int64(np.rint(w[Word.step] * s.times[Time.step_s] * 1e9))
+            s.stamp[0] = (time_ns // _NANOSECONDS) | ((time_ns % _NANOSECONDS) << 32)
+            source = w[Word.stamp]
+        else:
+            s.value[0] = s.scales[n] * s.y[row, 0]
+            source = w[Word.value]
+        call_c(s.calls[Call.copy], (s.readings[n, Reading.place], source, np.int64(8)))
+        call_c(s.calls[Call.publish], (
+            s.readings[n, Reading.publisher], s.readings[n, Reading.message], np.int64(0)))
+
+
 @shared
 def put_out(s: Any) -> int:
     """Go on to the next step: check what the unit has put out, publish it."""
@@ -251,11 +279,15 @@ def put_out(s: Any) -> int:
         s.stamps[step] = _read_clock(s)
     status = call_c(s.calls[Call.publish], (
         w[Word.publisher], w[Word.outgoing], np.int64(0)))
-    if t[Time.factor] > 0.0 and t[Time.now] - _due(s, step) > t[Time.step_s] / t[Time.factor]:
-        w[Word.late] += 1
+    if t[Time.factor] > 0.0:
+        after = t[Time.now] - _due(s, step)
+        count(s.delays, after + t[Time.lead])
+        if after > t[Time.step_s] / t[Time.factor]:
+            w[Word.late] += 1
+            t[Time.worst] = max(t[Time.worst], after)
     if status != _RCL_OK:
         w[Word.status] = status
         return PUBLISH_FAILED
-    if step == w[Word.pause] or (w[Word.every] > 0 and step % w[Word.every] == 0):
-        return STEPPED
-    return _GO_ON
+    if w[Word.every] > 0 and step % w[Word.every] == 0:
+        _publish_readings(s)
+    return STEPPED if step == w[Word.pause] else _GO_ON

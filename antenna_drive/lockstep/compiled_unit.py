@@ -25,8 +25,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from antenna_drive.emulator.kernels import of_unit
 from antenna_drive.emulator.unit import FloatArray, Unit
 from antenna_drive.emulator.units import BlockUnit, inner_steps, SourceUnit
+from antenna_drive.lockstep import partner
 from antenna_drive.physics import signal_generator
 from antenna_drive.physics.block import Block
 from antenna_drive.physics.compiling import inner
@@ -58,12 +60,13 @@ class Form(NamedTuple):
 
 @cache
 def _advance_block(block: Block) -> Any:
-    step = block.step
+    # The function that the unit calls itself: its physics is not compiled a second time.
+    step = of_unit(block).step
 
     @inner
     def advance(k: int, h: float, u: FloatArray, y: FloatArray, memory: Any) -> None:
         p, x, mode, work, steps = memory
-        step(x, mode, u, p[0], h, steps, work, y)
+        step(x, mode, u, p, h, steps, work, y)
 
     return advance
 
@@ -89,8 +92,24 @@ def _of_source(unit: Any) -> Form:
                 unit.reached, Path(signal_generator.__file__).resolve().parent)
 
 
+@inner
+def _advance_partner(k: int, h: float, u: FloatArray, y: FloatArray, memory: Any) -> None:
+    # what it puts out is there already
+    seen, = memory
+    for row in range(u.shape[0]):
+        seen[row, 0] = u[row, 0]
+        seen[row, 1] = u[row, 1]
+
+
+def _of_partner(unit: Any) -> Form:
+    y, seen = unit.memory()
+    return Form(partner.__name__, _advance_partner, lambda step_s: (seen,), y,
+                lambda step: None, Path(partner.__file__).resolve().parent)
+
+
 # By exact type: a subclass may do something else in its step.
-FORMS: dict[type[Unit], Callable[[Any], Form]] = {BlockUnit: _of_block, SourceUnit: _of_source}
+FORMS: dict[type[Unit], Callable[[Any], Form]] = {
+    BlockUnit: _of_block, SourceUnit: _of_source, partner.PartnerUnit: _of_partner}
 
 
 def form_of(unit: Unit) -> Form | None:

@@ -119,6 +119,36 @@ def run_unit(unit: Unit, args: Sequence[str] | None = None, wiring: str = '') ->
     return _run(unit.name, make, args, (), type(unit).__doc__ or '', wiring)
 
 
+def run_partner(args: Sequence[str] | None = None, description: str = '') -> int:
+    """
+    Run the stand-in of a partner that does not wait; SIGINT or SIGTERM ends the process.
+
+    Parameters
+    ----------
+    args, description
+        as for `run_drive_unit`
+
+    Returns
+    -------
+    exit code of a node that did not start: 2 wrong input, 3 no ROS 2; 0 after --help
+
+    """
+    def make(name: str, wired: Wiring, config: Sequence[str], given: Mapping[str, Any]) -> Unit:
+        from antenna_drive.lockstep.partner import PartnerUnit
+        if name not in wired.units:
+            raise UserError(f'{name}: no such unit, allowed are {", ".join(wired.units)}; '
+                            'choose with --ros-args -r __node:=test_signal')
+        reads = given.get('partner.reads', wired.units[name].sources)
+        reads = [reads] if isinstance(reads, str) else [str(item) for item in reads]
+        for source in reads:
+            if source not in wired.signals:
+                raise UserError(f'partner.reads: {source}: no such signal, known are '
+                                f'{", ".join(wired.signals)}')
+        return PartnerUnit(name, wired.outputs[name], reads)
+
+    return _run('partner', make, args, (), description, '')
+
+
 def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None,
          fed_by_topic: Sequence[str], description: str, wiring: str) -> int:
     ending = _Ending()
@@ -232,7 +262,7 @@ def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], wiring: str,
     wired = find(wiring)
     with told_while_compiling(node):
         unit = make(node.get_name(), wired, config, given)
-    drive_node = DriveNode(node, unit, overrides, config, fed_by_topic, wiring, wired.outputs)
+        drive_node = DriveNode(node, unit, overrides, config, fed_by_topic, wiring, wired.outputs)
     ending.by(drive_node.stop)
     if not ending.asked:
         drive_node.spin()

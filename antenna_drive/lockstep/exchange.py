@@ -30,9 +30,10 @@ from typing import Any, Protocol
 
 from antenna_drive.emulator.unit import FloatArray, Unit
 from antenna_drive.lockstep import compiled_loop as loop
-from antenna_drive.lockstep.compiled_loop import Call, Peer, Time, Word
+from antenna_drive.lockstep.compiled_loop import Call, Peer, Reading, Time, Word
 from antenna_drive.lockstep.compiled_unit import Form, form_of
-from antenna_drive.lockstep.frame import HEADER
+from antenna_drive.lockstep.delays import empty_counts
+from antenna_drive.lockstep.frame import HEADER, READING_PREFIX
 from antenna_drive.lockstep.inbox import DEPTH, Frame
 from antenna_drive.lockstep.member import Conductor, Member, SLACK
 from antenna_drive.lockstep.pace import Pace
@@ -76,6 +77,7 @@ class Channel(Protocol):
     calls : a function for each name in `Call`
     publisher, guard, wait_set : of the node
     subscriptions : of each peer
+    readings : row in the outputs, scale and publisher of each; row TIME is the simulated time
     incoming : a serialised message to take frames into, as words
     allocator : the five words that end a serialised message
 
@@ -86,6 +88,7 @@ class Channel(Protocol):
     guard: int
     wait_set: int
     subscriptions: Mapping[str, int]
+    readings: Sequence[tuple[int, float, int]]
     incoming: IntArray
     allocator: Sequence[int]
 
@@ -111,15 +114,19 @@ def _loop_of(form: Form) -> Any:
 
 
 def compile_ahead(unit: Unit) -> None:
-    """Compile a unit's loop now, not in its first step; nothing for a unit without one."""
-    import numba
+    """
+    Compile a unit's loop and call it once, so that its first step takes no longer than others.
+
+    The call makes no step. A unit without a compiled form has no loop.
+    """
     form = form_of(unit)
     if form is not None:
-        state = _state(1, 1, 1, 1, len(unit.inputs), form.outputs, 0)
-        _loop_of(form).compile((numba.typeof(state), numba.typeof(form.memory(1e-3))))
+        state = _state(0, 0, 1, 1, 0, len(unit.inputs), form.outputs, 0)
+        # it returns at once: step 0 is the last
+        _loop_of(form)(state, form.memory(1e-3))
 
 
-def _state(peers: int, stepping: int, longest: int, length: int, inputs: int,
+def _state(peers: int, stepping: int, longest: int, length: int, readings: int, inputs: int,
            outputs: FloatArray, stamps: int) -> Any:
     return loop.State(
         words=np.zeros(len(Word), np.int64), times=np.zeros(len(Time)),
@@ -128,8 +135,10 @@ def _state(peers: int, stepping: int, longest: int, length: int, inputs: int,
         held=np.zeros((peers, DEPTH), np.int64), used=np.zeros(peers),
         sources=np.zeros((inputs, 2), np.int64), numbers=np.zeros(longest),
         outgoing=np.zeros(length), clock=np.zeros(2, np.int64),
-        incoming=np.zeros(loop.MESSAGE_WORDS, np.int64), stamps=np.zeros(stamps),
-        u=np.zeros((inputs, 2)), y=outputs)
+        incoming=np.zeros(loop.MESSAGE_WORDS, np.int64),
+        readings=np.zeros((readings, len(Reading)), np.int64), scales=np.zeros(readings),
+        value=np.zeros(1), stamp=np.zeros(1, np.int64), delays=empty_counts(),
+        stamps=np.zeros(stamps), u=np.zeros((inputs, 2)), y=outputs)
 
 
 class Exchange:
@@ -171,7 +180,8 @@ class Exchange:
         stepping = member.inbox.stepping
         own = member.layout
         self._s = s = _state(len(self._peers), len(stepping), max([own.length, *lengths]),
-                             own.length, len(member.sources), form.outputs, stamps)._replace(
+                             own.length, len(channel.readings), len(member.sources),
+                             form.outputs, stamps)._replace(
                                  incoming=channel.incoming)
         s.order[:] = [self._rows[peer] for peer in stepping]
         s.sources[:] = np.array(
@@ -189,6 +199,7 @@ class Exchange:
                             lengths[row], peer in stepping)
         self._message = np.array(
             [self._out.ctypes.data, self._out.size, self._out.size, *channel.allocator], np.int64)
+        self._prepare_readings()
         for name, value in {
                 'slack': SLACK, 'publisher': channel.publisher, 'guard': channel.guard,
                 'wait_set': channel.wait_set, 'incoming': channel.incoming.ctypes.data,
@@ -196,8 +207,22 @@ class Exchange:
                 'frame_out': s.outgoing.ctypes.data,
                 'frame_to': self._out.ctypes.data + len(own.prefix),
                 'size_out': s.outgoing.nbytes, 'clock': s.clock.ctypes.data,
+                'value': s.value.ctypes.data, 'stamp': s.stamp.ctypes.data,
                 'brief_ns': int(1e9 * BRIEF_WAIT_S)}.items():
             s.words[getattr(Word, name)] = value
+
+    def _prepare_readings(self) -> None:
+        readings, prefix = self._channel.readings, READING_PREFIX
+        size = len(prefix) + 8
+        self._reading_bytes = np.zeros((len(readings), size), np.uint8)
+        self._reading_bytes[:, :len(prefix)] = np.frombuffer(prefix, np.uint8)
+        self._reading_messages = np.zeros((len(readings), loop.MESSAGE_WORDS), np.int64)
+        for n, (row, scale, publisher) in enumerate(readings):
+            start = self._reading_bytes[n].ctypes.data
+            message = self._reading_messages[n]
+            message[:] = start, size, size, *self._channel.allocator
+            self._s.readings[n] = row, publisher, message.ctypes.data, start + len(prefix)
+            self._s.scales[n] = scale
 
     @property
     def outputs(self) -> FloatArray:
@@ -235,7 +260,7 @@ class Exchange:
         Parameters
         ----------
         every
-            return after each step that this divides; 0 for none
+            publish readings after each step that this divides; 0 for none
         pace
             when steps are due; it must have begun unless it is as fast as possible
         limit_s
@@ -270,6 +295,7 @@ class Exchange:
         t[Time.run] = member.run
         t[Time.step_s] = member.step_s
         t[Time.until] = time.monotonic() + limit_s
+        t[Time.worst] = 0.0
         t[Time.factor] = 0.0
         if pace is not None:
             t[Time.factor] = pace.factor
@@ -292,7 +318,9 @@ class Exchange:
         member, s = self._member, self._s
         inbox, step = member.inbox, int(s.words[Word.step])
         if pace is not None:
-            pace.late_steps += int(s.words[Word.late])
+            pace.add_late(int(s.words[Word.late]), float(s.times[Time.worst]))
+            pace.delays.counts += s.delays
+            s.delays[:] = 0
         for peer, held, frames, length in zip(
                 self._peers, s.held.tolist(), s.frames, self._lengths):
             inbox.slots[peer][:] = [

@@ -40,6 +40,9 @@ LATEST_BIRTH = LARGEST_RUN - 2.0 ** 40
 
 _CDR_LITTLE_ENDIAN = b'\x00\x01\x00\x00'
 
+# In front of the number of a Float64, and of seconds and nanoseconds of a Clock: eight bytes each.
+READING_PREFIX = _CDR_LITTLE_ENDIAN
+
 
 class FrameLayout:
     """The length, labels and bytes of one unit's frames."""

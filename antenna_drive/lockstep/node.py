@@ -21,18 +21,23 @@ import time
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
+from antenna_drive.errors import one_line
 from antenna_drive.lockstep import compiled_loop, ros_parameters
 from antenna_drive.lockstep.changes import CHANGES, write_record
 from antenna_drive.lockstep.compiled_unit import form_of
 from antenna_drive.lockstep.exchange import BRIEF_WAIT_S, compile_ahead, Exchange
 from antenna_drive.lockstep.member import Conductor, Member
 from antenna_drive.lockstep.pace import LEAD_S, Pace
+from antenna_drive.lockstep.partner import ANSWER, HOLD, ON_MISS, PartnerUnit
+from antenna_drive.lockstep.partner_link import Answer, PartnerLink
 from antenna_drive.lockstep.rcl_channel import RclChannel, Unusable
 from antenna_drive.lockstep.readings import ChangeRecord, READING_QOS, Readings
+from antenna_drive.lockstep.realtime import lock_memory, schedule_first_in_first_out
 from antenna_drive.lockstep.report import Report
 from antenna_drive.lockstep.ros_link import FrameLink
 from antenna_drive.lockstep.serving import Serving
 from antenna_drive.parameters.schema import Entry, Value
+from numba.core.errors import NumbaError
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
@@ -49,11 +54,22 @@ LEAD = Entry('s', 0.0, 1.0, 'how long before it is due a step may be made')
 STEP = Entry('s', 1e-5, 0.1, 'macro-step')
 EXCHANGE = Entry('', description='auto: the compiled exchange where it can be used; '
                  'python: the exchange in Python', choices=('auto', 'python'))
+PRIORITY = Entry('1', 0, 99, 'real-time priority (SCHED_FIFO) of the lock-step, 0: none',
+                 whole=True)
+MEMORY = Entry('', description='locked: all memory of the node stays in RAM (mlockall)',
+               choices=('pageable', 'locked'))
 DURATION = Entry('s', 0.0, 1e9, 'simulated time after which the run ends, 0: never')
 
+PARTNER_RATE = Entry('Hz', 1.0, 1e4,
+                     'how often per simulated second the partner is told its inputs')
+DEADLINE = Entry('s', 0.0, 1e3,
+                 'how old the step may be that was answered last, in simulated time; 0: any age')
+MISS = Entry('', description='what the outputs do while an answer is overdue', choices=ON_MISS)
+
 # The parameters of a node itself, beside the settings of its unit.
-OWN_PARAMETERS = ('config', 'wiring', 'exchange', 'publish_rate', 'run.step', 'run.pace',
-                  'run.lead', 'run.duration', 'run.observers')
+OWN_PARAMETERS = ('config', 'wiring', 'exchange', 'publish_rate', 'realtime.priority',
+                  'realtime.memory', 'partner.rate', 'partner.deadline', 'partner.on_miss',
+                  'run.step', 'run.pace', 'run.lead', 'run.duration', 'run.observers')
 
 
 class DriveNode:
@@ -89,6 +105,7 @@ class DriveNode:
         Raises
         ------
         ParameterError : an override is not allowed, or no parameter has that name
+        UserError : real-time scheduling or locked memory was asked for, and is not to be had
 
         """
         self._node = node
@@ -98,9 +115,19 @@ class DriveNode:
         self._stop = False
         birth = float(time.time_ns() // 1000)
         settings: dict[str, tuple[Entry, Value]] = {
-            name: item for name, item in unit.settings().items() if name not in fed_by_topic}
+            name: item for name, item in unit.settings().items()
+            if name not in (*fed_by_topic, ANSWER)}
         rate_hz = overrides.number('publish_rate', PUBLISH_RATE, 100.0)
-        exchange = overrides.get('exchange', EXCHANGE, 'python')
+        exchange = overrides.get('exchange', EXCHANGE, 'auto')
+        priority = overrides.get('realtime.priority', PRIORITY, 0)
+        memory = overrides.get('realtime.memory', MEMORY, 'pageable')
+        if isinstance(unit, PartnerUnit):
+            overrides.get('partner.rate', PARTNER_RATE, 100.0)
+            overrides.get('partner.deadline', DEADLINE, 0.0)
+            overrides.get('partner.on_miss', MISS, HOLD)
+            ros_parameters.declare_names(
+                node, 'partner.reads', overrides.names('partner.reads', unit.inputs),
+                'signals that the partner is told')
         self._pace: Pace | None = None
         self._member = self._make_member(birth, overrides)
         own = overrides.own
@@ -122,11 +149,17 @@ class DriveNode:
         ros_parameters.accept_changes(
             node, {name: entry for name, (entry, _) in {**settings, **own}.items()}, self._change)
         self._every = 0
+        self._partner = (self._make_partner(unit, overrides) if isinstance(unit, PartnerUnit)
+                         else None)
         self._quiet = False
         self._stands_still = False
         self._said_end = False
         self._channel: RclChannel | None = None
         self._exchange = self._make_exchange() if exchange == 'auto' else None
+        if memory == 'locked':
+            lock_memory()
+        if priority:
+            schedule_first_in_first_out(int(priority))  # type: ignore[arg-type]
 
     def _make_exchange(self) -> Exchange | None:
         """Make the compiled exchange, or say once why there is none."""
@@ -135,10 +168,10 @@ class DriveNode:
             if form is None:
                 raise Unusable('the unit is in plain Python')
             compile_ahead(self._unit)
-            self._channel = RclChannel(self._node, self._link)
+            self._channel = RclChannel(self._node, self._link, self._readings)
             self._report.exchange = Exchange(self._member, form, self._channel, self._stamps())
-        except Unusable as reason:
-            self._node.get_logger().info(f'the exchange runs in Python: {reason}')
+        except (Unusable, NumbaError) as reason:
+            self._node.get_logger().info(f'the exchange runs in Python: {one_line(reason)}')
         return self._report.exchange
 
     def _stamps(self) -> int:
@@ -158,6 +191,25 @@ class DriveNode:
         self._pace = Pace(pace, lead_s)
         return Conductor(self._unit, birth, step_s, round(duration / step_s) or None,
                          self._outputs, observers)
+
+    def _make_partner(self, unit: PartnerUnit, overrides: ros_parameters.Overrides) -> PartnerLink:
+        settings = overrides.own
+        self._report.partner = PartnerLink(
+            self._node, self._member, unit, _as_float(settings['partner.rate'][1]),
+            _as_float(settings['partner.deadline'][1]), str(settings['partner.on_miss'][1]),
+            self._reached, lambda answer: self.tuning.request({ANSWER: answer}, wait=False),
+            self._force)
+        return self._report.partner
+
+    def _force(self, answer: Answer) -> None:
+        """Put an answer of nobody in force, as a change."""
+        self._unit.tune({ANSWER: answer})
+        self._note_changes({ANSWER: answer})
+
+    def _reached(self) -> int:
+        """Return the step that the node is at, to any thread."""
+        exchange = self._exchange
+        return self._member.step if exchange is None else exchange.step
 
     def _follow(self, setting: str) -> None:
         def follow(message: Float64) -> None:
@@ -179,9 +231,7 @@ class DriveNode:
             self._every = self._readings.every(self._member.step_s or 1e-3)
             self._wake()
         if 'run.pace' in own and self._pace is not None:
-            exchange = self._exchange
-            self._pace.change(_as_float(own['run.pace']), time.monotonic(),
-                              self._member.step if exchange is None else exchange.step)
+            self._pace.change(_as_float(own['run.pace']), time.monotonic(), self._reached())
             self._wake()
         return ''
 
@@ -215,6 +265,7 @@ class DriveNode:
                 if self._quiet or not self._gather():
                     self._wait_for_anything()
         finally:
+            self._report.ended()
             serving.close()
             self._exchange = None
             if self._channel is not None:
@@ -231,10 +282,14 @@ class DriveNode:
         """
         member, pace = self._member, self._pace
         exchange.listen()
-        if (self._stop or self._quiet or self.tuning.pending or not member.steady()
+        if (self._stop or self._quiet or not member.steady()
                 or pace is not None and pace.factor > 0.0 and not pace.begun):
             return False
+        if self.tuning.pending:
+            self._apply_changes()
         before = member.step
+        if self._partner is not None:
+            exchange.pauses = [self._partner.next_step()]
         reason = exchange.run(self._every, pace)
         if member.step != before:
             self._made(exchange, before)
@@ -247,9 +302,6 @@ class DriveNode:
 
     def _made(self, exchange: Exchange, before: int) -> None:
         """Do what is due after the steps that the compiled exchange has made since `before`."""
-        member = self._member
-        if not member.fault:
-            self._publish_readings(exchange.outputs)
         self._stepped()
 
     def _give_up(self, exchange: Exchange, reason: int) -> None:
@@ -288,14 +340,20 @@ class DriveNode:
     def _apply_changes(self) -> None:
         changes = self.tuning.apply()
         if changes and self._member.run:
-            self._record.add(self._member.run, self._member.step, changes)
-            self._report.last_change = write_record(self._member.run, self._member.step, CHANGES,
-                                                    changes)
+            self._note_changes(changes)
+            if self._partner is not None and ANSWER in changes:
+                self._partner.took(changes[ANSWER])  # type: ignore[arg-type]
+
+    def _note_changes(self, changes: Mapping[str, Value]) -> None:
+        member = self._member
+        self._record.add(member.run, member.step, changes)
+        self._report.last_change = write_record(member.run, member.step, CHANGES, changes)
 
     def _publish(self, outputs: FloatArray) -> None:
-        self._link.publish(self._member.message())
         if self._member.step == 0:
+            # Before the frame: it takes tens of milliseconds, and nobody waits for a step yet.
             self._begun()
+        self._link.publish(self._member.message())
         self._publish_readings(outputs)
         self._stepped()
 
@@ -306,6 +364,8 @@ class DriveNode:
 
     def _stepped(self) -> None:
         self._quiet = self._stands_still = False
+        if self._partner is not None:
+            self._partner.stepped()
         self._report.stepped()
         self._report.publish_if_due(time.monotonic())
 
@@ -313,6 +373,8 @@ class DriveNode:
         member = self._member
         self._said_end = False
         self._every = self._readings.every(member.step_s)
+        if self._partner is not None:
+            self._partner.begin()
         self._record.begin(member.run, {
             name: value for name, (_, value) in self._unit.settings().items()})
         self._node.get_logger().info(
@@ -357,6 +419,7 @@ class DriveNode:
             self._report.waiting(now)
         if isinstance(member, Conductor) and member.ended and not self._said_end:
             self._said_end = True
+            self._report.ended()
             self._hello()
         ready = self._link.wait(member.wanted(), timeout)
         for peer in ready:

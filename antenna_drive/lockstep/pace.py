@@ -15,6 +15,8 @@
 
 from __future__ import annotations
 
+from antenna_drive.lockstep.delays import Delays
+
 # No one at a screen sees a drive ahead of the clock by so much [s]; a process that has to wait
 # for a core mostly waits less.
 LEAD_S = 0.02
@@ -26,7 +28,7 @@ class Pace:
 
     It begins with the first step that is noted: how long the nodes took to get there is no
     lateness. Step k is due at start + k * step_s / factor: nothing adds up, so nothing drifts. It
-    may be made a little earlier, so that a process which has to wait for the machine makes none
+    may be made `lead_s` earlier, so that a process which has to wait for the machine makes none
     late. A step that comes late is counted and made all the same; the next ones catch up.
 
     Attributes
@@ -34,6 +36,8 @@ class Pace:
     factor : how many times faster than real time; 0 for as fast as possible
     lead_s : how long before it is due a step may be made [s]
     late_steps : steps of this run that came more than one step's time after they were due
+    worst_s : how long after it was due the latest of them came [s]
+    delays : of each step of this run, from when it may be made until it is made
 
     """
 
@@ -41,11 +45,14 @@ class Pace:
         """Set the pace."""
         self.factor = factor
         self.lead_s = lead_s
+        self.delays = Delays()
         self.begin()
 
     def begin(self) -> None:
         """Begin a run: its timetable begins with the next step that is noted."""
         self.late_steps = 0
+        self.worst_s = 0.0
+        self.delays.clear()
         self._begun = False
         self._start = 0.0
         self._first_step = 0
@@ -85,5 +92,23 @@ class Pace:
         """Note that `step` was made at `now`: the first begins the timetable, late ones count."""
         if not self._begun:
             self._anchor(step, now)
-        elif self.factor > 0.0 and now - self.due(step, step_s) > step_s / self.factor:
-            self.late_steps += 1
+        elif self.factor > 0.0:
+            after_s = now - self.due(step, step_s)
+            self.delays.note(after_s + self.lead_s)
+            if after_s > step_s / self.factor:
+                self.add_late(1, after_s)
+
+    def add_late(self, steps: int, worst_s: float) -> None:
+        """Count steps that came late, the latest of them by so much [s]."""
+        self.late_steps += steps
+        self.worst_s = max(self.worst_s, worst_s)
+
+    def summary(self) -> str:
+        """Say in words how the steps of this run kept the timetable, '' if they had none."""
+        percentiles = self.delays.percentiles()
+        if percentiles is None:
+            return ''
+        late = f'{self.late_steps} late'
+        if self.late_steps:
+            late += f' by up to {1e3 * self.worst_s:.3g} ms'
+        return f'delay of a step {percentiles}; {late}'

@@ -51,7 +51,8 @@ class DriveProcesses:
                  config: Sequence[str] = (), namespace: str = '', domain_id: int | None = None,
                  order: Sequence[str] = (), wiring: str = '',
                  commands: Mapping[str, Sequence[str]] | None = None,
-                 environment: Mapping[str, str] | None = None) -> None:
+                 environment: Mapping[str, str] | None = None,
+                 placed: bool | None = None) -> None:
         """
         Say what to start; `start` or entering the context does it.
 
@@ -72,6 +73,8 @@ class DriveProcesses:
             commands to run in place of our own nodes, by unit
         environment
             variables to set beside those of this process
+        placed
+            whether to place the processes for speed; None for what is said above
 
         """
         self._wiring = wiring
@@ -86,7 +89,7 @@ class DriveProcesses:
             self._environment['ROS_DOMAIN_ID'] = str(domain_id)
         choose_transport(self._environment)
         self._unpaced = self._parameters.get(TEST_SIGNAL, {}).get('run.pace') == 0.0
-        self._hurried: bool | None = None
+        self._hurried = placed
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
         self._logs: dict[str, IO[bytes]] = {}
 

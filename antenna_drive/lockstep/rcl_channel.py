@@ -33,6 +33,7 @@ from typing import Any
 
 from antenna_drive.lockstep.compiled_loop import MESSAGE_WORDS
 from antenna_drive.lockstep.frame import FrameLayout
+from antenna_drive.lockstep.readings import Readings
 from antenna_drive.lockstep.ros_link import FRAME_QOS, FrameLink, NotForExecutors, read_message
 import numpy as np
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
@@ -71,11 +72,11 @@ class _Allocator(ctypes.Structure):
 
 
 class RclChannel:
-    """A node's frames as rcl's C functions carry them; see `exchange.Channel`."""
+    """A node's frames and readings as rcl's C functions carry them; see `exchange.Channel`."""
 
-    def __init__(self, node: Node, link: FrameLink) -> None:
+    def __init__(self, node: Node, link: FrameLink, readings: Readings) -> None:
         """
-        Look everything up and check it.
+        Look everything up and check it, for a node's frames and readings.
 
         Raises
         ------
@@ -100,7 +101,7 @@ class RclChannel:
         self._entities = ExitStack()
         try:
             self._check_message()
-            self._keep(node, link)
+            self._keep(node, link, readings.routes())
             self._check_loopback(node)
         except BaseException:
             self.close()
@@ -125,19 +126,22 @@ class RclChannel:
             self._finish(self.incoming.ctypes.data)
             self._make_space()
 
-    def _keep(self, node: Node, link: FrameLink) -> None:
+    def _keep(self, node: Node, link: FrameLink, routes: list[tuple[int, float, Any]]) -> None:
         context = node.context.handle
         assert context is not None
         wait_set = _rclpy.WaitSet(1, 1, 0, 0, 0, 0, context)
         publisher, guard, subscriptions = link.handles()
         # rclpy destroys an entity only when nobody has entered it
-        for handle in (context, wait_set, publisher, guard, *subscriptions.values()):
+        for handle in (context, wait_set, publisher, guard, *subscriptions.values(),
+                       *(handle for _, _, handle in routes)):
             self._entities.enter_context(handle)
         self.publisher: int = publisher.pointer
         self.guard: int = guard.pointer
         self.wait_set: int = wait_set.pointer
         self.subscriptions: Mapping[str, int] = {
             peer: handle.pointer for peer, handle in subscriptions.items()}
+        self.readings: Sequence[tuple[int, float, int]] = [
+            (row, scale, handle.pointer) for row, scale, handle in routes]
 
     def _check_loopback(self, node: Node) -> None:
         """Send a frame to ourselves, with the functions that will carry all others."""

@@ -17,9 +17,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 import struct
+from typing import Any
 
 from antenna_drive.emulator.unit import FloatArray, Signal
 from antenna_drive.lockstep.changes import CHANGES, SETTINGS, write_record
+from antenna_drive.lockstep.compiled_loop import TIME
+from antenna_drive.lockstep.frame import READING_PREFIX
 from antenna_drive.parameters.schema import Value
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -34,7 +37,6 @@ CHANGES_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE,
 
 _FLOAT64 = struct.Struct('<4sd')
 _CLOCK = struct.Struct('<4siI')
-_LITTLE_ENDIAN = b'\x00\x01\x00\x00'
 
 
 class Readings:
@@ -68,6 +70,13 @@ class Readings:
                 Float64, f'{name}/armature_current', READING_QOS)))
         self._clock = node.create_publisher(Clock, 'clock', READING_QOS) if with_clock else None
 
+    def routes(self) -> list[tuple[int, float, Any]]:
+        """Return row, scale and publisher handle of each reading; TIME is the clock's row."""
+        routes = [(row, scale, publisher.handle) for row, scale, publisher in self._rows]
+        if self._clock is not None:
+            routes.append((TIME, 1.0, self._clock.handle))
+        return routes
+
     def every(self, step_s: float) -> int:
         """Return after how many steps of `step_s` [s] the next readings are published."""
         return max(1, round(1.0 / (self.rate_hz * step_s))) if self.rate_hz > 0.0 else 0
@@ -76,10 +85,10 @@ class Readings:
         """Publish the readings of a step."""
         values = outputs[:, 0].tolist()
         for row, scale, publisher in self._rows:
-            publisher.publish(_FLOAT64.pack(_LITTLE_ENDIAN, scale * values[row]))
+            publisher.publish(_FLOAT64.pack(READING_PREFIX, scale * values[row]))
         if self._clock is not None:
             seconds, nanoseconds = divmod(round(step * step_s * 1e9), 1_000_000_000)
-            self._clock.publish(_CLOCK.pack(_LITTLE_ENDIAN, seconds, nanoseconds))
+            self._clock.publish(_CLOCK.pack(READING_PREFIX, seconds, nanoseconds))
 
 
 class ChangeRecord:

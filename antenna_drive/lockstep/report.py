@@ -17,10 +17,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from antenna_drive.lockstep.delays import PERCENTILES
 from antenna_drive.lockstep.diagnostics import diagnostics
 from antenna_drive.lockstep.exchange import Exchange
 from antenna_drive.lockstep.member import Conductor, Member
 from antenna_drive.lockstep.pace import Pace
+from antenna_drive.lockstep.partner_link import PartnerLink
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
@@ -60,9 +62,11 @@ class Report:
         self._told = False
         self._fault_told = ''
         self._next_s = 0.0
+        self._ended_run = 0.0
         self.last_change = ''
         self.refused_values = 0
         self.exchange: Exchange | None = None
+        self.partner: PartnerLink | None = None
 
     def stepped(self) -> None:
         """Note that the node has gone on."""
@@ -84,6 +88,17 @@ class Report:
         if not self._told and not fault and self._waits_long(now):
             self._node.get_logger().warning(f'{self._waits_for()}')
             self._told = True
+
+    def ended(self) -> None:
+        """Say once for each run how its steps and its partner's answers came."""
+        member = self._member
+        if member.run in (0.0, self._ended_run):
+            return
+        self._ended_run = member.run
+        told = [source.summary() for source in (self._pace, self.partner) if source is not None]
+        if told:
+            self._node.get_logger().info('; '.join(filter(None, (
+                f'run {member.run:.0f} ends at step {member.step}', *told))))
 
     def stands_still(self, now: float) -> bool:
         """Tell at `now` [s] whether the node has made no step for a while."""
@@ -127,6 +142,8 @@ class Report:
                         f'{refused - self._refused_before} frames refused')
             if self._waits_long(now):
                 return DiagnosticStatus.WARN, self._waits_for()
+            if self.partner is not None and self.partner.trouble():
+                return DiagnosticStatus.WARN, self.partner.trouble()
             if doubled:
                 return (DiagnosticStatus.WARN,
                         f'more than one publisher of {", ".join(doubled)} frames')
@@ -154,8 +171,13 @@ class Report:
         if self._pace is not None:
             values.append(('pace', repr(self._pace.factor)))
             values.append(('late steps', str(self._pace.late_steps)))
+            values.append(('latest step [ms]', f'{1e3 * self._pace.worst_s:.3g}'))
+            values += [(f'delay p{percent:g} [ms]', f'{1e3 * delay_s:.3g}') for percent, delay_s
+                       in zip(PERCENTILES, self._pace.delays.percentiles() or ())]
         values.append(('exchange', 'compiled' if self.exchange else 'Python'))
         if self.exchange:
             values.append(('compiled steps', str(self.exchange.steps)))
+        if self.partner is not None:
+            values += self.partner.values()
         values.append(('last change', self.last_change))
         return values

@@ -16,13 +16,17 @@
 from __future__ import annotations
 
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from functools import partial
 import json
 import multiprocessing
 from pathlib import Path
 import shutil
+import time
 
 from antenna_drive.article.experiments import experiments
-from antenna_drive.bench import batches, c_loop, measuring, peers, simulation, suite, transport
+from antenna_drive.bench import (
+    batches, c_loop, measuring, peers, simulation, stolen, suite, transport,
+)
 from antenna_drive.bench.batches import Task
 from antenna_drive.bench.peers import Setting
 from antenna_drive.bench.stamps import WARM_STEPS
@@ -104,22 +108,40 @@ def test_batch_through_dask() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('exchange', [transport.own, transport.bare])
-@pytest.mark.parametrize('pace', [0.0, 1.0])
-def test_five_processes_note_every_step(exchange: transport.Run, pace: float,
-                                        fresh_domain: int) -> None:
+@pytest.mark.parametrize('exchange', [
+    transport.own, partial(transport.own, pace=1.0), transport.bare,
+    partial(transport.bare, kind='compiled')])
+def test_five_processes_note_every_step(exchange: transport.Run, fresh_domain: int) -> None:
     pytest.importorskip('rclpy', reason='there is no ROS 2')
     last = WARM_STEPS + 200
-    run = exchange(last, pace=pace)
+    run = exchange(last)
     assert set(run.nodes) == set(UNITS)
     for unit, node in run.nodes.items():
         assert node.times.shape == (last + 1,)
         assert np.all(np.diff(node.times) > 0.0)
         assert run.cpu_per_step(unit) > 0.0
     assert np.all(run.latencies > 0.0)  # nobody makes a step before the conductor's is there
-    if pace:
+    if run.pace:
         # step k is never made before it may be
-        assert np.all(run.delays > (-LEAD_S if exchange is transport.own else 0.0) - 1e-6)
+        assert np.all(run.delays > -LEAD_S - 1e-6)
+    assert run.began_s > 0.0
+
+
+def test_steal_is_a_share_of_the_time_of_all_cores(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [100.0]
+    # user nice system idle iowait irq softirq steal guest guest_nice
+    lines = iter(['cpu 10 0 10 80 0 0 0 0 0 0', 'cpu 60 0 20 180 0 0 0 40 0 0'])
+    monkeypatch.setattr(time, 'monotonic', lambda: now[0])
+    monkeypatch.setattr(Path, 'read_text', lambda path: next(lines) + '\ncpu0 1 2 3')
+    steal = stolen.Steal()
+    assert np.isnan(steal.share(100.0, 101.0)), 'nothing was noted'
+    steal.note()
+    now[0] = 100.5
+    steal.note()
+    now[0] = 102.0
+    steal.note()
+    assert steal.share(100.0, 102.0) == pytest.approx(40 / 200)
 
 
 @pytest.mark.parametrize(('value', 'goal'), [(0.9, 'reached'), (0.7, 'not reached')])

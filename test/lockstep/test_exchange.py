@@ -15,7 +15,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import ctypes
+import struct
+import time
 
 from antenna_drive.emulator.unit import Signal
 from antenna_drive.emulator.units import BlockUnit, build, SourceUnit
@@ -36,13 +39,15 @@ OUTPUTS = {'test_signal': (Signal('a', 'rad', ''), Signal('b', 'V', '')),
 class Conducted:
     """A conductor with a loop, a plant and an observer, as far as frames can tell."""
 
-    def __init__(self, last_step: int | None = None) -> None:
+    def __init__(self, last_step: int | None = None, step_s: float = 1e-3,
+                 readings: Sequence[tuple[int, float, int]] = ()) -> None:
         self.sent: list[Frame] = []
         unit = build('test_signal', load())
         form = form_of(unit)
         assert form is not None
-        self.member = Conductor(unit, 1.0, 1e-3, last_step, OUTPUTS, ['watcher'])
-        self.channel = MemoryChannel(self.member.layout, self.member.layouts, self.sent.append)
+        self.member = Conductor(unit, 1.0, step_s, last_step, OUTPUTS, ['watcher'])
+        self.channel = MemoryChannel(self.member.layout, self.member.layouts, self.sent.append,
+                                     readings)
         self.exchange = Exchange(self.member, form, self.channel)
         self.member.receive('plant', (0.0, 2.0, 0.0, 0.0, 0.0))
         self.member.receive('watcher', (0.0, 2.0, 0.0))
@@ -90,12 +95,31 @@ def test_the_loop_gives_the_steps_of_python() -> None:
     drive, alone = Conducted(last_step=40), build('test_signal', load())
     drive.give(0, 40)
     drive.report(0)
-    assert drive.exchange.run(every=7, limit_s=60.0) == compiled_loop.STEPPED
+    drive.exchange.pauses = [7]
+    assert drive.exchange.run(limit_s=60.0) == compiled_loop.STEPPED
     assert drive.member.step == 7
     assert drive.exchange.run(limit_s=60.0) == compiled_loop.LAST_STEP
     alone.start(1e-3)
     law = [alone.step(k, drive.exchange.outputs[:0]).ravel().tolist() for k in range(40)]
     assert [list(frame[3:]) for frame in drive.sent] == law
+
+
+def test_the_loop_publishes_readings_and_the_clock() -> None:
+    readings = [(1, 1.0, 50), (0, 6.25, 51), (compiled_loop.TIME, 1.0, 52)]
+    drive = Conducted(last_step=3000, step_s=0.0703, readings=readings)
+    drive.member.unit.tune({'waveform': 'saw_tooth', 'amplitude': 0.01, 'period': 47.0})
+    drive.give(0, 3000)
+    for steps in range(0, 3001, SLACK):
+        drive.report(steps)
+    assert drive.exchange.run(every=1000, limit_s=60.0) == compiled_loop.LAST_STEP
+    want = []
+    for k in (1000, 2000, 3000):
+        values = drive.sent[k - 1][3:]
+        want += [(50, struct.pack('<4sd', b'\0\1\0\0', values[2])),
+                 (51, struct.pack('<4sd', b'\0\1\0\0', 6.25 * values[0])),
+                 (52, struct.pack('<4siI', b'\0\1\0\0', *divmod(70_300_000 * k, 10**9)))]
+    assert drive.channel.read_out == want
+    assert want[1][1] != want[4][1], 'the signal moves'
 
 
 def test_the_loop_counts_late_steps_and_returns_when_it_is_asked() -> None:
@@ -109,6 +133,8 @@ def test_the_loop_counts_late_steps_and_returns_when_it_is_asked() -> None:
     drive.exchange.listen()
     assert drive.exchange.run(pace=pace, limit_s=60.0) == compiled_loop.LAST_STEP
     assert pace.late_steps == 5
+    assert pace.delays.counts.sum() == 5
+    assert 0.0 < pace.worst_s < time.monotonic()
 
 
 def test_what_is_not_there_is_named() -> None:

@@ -46,9 +46,14 @@ def test_late_steps_are_counted_and_the_timetable_stays() -> None:
     assert pace.late_steps == 0
     pace.note(4, 1e-3, 0.0041)
     assert pace.late_steps == 1
+    assert pace.worst_s == pytest.approx(1.1e-3)
+    pace.note(5, 1e-3, 0.0051)
+    assert pace.worst_s == pytest.approx(1.1e-3), 'the latest stays'
+    assert pace.summary().endswith('2 late by up to 1.1 ms')
     assert pace.remaining(5, 1e-3, 0.0) == pytest.approx(0.004)
     pace.begin()
     assert pace.late_steps == 0
+    assert pace.summary() == ''
 
 
 def test_the_time_until_all_are_there_is_no_lateness() -> None:

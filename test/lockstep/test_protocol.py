@@ -224,7 +224,8 @@ class Network:
         """Do what a node does with its loop until it is quiet; tell whether it made a step."""
         member, arrived = self.members[name], self.channels[name].arrived
         while member.steady():
-            reason = self.exchanges[name].run(every=1, limit_s=60.0)
+            self.exchanges[name].pauses = [member.step + 1]
+            reason = self.exchanges[name].run(limit_s=60.0)
             if reason == compiled_loop.STEPPED:
                 return True
             if reason == compiled_loop.MISSING:
