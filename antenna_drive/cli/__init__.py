@@ -72,6 +72,7 @@ COMMANDS = {
     'plot': Command('plot', 'draw the signals of a recording'),
     'report': Command('report', 'write a self-contained page about a recording'),
     'diagnose': Command('diagnose', 'say where a real drive and the model part, and why'),
+    'diagnose-many': Command('diagnose_many', 'the same for many machines, one row each'),
     'predict': Command('predict', 'predict a recording that the diagnosis has not seen'),
     'trial': Command('trial', 'make sealed test cases with an independent antenna'),
     'score': Command('score', 'score the verdicts of a trial against its truths'),
