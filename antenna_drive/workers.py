@@ -152,8 +152,14 @@ def workers(count: int, scheduler: str | None = None, *, threads: bool = False,
         with cluster(scheduler) as found:
             yield found
     elif threads:
-        with ThreadPoolExecutor(count) as pool:
+        pool = ThreadPoolExecutor(count)
+        try:
             yield Workers(pool, count)
+        except BaseException:
+            # what the threads wait for ends with this process
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+        pool.shutdown()
     else:
         with worker_processes(count) as processes:
             yield Workers(processes, count)
