@@ -28,7 +28,7 @@ from antenna_drive.lockstep.exchange import BRIEF_WAIT_S, compile_ahead, Exchang
 from antenna_drive.lockstep.member import Conductor, Member
 from antenna_drive.lockstep.pace import LEAD_S, Pace
 from antenna_drive.lockstep.rcl_channel import RclChannel, Unusable
-from antenna_drive.lockstep.readings import ChangeRecord, READING_QOS, Readings
+from antenna_drive.lockstep.readings import ChangeRecord, READING_OVERRIDES, READING_QOS, Readings
 from antenna_drive.lockstep.report import Report
 from antenna_drive.lockstep.ros_link import FrameLink
 from antenna_drive.lockstep.serving import Serving
@@ -165,7 +165,8 @@ class DriveNode:
                 self._report.refused_values += 1
 
         self._node.create_subscription(
-            Float64, f'{self._node.get_name()}/{setting}', follow, READING_QOS)
+            Float64, f'{self._node.get_name()}/{setting}', follow, READING_QOS,
+            qos_overriding_options=READING_OVERRIDES)
 
     def _change(self, changes: dict[str, Value]) -> str:
         # in the thread of the parameter services
