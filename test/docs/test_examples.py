@@ -107,8 +107,8 @@ def test_launch_file(monkeypatch: pytest.MonkeyPatch) -> None:
     assert set(nodes) == set(DRIVE.units)
     for name, options in nodes.items():
         # setup.py names an executable after its module, but for one
-        module = (DRIVE.units[name].node or '').rpartition('.')[2]
-        assert options['executable'] == {'signal_generator': 'test_signal'}.get(module, module)
+        node = (DRIVE.units[name].node or '').rpartition('.')[2]
+        assert options['executable'] == {'signal_generator': 'test_signal'}.get(node, node)
         assert options['package'] == 'antenna_drive'
     # every parameter is one of the node's, and the configuration is a set that there is
     from antenna_drive.emulator.units import build
