@@ -30,10 +30,12 @@ PATIENCE_S = 60.0
 
 
 class Cluster:
-    """A scheduler's address and the processes of its workers."""
+    """A scheduler's address, its process and those of its workers."""
 
-    def __init__(self, address: str, workers: list[subprocess.Popen[bytes]]) -> None:
+    def __init__(self, address: str, scheduler: subprocess.Popen[bytes],
+                 workers: list[subprocess.Popen[bytes]]) -> None:
         self.address = address
+        self.scheduler = scheduler
         self.workers = workers
 
     def kill(self, pid: int) -> None:
@@ -62,8 +64,9 @@ def cluster(folder: Path, count: int) -> Iterator[Cluster]:
             stack.callback(_end, process)
             return process
 
-        start('distributed.cli.dask_scheduler', '--host', '127.0.0.1', '--port', '0',
-              '--no-dashboard', '--scheduler-file', str(file))
+        scheduler = start(
+            'distributed.cli.dask_scheduler', '--host', '127.0.0.1', '--port', '0',
+            '--no-dashboard', '--scheduler-file', str(file))
         # --no-nanny: nobody starts a worker again that was killed
         workers = [start('distributed.cli.dask_worker', '--scheduler-file', str(file),
                          '--nthreads', '1', '--no-nanny', '--no-dashboard')
@@ -74,7 +77,7 @@ def cluster(folder: Path, count: int) -> Iterator[Cluster]:
             if count:
                 client.wait_for_workers(count, timeout=PATIENCE_S)
             address = client.scheduler.address
-        yield Cluster(address, workers)
+        yield Cluster(address, scheduler, workers)
 
 
 def wait_for(path: Path, log: IO[bytes] | None = None) -> str:

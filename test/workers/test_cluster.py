@@ -16,6 +16,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+import json
 import os
 from pathlib import Path
 import shutil
@@ -23,6 +24,7 @@ import subprocess
 import sys
 import threading
 
+from antenna_drive.cli import main
 from antenna_drive.cluster import cluster as connected, fingerprint
 from antenna_drive.errors import UserError
 from antenna_drive.trial import batch
@@ -128,6 +130,45 @@ def test_trial_with_two_workers_killed(four: Cluster, tmp_path: Path) -> None:
     assert len(made) == 60
     for name in made:
         assert (here / name).read_bytes() == (there / name).read_bytes()
+
+
+@pytest.mark.parametrize(('who', 'said'), [('workers', 'no worker for 3 s'),
+                                          ('scheduler', 'the scheduler is gone')])
+def test_a_cluster_that_goes_away(who: str, said: str, tmp_path: Path,
+                                  monkeypatch: pytest.MonkeyPatch) -> None:
+    """It ends the batch in one line; nobody waits for ever."""
+    monkeypatch.setattr('antenna_drive.cluster.PATIENCE_S', 3.0)
+    os.mkfifo(tmp_path / 'nothing')
+
+    def kill() -> None:
+        pid = int(wait_for(tmp_path / 'waiting-0'))
+        if who == 'workers':
+            found.kill(pid)
+        else:
+            found.scheduler.kill()
+
+    with cluster(tmp_path, 1) as found:
+        killer = threading.Thread(target=kill)
+        killer.start()
+        with pytest.raises(TaskLost, match=said):
+            with workers(1, found.address) as pool:
+                for _, result in pool.each(worker_tasks.told, [(str(tmp_path), 0, 1)]):
+                    result()
+        killer.join()
+
+
+def test_a_fleet_is_sent_to_the_workers(steady: Cluster, tmp_path: Path,
+                                        capsys: pytest.CaptureFixture[str]) -> None:
+    """They have no disk in common with us as far as they know, and say what is wrong."""
+    for name in ('north', 'south'):
+        (tmp_path / 'fleet' / name).mkdir(parents=True)
+        (tmp_path / 'fleet' / name / 'rec_a.csv').write_text(f'time_s,{name}\n0,1\n')
+    assert main(['diagnose-many', str(tmp_path / 'fleet'), '--scheduler', steady.address,
+                 '--json', '-']) == 1
+    rows = json.loads(capsys.readouterr().out)['rows']
+    assert [row['machine'] for row in rows] == ['north', 'south']
+    for row in rows:
+        assert row['failure'].startswith('recordings/rec_a.csv: line 1, column 2: no such column')
 
 
 def test_nobody_there(monkeypatch: pytest.MonkeyPatch) -> None:
