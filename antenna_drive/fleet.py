@@ -22,12 +22,15 @@ for the same recordings, options and sources, and only for these.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+import fcntl
 import hashlib
 import json
 import math
 from pathlib import Path
+import shutil
 import tempfile
 from typing import Any
 
@@ -43,6 +46,8 @@ FAILURE = 'failure.txt'
 CONFIG = 'config.yaml'          # of one machine, beside its recordings
 MADE_FROM = 'made_from'         # the digest, in the verdict
 Files = dict[str, bytes]
+# Where a diagnosis works; its process holds the lock.
+_WORK, _LOCK = 'antenna_drive-fleet-', '.lock'
 
 
 @dataclass(frozen=True)
@@ -206,8 +211,7 @@ def diagnosed(files: Mapping[str, bytes], recordings: Sequence[str], options: Op
     the files VERDICT and PAGE, and CORRECTED if it is wanted; FAILURE alone if there is none
 
     """
-    with tempfile.TemporaryDirectory(prefix='antenna_drive-') as name:
-        folder = Path(name)
+    with _work_folder() as folder:
         for path, content in files.items():
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             (folder / path).write_bytes(content)
@@ -227,6 +231,27 @@ def diagnosed(files: Mapping[str, bytes], recordings: Sequence[str], options: Op
         if not all((folder / path).exists() for path in wanted):
             return {FAILURE: said.replace(f'{folder}/', '').encode()}
         return {path: (folder / path).read_bytes() for path in wanted}
+
+
+@contextmanager
+def _work_folder() -> Iterator[Path]:
+    """
+    Yield a folder that is gone at the end; remove those of processes that were killed.
+
+    A process holds a lock on its folder for as long as it lives.
+    """
+    for old in Path(tempfile.gettempdir()).glob(f'{_WORK}*'):
+        try:
+            with (old / _LOCK).open() as lock:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                shutil.rmtree(old, ignore_errors=True)
+        except OSError:  # in use, or not ours
+            continue
+    with tempfile.TemporaryDirectory(prefix=_WORK) as name:
+        folder = Path(name)
+        with (folder / _LOCK).open('w') as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            yield folder
 
 
 def row_of(machine: FleetMachine, verdict: Mapping[str, Any]) -> dict[str, Any]:

@@ -132,8 +132,8 @@ def test_trial_with_two_workers_killed(four: Cluster, tmp_path: Path) -> None:
         assert (here / name).read_bytes() == (there / name).read_bytes()
 
 
-@pytest.mark.parametrize(('who', 'said'), [('workers', 'no worker for 3 s'),
-                                          ('scheduler', 'the scheduler is gone')])
+@pytest.mark.parametrize(('who', 'said'), [
+    ('workers', 'no worker for 3 s'), ('scheduler', 'the scheduler is gone')])
 def test_a_cluster_that_goes_away(who: str, said: str, tmp_path: Path,
                                   monkeypatch: pytest.MonkeyPatch) -> None:
     """It ends the batch in one line; nobody waits for ever."""

@@ -16,10 +16,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import fcntl
 import json
 from pathlib import Path
 import shutil
 import sys
+import tempfile
 from typing import Any
 
 from antenna_drive.cli import main
@@ -191,6 +193,20 @@ def test_memory_is_bounded(tmp_path: Path, told: Told,
     assert main([*words, '1000']) == 1
     assert 'MemoryError' in capsys.readouterr().out
     assert main([*words, '8000']) == 0
+
+
+def test_what_a_killed_diagnosis_left_is_removed(
+        fleet: Path, told: Told, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A folder in which another one works is not."""
+    monkeypatch.setattr(tempfile, 'tempdir', str(tmp_path / 'tmp'))
+    left, used = (tmp_path / 'tmp' / f'antenna_drive-fleet-{name}' for name in ('left', 'used'))
+    for folder in (left, used):
+        folder.mkdir(parents=True)
+        (folder / '.lock').write_text('')
+    with (used / '.lock').open() as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        main(['diagnose-many', str(fleet), '--jobs', '2'])
+    assert list((tmp_path / 'tmp').iterdir()) == [used]
 
 
 def test_results_are_not_recordings(fleet: Path, told: Told) -> None:
