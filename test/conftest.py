@@ -16,25 +16,20 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
-import faulthandler
 import fcntl
 import os
 from pathlib import Path
-import sys
 import tempfile
 from typing import IO
 
+import hanging
 from hypothesis import settings
 from installations import install_with_colcon, install_with_pip, Installation
-import leftovers
 import pytest
 
 # Nothing here is judged by how long it takes: the first call of compiled code compiles.
 settings.register_profile('antenna_drive', deadline=None)
 settings.load_profile('antenna_drive')
-
-# How long a test marked trial may take; setup.cfg has the limit of the others [s].
-TRIAL_TIMEOUT_S = 3600.0
 
 # Domains 0 to 101 use ports that no operating system hands out; 0 is where people work.
 DOMAINS = range(1, 102)
@@ -42,10 +37,6 @@ DOMAINS = range(1, 102)
 # Fixtures of tests that no two workers run at the same time.
 ONE_AT_A_TIME = {'session_domain', 'module_domain', 'fresh_domain', 'colcon_installation',
                  'pip_installation'}
-
-
-_STDERR = pytest.StashKey[int]()        # where faults are told, whatever is captured
-_BEFORE = pytest.StashKey[set[int]]()   # processes that a test found running
 
 
 class DomainClaim:
@@ -85,44 +76,9 @@ def pytest_configure(config: pytest.Config) -> None:
     """Put the whole session, and every process that it starts, into a domain of its own."""
     claim = DomainClaim()
     config.add_cleanup(claim.release)
-    leftovers.mark(hasattr(config, 'workerinput'))
-    config.stash[_STDERR] = os.dup(2)
+    config.pluginmanager.register(hanging)
     os.environ['ROS_DOMAIN_ID'] = str(claim.number)
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-
-
-def pytest_unconfigure(config: pytest.Config) -> None:
-    """End what the tests have left running, and say what it was."""
-    for command in leftovers.end(leftovers.started()):
-        print(f'left running by the tests, ended: {command}', file=sys.stderr)
-
-
-@pytest.hookimpl(tryfirst=True, hookwrapper=True)
-def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, None, None]:
-    """
-    End the process if a test goes on after its time.
-
-    pytest-timeout raises in the main thread, which compiled code may never let happen.
-    """
-    mark = item.get_closest_marker('timeout')
-    known = item.config.pluginmanager.hasplugin('timeout')
-    seconds = float(mark.args[0] if mark else known and item.config.getini('timeout') or 0.0)
-    if seconds:
-        faulthandler.dump_traceback_later(2.0 * seconds, exit=True,
-                                          file=item.config.stash[_STDERR])
-    item.stash[_BEFORE] = leftovers.started()
-    yield
-    faulthandler.cancel_dump_traceback_later()
-
-
-@pytest.hookimpl(hookwrapper=True)
-def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None],
-                              ) -> Generator[None, None, None]:
-    """End what a test has started that came to no end: it would disturb those that follow."""
-    yield
-    if call.excinfo is not None and 'pytest-timeout' in str(call.excinfo.value):
-        before = item.stash[_BEFORE]
-        leftovers.end(leftovers.started() - before)
 
 
 @pytest.hookimpl(tryfirst=True, hookwrapper=True)
@@ -137,8 +93,6 @@ def pytest_collection_modifyitems(
     for item in items:
         alone = ONE_AT_A_TIME & set(getattr(item, 'fixturenames', ()))
         item.add_marker(pytest.mark.xdist_group('processes' if alone else item.path.name))
-        if item.get_closest_marker('trial') and not item.get_closest_marker('timeout'):
-            item.add_marker(pytest.mark.timeout(TRIAL_TIMEOUT_S))
     yield
     if hasattr(config, 'workerinput'):
         items.sort(key=lambda item: not ONE_AT_A_TIME & set(getattr(item, 'fixturenames', ())))

@@ -56,6 +56,7 @@ class Command(NamedTuple):
 
 COMMANDS = {
     'doctor': Command('doctor', 'say what is installed, what works, and what to do'),
+    'completion': Command('completion', 'print the completion of this command for a shell'),
     'demo': Command('demo', 'run the saw-tooth test on the old and the new circuit, in five '
                             'processes'),
     'lockstep-check': Command('lockstep_check', 'compare five processes with one, sample by '
@@ -72,15 +73,14 @@ COMMANDS = {
     'plot': Command('plot', 'draw the signals of a recording'),
     'report': Command('report', 'write a self-contained page about a recording'),
     'diagnose': Command('diagnose', 'say where a real drive and the model part, and why'),
-    'diagnose-many': Command('diagnose_many', 'the same for many machines, one row each'),
     'predict': Command('predict', 'predict a recording that the diagnosis has not seen'),
+    'diagnose-many': Command('diagnose_many', 'the diagnosis of many machines, one row each'),
     'trial': Command('trial', 'make sealed test cases with an independent antenna'),
     'score': Command('score', 'score the verdicts of a trial against its truths'),
     'thresholds': Command('thresholds', "list the diagnosis' thresholds and what they decide"),
     'servo': Command('servo', 'say what the model of an ordinary servo lacks'),
     'confusability': Command('confusability', 'measure which effects can be told apart'),
     'bench': Command('bench', 'measure speed'),
-    'completion': Command('completion', 'print the completion of this command for a shell'),
 }
 
 
