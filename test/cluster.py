@@ -49,8 +49,20 @@ class Cluster:
 
 
 @contextmanager
-def cluster(folder: Path, count: int) -> Iterator[Cluster]:
-    """Start a scheduler and workers of one thread each; end all of them."""
+def cluster(folder: Path, count: int, executable: Path | None = None) -> Iterator[Cluster]:
+    """
+    Start a scheduler and workers of one thread each; end all of them.
+
+    Parameters
+    ----------
+    folder
+        for files
+    count
+        of workers
+    executable
+        what the workers take for Python when they start a process
+
+    """
     environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(
         [str(ROOT), str(ROOT / 'test'), os.environ.get('PYTHONPATH', '')])}
     file = folder / 'scheduler.json'
@@ -68,9 +80,12 @@ def cluster(folder: Path, count: int) -> Iterator[Cluster]:
             'distributed.cli.dask_scheduler', '--host', '127.0.0.1', '--port', '0',
             '--no-dashboard', '--scheduler-file', str(file))
         # --no-nanny: nobody starts a worker again that was killed
-        workers = [start('distributed.cli.dask_worker', '--scheduler-file', str(file),
-                         '--nthreads', '1', '--no-nanny', '--no-dashboard')
-                   for _ in range(count)]
+        module = 'distributed.cli.dask_worker'
+        if executable is not None:
+            module = 'worker_with_stand_in'
+            environment['STAND_IN'] = str(executable)
+        workers = [start(module, '--scheduler-file', str(file), '--nthreads', '1', '--no-nanny',
+                         '--no-dashboard') for _ in range(count)]
         from distributed import Client
         wait_for(file, log)
         with Client(scheduler_file=str(file), timeout=PATIENCE_S, set_as_default=False) as client:

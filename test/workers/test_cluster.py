@@ -171,6 +171,58 @@ def test_a_fleet_is_sent_to_the_workers(steady: Cluster, tmp_path: Path,
         assert row['failure'].startswith('recordings/rec_a.csv: line 1, column 2: no such column')
 
 
+# Takes the place of a diagnosis: notes that it was begun; the first two wait when first begun.
+STAND_IN = """
+import json, os, pathlib, sys
+words = sys.argv[3:]
+case = pathlib.Path(words[1]).parent.name
+with open(f'{folder}/begun-{{case}}', 'a+') as stream:
+    stream.write('x')
+    stream.seek(0)
+    first = len(stream.read()) == 1
+if first and case in ('case_0001', 'case_0002'):
+    pathlib.Path(f'{folder}/waiting-{{case}}').write_text(os.environ['ANTENNA_DRIVE_PARENT'])
+    open(f'{folder}/nothing').read()
+pathlib.Path(words[words.index('--json') + 1]).write_text(json.dumps({{'case': case}}))
+"""
+
+
+def test_diagnoses_of_a_trial_with_two_workers_killed(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was being diagnosed by the two is begun once more, and nothing else."""
+    program, launcher = tmp_path / 'stand_in.py', tmp_path / 'launcher'
+    program.write_text(STAND_IN.format(folder=tmp_path))
+    launcher.write_text(f'#!/bin/sh\nexec {sys.executable} {program} "$@"\n')
+    launcher.chmod(0o755)
+    os.mkfifo(tmp_path / 'nothing')
+    manifest = batch.prepare(tmp_path / 'trial', 12, 4, 0.02, 50.0, batch.DURATION_S)
+    for name in manifest['seals']:
+        (tmp_path / 'trial' / name).mkdir()
+
+    with cluster(tmp_path, 4, launcher) as found:
+        def kill() -> None:
+            for case in ('case_0001', 'case_0002'):
+                found.kill(int(wait_for(tmp_path / f'waiting-{case}')))
+
+        killer = threading.Thread(target=kill)
+        killer.start()
+        told: list[tuple[int, int]] = []
+        assert batch.diagnose_cases(
+            tmp_path / 'trial', manifest, 1, done=lambda *count: told.append(count),
+            scheduler=found.address) == 0
+        killer.join()
+        assert found.alive() == 2
+        # let the diagnoses end whose workers were killed
+        for _ in range(2):
+            (tmp_path / 'nothing').open('w').close()
+    assert told == [(k, 12) for k in range(13)]
+    for name in manifest['seals']:
+        verdict = json.loads((tmp_path / 'trial' / name / 'verdict.json').read_text())
+        assert verdict == {'case': name}
+        begun = (tmp_path / f'begun-{name}').read_text()
+        assert begun == ('xx' if name in ('case_0001', 'case_0002') else 'x')
+
+
 def test_nobody_there(monkeypatch: pytest.MonkeyPatch) -> None:
     """A scheduler that does not answer is one line, with its address."""
     monkeypatch.setattr('antenna_drive.cluster.CONNECT_S', 1.0)
