@@ -283,6 +283,14 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
                 for effect in row['effects']).most_common())}
 
 
+def share(row: Mapping[str, Any]) -> str:
+    """Return the share of the gap that is explained, as people read it."""
+    if row['explained'] is None:
+        return ''
+    # an effect may make the gap wider on withheld data
+    return 'nothing' if row['explained'] < 0.0 else f'{100.0 * row["explained"]:.0f} %'
+
+
 def text(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the table of the fleet for a terminal."""
     width = max(len('machine'), *(len(row['machine']) for row in rows))
@@ -291,8 +299,7 @@ def text(rows: Sequence[Mapping[str, Any]]) -> str:
         if row['failure'] is not None:
             lines.append(f'{row["machine"]:{width}}  {"failed":18}{"":>9}  {row["failure"]}')
             continue
-        share = '' if row['explained'] is None else f'{100.0 * row["explained"]:.0f} %'
-        lines.append(f'{row["machine"]:{width}}  {row["verdict"]:18}{share:>9}  '
+        lines.append(f'{row["machine"]:{width}}  {row["verdict"]:18}{share(row):>9}  '
                      + (' + '.join(row['effects']) + f' ({100.0 * row["probability"]:.0f} %)'
                         if row['effects'] else ''))
     found = summary(rows)

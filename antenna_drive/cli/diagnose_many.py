@@ -74,7 +74,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose the machines, and write table and page; 1 if a diagnosis failed."""
-    from antenna_drive.fleet import diagnose_fleet, machines_of, Options, summary, text
+    from antenna_drive.fleet import diagnose_fleet, machines_of, Options, share, summary, text
     from antenna_drive.pages import render
     from antenna_drive.workers import workers
 
@@ -93,7 +93,8 @@ def run(arguments: argparse.Namespace) -> int:
     found = {**summary(rows), 'rows': rows}
     write_json(found, out / 'fleet.json')
     with replaced(out / 'fleet.html') as stream:
-        stream.write(render('fleet.html', title=str(arguments.folder), rows=rows,
-                            lead=f'{found["machines"]} machines', summary=found).encode())
+        stream.write(render('fleet.html', title=f'Fleet {arguments.folder.resolve().name}',
+                            lead=f'{len(rows)} machines', rows=rows, summary=found,
+                            share=share).encode())
     give(found, arguments.json, f'{text(rows)}\n{out / "fleet.html"}')
     return NEGATIVE if found['failed'] else OK

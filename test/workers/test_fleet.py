@@ -26,7 +26,7 @@ from typing import Any
 
 from antenna_drive.cli import main
 from antenna_drive.errors import UserError
-from antenna_drive.fleet import machines_of
+from antenna_drive.fleet import machines_of, share
 import pytest
 
 # A stand-in for the diagnosis: it notes what it was given, and answers from the recording's name.
@@ -137,6 +137,12 @@ def test_one_row_a_machine(fleet: Path, told: Told, tmp_path: Path,
     assert north['configs'] == ['of all', 'of the north']
     assert north['words'].index('new_circuit') > 0
     assert given['east.csv',]['configs'] == ['of all']
+
+
+@pytest.mark.parametrize(('explained', 'said'), [
+    (None, ''), (0.5, '50 %'), (0.0, '0 %'), (-8453.94, 'nothing')])
+def test_share_as_people_read_it(explained: float | None, said: str) -> None:
+    assert share({'explained': explained}) == said
 
 
 def test_page_links_what_there_is(fleet: Path, told: Told) -> None:
