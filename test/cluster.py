@@ -25,8 +25,8 @@ import time
 from typing import IO
 
 ROOT = Path(__file__).resolve().parents[1]
-# What is waited for comes within seconds; a test that waits longer fails.
-PATIENCE_S = 60.0
+# What is waited for comes within seconds on a quiet machine; a test that waits longer fails.
+PATIENCE_S = 200.0
 
 
 class Cluster:

@@ -25,7 +25,7 @@ from antenna_drive.subcommand import run_command
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PATIENCE_S = 60.0
+PATIENCE_S = 200.0
 # A parent with a command that would take many minutes.
 PARENT = """
 import sys
