@@ -90,12 +90,17 @@ setup(
         'ros': [f'{wheel} ; {WHEELS_EXIST}' for wheel in KILTED],
         'plot': ['matplotlib >= 3.6'],
         'calibrate': ['cma >= 3.2'],
+        # trials, studies, calibrations and fleets on a cluster
+        'cluster': ['dask[distributed] >= 2024.1'],
+        'completion': ['shtab >= 1.6'],
         # the first release that can complete a chunk on demand
         'recording': ['mcap >= 1.5'],
         'test': [
             'cma >= 3.2',
             'pytest >= 7.4',
+            'pytest-timeout >= 2.2',
             'pytest-xdist >= 3.7',
+            'shtab >= 1.6',
             'hypothesis >= 6.80',
             'mypy >= 1.8',
             'types-PyYAML',

@@ -13,9 +13,15 @@
 # limitations under the License.
 """Let `python -m antenna_drive` be the antenna-drive command."""
 
+import os
 import sys
 
 from antenna_drive.cli import main
+from antenna_drive.programs import end_with_parent, PARENT
 
 if __name__ == '__main__':
+    if PARENT in os.environ:
+        end_with_parent()
+        if os.getppid() != int(os.environ[PARENT]):
+            sys.exit()
     sys.exit(main())

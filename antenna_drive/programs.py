@@ -23,6 +23,8 @@ from antenna_drive.errors import UserError
 from antenna_drive.remedies import remedy
 
 OK, NEGATIVE, BAD_INPUT, NOT_INSTALLED = 0, 1, 2, 3
+# In the environment of a process that is to end with its parent: the number of the parent.
+PARENT = 'ANTENNA_DRIVE_PARENT'
 
 
 def run_program(name: str, description: str, args: Sequence[str] | None,

@@ -27,6 +27,8 @@ REMEDIES = {
     'matplotlib': 'pip install matplotlib',
     'mcap': 'pip install mcap',
     'cma': 'pip install cma',
+    'distributed': "pip install 'dask[distributed]'",
+    'shtab': 'pip install shtab',
 }
 
 

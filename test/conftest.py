@@ -22,6 +22,7 @@ from pathlib import Path
 import tempfile
 from typing import IO
 
+import hanging
 from hypothesis import settings
 from installations import install_with_colcon, install_with_pip, Installation
 import pytest
@@ -75,6 +76,7 @@ def pytest_configure(config: pytest.Config) -> None:
     """Put the whole session, and every process that it starts, into a domain of its own."""
     claim = DomainClaim()
     config.add_cleanup(claim.release)
+    config.pluginmanager.register(hanging)
     os.environ['ROS_DOMAIN_ID'] = str(claim.number)
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 

@@ -21,10 +21,11 @@ therefore resumes where it stopped and gives the same result.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 import hashlib
+from itertools import chain
 import json
 import math
 from pathlib import Path
@@ -32,6 +33,7 @@ from typing import Any, TextIO
 
 from antenna_drive.calibration.problem import CalibrationProblem, Evaluation
 from antenna_drive.errors import UserError
+from antenna_drive.workers import workers
 import cma
 import numpy as np
 
@@ -121,7 +123,8 @@ def _digest(problem: CalibrationProblem) -> str:
 
 
 def search(problem: CalibrationProblem, count: int, *, seed: int = 1, log: Path | None = None,
-           progress: Callable[[int, FitCandidate], None] | None = None) -> SearchResult:
+           progress: Callable[[int, FitCandidate], None] | None = None, jobs: int = 1,
+           scheduler: str | None = None) -> SearchResult:
     """
     Search for the parameters of least cost.
 
@@ -137,10 +140,15 @@ def search(problem: CalibrationProblem, count: int, *, seed: int = 1, log: Path 
         file for the candidates; the search resumes from it if it exists
     progress
         called with the number of candidates so far and the best one
+    jobs
+        processes that evaluate the candidates of a generation
+    scheduler
+        address of a dask.distributed scheduler whose workers do that instead
 
     Raises
     ------
-    UserError : the log belongs to another search, or cannot be read or written
+    UserError : the log belongs to another search, or cannot be read or written; the scheduler
+        has no workers
 
     """
     known = [] if log is None else _begin_log(log, problem, seed)
@@ -150,23 +158,22 @@ def search(problem: CalibrationProblem, count: int, *, seed: int = 1, log: Path 
     strategy = cma.CMAEvolutionStrategy(start, problem.spread, {
         'bounds': [0.0, 1.0], 'popsize': problem.population, 'verbose': -9, 'seed': math.nan,
         'randn': lambda *shape: random.standard_normal(shape), 'maxiter': math.inf})
-    with nullcontext() if log is None else log.open('a', encoding='utf-8') as stream:
+    with (nullcontext() if log is None else log.open('a', encoding='utf-8') as stream,
+          _evaluators(problem, jobs, scheduler) as evaluated):
         limit = math.inf
         while len(candidates) <= count and not strategy.stop():
             asked = strategy.ask()
             generation = []
-            for shares in asked:
-                number = len(candidates) - 1
-                if number < len(known):
-                    candidate = known[number]
-                    if not np.allclose(candidate.shares, shares, rtol=0.0, atol=1e-9):
-                        raise UserError(f'{log}: does not repeat (another version of a library?), '
-                                        'remove it to start again')
-                else:
-                    candidate = FitCandidate(tuple(map(float, shares)),
-                                             problem.evaluate(shares, limit))
-                    if stream:
-                        _write(stream, candidate)
+            # those of this generation that the log holds
+            logged = known[len(candidates) - 1:][:len(asked)]
+            for candidate, shares in zip(logged, asked):
+                if not np.allclose(candidate.shares, shares, rtol=0.0, atol=1e-9):
+                    raise UserError(f'{log}: does not repeat (another version of a library?), '
+                                    'remove it to start again')
+            for number, candidate in enumerate(chain(
+                    logged, evaluated(asked[len(logged):], limit))):
+                if stream and number >= len(logged):
+                    _write(stream, candidate)
                 candidates.append(candidate)
                 generation.append(candidate.evaluation.cost)
                 if progress:
@@ -174,6 +181,35 @@ def search(problem: CalibrationProblem, count: int, *, seed: int = 1, log: Path 
             strategy.tell(asked, generation)
             limit = _GIVE_UP * sorted(generation)[len(generation) // 2]
     return SearchResult(_best(candidates), tuple(candidates))
+
+
+@contextmanager
+def _evaluators(problem: CalibrationProblem, jobs: int, scheduler: str | None) -> Iterator[
+        Callable[[Sequence[Any], float], Iterator[FitCandidate]]]:
+    """Yield a function that evaluates candidates and yields them in their order."""
+    def one_by_one(asked: Sequence[Any], limit: float) -> Iterator[FitCandidate]:
+        return (_evaluated(problem, shares, limit) for shares in asked)
+
+    if jobs == 1 and scheduler is None:
+        yield one_by_one
+        return
+    with workers(jobs, scheduler) as pool:
+        def side_by_side(asked: Sequence[Any], limit: float) -> Iterator[FitCandidate]:
+            ended: dict[int, FitCandidate] = {}
+            following = 0
+            for number, result in pool.each(_evaluated, (
+                    (problem, shares, limit) for shares in asked)):
+                ended[number] = result()
+                while following in ended:
+                    yield ended.pop(following)
+                    following += 1
+
+        yield side_by_side
+
+
+def _evaluated(problem: CalibrationProblem, shares: Sequence[float], limit: float,
+               ) -> FitCandidate:
+    return FitCandidate(tuple(map(float, shares)), problem.evaluate(shares, limit))
 
 
 def _best(candidates: list[FitCandidate]) -> FitCandidate:

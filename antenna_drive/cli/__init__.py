@@ -26,7 +26,6 @@ import difflib
 import importlib
 import os
 import sys
-from types import ModuleType
 from typing import NamedTuple
 import warnings
 
@@ -56,6 +55,8 @@ class Command(NamedTuple):
 
 
 COMMANDS = {
+    'doctor': Command('doctor', 'say what is installed, what works, and what to do'),
+    'completion': Command('completion', 'print the completion of this command for a shell'),
     'demo': Command('demo', 'run the saw-tooth test on the old and the new circuit, in five '
                             'processes'),
     'lockstep-check': Command('lockstep_check', 'compare five processes with one, sample by '
@@ -73,6 +74,7 @@ COMMANDS = {
     'report': Command('report', 'write a self-contained page about a recording'),
     'diagnose': Command('diagnose', 'say where a real drive and the model part, and why'),
     'predict': Command('predict', 'predict a recording that the diagnosis has not seen'),
+    'diagnose-many': Command('diagnose_many', 'the diagnosis of many machines, one row each'),
     'trial': Command('trial', 'make sealed test cases with an independent antenna'),
     'score': Command('score', 'score the verdicts of a trial against its truths'),
     'thresholds': Command('thresholds', "list the diagnosis' thresholds and what they decide"),
@@ -126,21 +128,29 @@ def _run(name: str, arguments: list[str]) -> int:
         close = difflib.get_close_matches(name, COMMANDS, n=1)
         guess = f'did you mean {close[0]}?' if close else 'antenna-drive --help lists them'
         raise UserError(f'no such command, {guess}')
+    parsed = make_parser(name).parse_args(arguments)
+    # parse_args has left by now unless there was a command
+    return int(importlib.import_module(f'{__name__}.{COMMANDS[name].module}').run(parsed))
+
+
+def make_parser(*names: str) -> argparse.ArgumentParser:
+    """
+    Return the parser of the command line.
+
+    Only the commands in `names` know their arguments, because only these are imported: the
+    compiled physics takes a while to load.
+    """
     parser = argparse.ArgumentParser(
         prog='antenna-drive', description=__doc__, epilog=EXIT_CODES,
         formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--version', action='version', version=f'antenna-drive {__version__}')
     subparsers = parser.add_subparsers(metavar='COMMAND', required=True)
-    module: ModuleType | None = None
     for command_name, command in COMMANDS.items():
-        if command_name != name:
+        if command_name not in names:
             subparsers.add_parser(command_name, help=command.summary)
             continue
-        # Only the command asked for is imported: the compiled physics takes a while to load.
         module = importlib.import_module(f'{__name__}.{command.module}')
         module.add_arguments(subparsers.add_parser(
             command_name, help=command.summary, description=module.__doc__,
             formatter_class=argparse.RawDescriptionHelpFormatter))
-    parsed = parser.parse_args(arguments)
-    assert module is not None  # parse_args has left by now unless there was a command
-    return int(module.run(parsed))
+    return parser

@@ -20,6 +20,7 @@ Groups:
               and against the same loop in C
   batch       many variants on all cores, in an executor of the caller
   diagnosis   wall time and memory of a diagnosis
+  fleet       diagnoses of several machines by one worker of a cluster, and by two
   start       import, first step, demo
 
 Peers that are not installed are left out, and the result names them; pip install
@@ -41,7 +42,7 @@ import sys
 from antenna_drive.cli.output import add_json_option, check_options, give
 from antenna_drive.parameters.schema import Entry
 
-GROUPS = ('start', 'simulation', 'batch', 'diagnosis', 'transport')
+GROUPS = ('start', 'simulation', 'batch', 'diagnosis', 'fleet', 'transport')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

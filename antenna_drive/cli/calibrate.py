@@ -33,8 +33,10 @@ from antenna_drive.calibration.configuration import configuration
 from antenna_drive.calibration.problem import read_problem
 from antenna_drive.calibration.report import report
 from antenna_drive.calibration.search import read_log, search
-from antenna_drive.cli.output import add_json_option, give, Progress, replaced
+from antenna_drive.cli.output import add_json_option, check_options, give, Progress, replaced
+from antenna_drive.cli.sharing import add_worker_options
 from antenna_drive.parameters.files import config_dir
+from antenna_drive.parameters.schema import Entry
 from antenna_drive.programs import NEGATIVE, OK
 
 COUNT = 2000
@@ -59,16 +61,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              'FIGURE')
     parser.add_argument('--also', metavar='LOG', nargs='+', type=Path, default=[],
                         help='logs of earlier searches, used for the trade-offs')
+    add_worker_options(parser, 1)
     add_json_option(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Do what the arguments say; return the exit code."""
+    check_options(arguments, jobs=Entry('', 1, whole=True))
     also = [candidate for path in arguments.also for candidate in read_log(path)]
     problem = read_problem(_find(arguments.targets), [arguments.start])
     with Progress('candidates', max(1, arguments.count)) as shown:
         found = search(problem, arguments.count, seed=arguments.seed, log=arguments.log,
-                       progress=lambda done, best: shown.update(done))
+                       progress=lambda done, best: shown.update(done),
+                       jobs=arguments.jobs, scheduler=arguments.scheduler)
     with replaced(arguments.out) as stream:
         stream.write(configuration(problem, found.best.shares, arguments.start).encode())
     with Progress('uncertainties', 1.0) as shown:

@@ -34,6 +34,7 @@ import argparse
 from pathlib import Path
 
 from antenna_drive.cli.output import add_json_option, check_options, give, Progress
+from antenna_drive.cli.sharing import add_worker_options
 from antenna_drive.errors import UserError
 from antenna_drive.machines.servo.bam import read_bam
 from antenna_drive.parameters.schema import Entry
@@ -49,8 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--runs', type=int, default=2400, metavar='N',
                         help='simulations of the fitted logs per fit (default: 2400); fewer are '
                              'faster but worse for every model')
-    parser.add_argument('--jobs', type=int, default=1, metavar='N',
-                        help='parallel processes (default: 1)')
+    add_worker_options(parser, 1)
     parser.add_argument('--keep', metavar='FOLDER',
                         help='write the result of each split to FOLDER; an interrupted run '
                              'resumes from there')
@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
     with Progress('servo', 1.0) as progress:
         result = study(tests, chosen, effort, arguments.without, arguments.jobs,
                        Path(arguments.keep) if arguments.keep else None,
-                       lambda share, doing: progress.update(share))
+                       lambda share, doing: progress.update(share), arguments.scheduler)
     give(result, arguments.json, text(result))
     return 0 if all(part['lower_than_best_of_ladder']
                     for part in result['summary'].values()) else 1

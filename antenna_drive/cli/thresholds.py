@@ -31,21 +31,23 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
 import json
 import math
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.cli.output import add_json_option, give, Progress
+from antenna_drive.cli.output import add_json_option, check_options, give, Progress
+from antenna_drive.cli.sharing import add_worker_options
 from antenna_drive.diagnosis.evidence import Evidence
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
 from antenna_drive.diagnosis.verdict import which
 from antenna_drive.errors import UserError
+from antenna_drive.parameters.schema import Entry
 from antenna_drive.trial import sealing
 from antenna_drive.trial.batch import diagnose_case, VERDICT
 from antenna_drive.trial.scorecard import Case, score
 from antenna_drive.trial.verdict import parse_verdict, read_verdict
+from antenna_drive.workers import workers
 
 # Groups whose thresholds act on kept fits; the fits depend on the others.
 DECIDED = ('penalty', 'verdict')
@@ -62,13 +64,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='thresholds of the search to run diagnoses again with')
     parser.add_argument('--cases', type=int, default=10, metavar='N',
                         help='how many cases --again takes (default: %(default)s)')
-    parser.add_argument('--jobs', type=int, default=2, metavar='N',
-                        help='diagnoses at once for --again (default: %(default)s)')
+    add_worker_options(parser, 2)
     add_json_option(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the table, or what changed thresholds do."""
+    check_options(arguments, jobs=Entry('', 1, whole=True))
     table = [{'name': name, 'value': value, **item.metadata}
              for name, item, value in DEFAULT.entries()]
     if arguments.trial is None:
@@ -147,12 +149,12 @@ def _run_again(arguments: argparse.Namespace) -> dict[str, Mapping[str, float]]:
                             'them')
         for label, _ in _halved_and_doubled(name, *known[name]):
             wanted[label] = ['--threshold', f'{name}={label.rpartition(" ")[2]}']
-    jobs = [(_linked(folder, label, case), options)
+    jobs = [(_linked(folder, label, case).absolute(), options)
             for label, options in wanted.items() for case in names]
-    with Progress('diagnoses', len(jobs)) as progress, ThreadPoolExecutor(arguments.jobs) as pool:
-        runs = pool.map(lambda job: (job[0] / VERDICT).exists() or diagnose_case(
-            job[0], ['--jobs', '1', *job[1]], math.inf), jobs)
-        for done, _ in enumerate(runs, start=1):
+    with (Progress('diagnoses', len(jobs)) as progress,
+          workers(arguments.jobs, arguments.scheduler, threads=True) as pool):
+        for done, (_, result) in enumerate(pool.each(_diagnose_again, jobs), start=1):
+            result()
             progress.update(done)
     found: dict[str, Mapping[str, float]] = {}
     for label in wanted:
@@ -164,6 +166,10 @@ def _run_again(arguments: argparse.Namespace) -> dict[str, Mapping[str, float]]:
         figures = score(cases, 0)
         found[label] = {key: float(figures[key]) for key in FIGURES}
     return found
+
+
+def _diagnose_again(case: Path, options: list[str]) -> bool:
+    return (case / VERDICT).exists() or diagnose_case(case, ['--jobs', '1', *options], math.inf)
 
 
 def _linked(folder: Path, label: str, case: str) -> Path:

@@ -34,6 +34,9 @@ lists, and other programmes, lengths, rates and sheets. A fourth recording is ke
 diagnosis, in DIR/kept/case_0001/rec_d.csv. docs/trial.md has the sizes. --family b draws other
 forms, outsiders and programmes, to report on only.
 
+With --scheduler, the workers of a cluster make and diagnose the cases. DIR must lie on a disk
+that they all have under the same path.
+
 For example:
   antenna-drive trial --cases 200 --seed 7 --out trial7 --diagnose && antenna-drive score trial7
   antenna-drive trial --wild --cases 20 --seed 7 --out wild7 --diagnose
@@ -47,6 +50,7 @@ from pathlib import Path
 import shlex
 
 from antenna_drive.cli.output import check_options, Progress
+from antenna_drive.cli.sharing import add_worker_options
 from antenna_drive.errors import UserError
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.trial import batch, sealing
@@ -77,8 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--family', choices=sorted(FAMILIES), default='a',
                         help='forms of effects, outsiders and programmes; nothing may be tuned '
                              'on b, which needs --wild (default %(default)s)')
-    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
-                        help='parallel processes (default: one per core, %(default)s here)')
+    add_worker_options(parser, os.cpu_count() or 1)
     parser.add_argument('--diagnose', action='store_true',
                         help='diagnose each case as well')
     parser.add_argument('--diagnose-options', default='', metavar='TEXT',
@@ -100,17 +103,19 @@ def run(arguments: argparse.Namespace) -> int:
           f'{sealing.manifest_seal(manifest)}', flush=True)
     with Progress('recordings', arguments.cases, quiet=arguments.quiet) as progress:
         batch.make_cases(folder, manifest, arguments.jobs,
-                         lambda done, total: progress.update(done))
+                         lambda done, total: progress.update(done), arguments.scheduler)
     print(f'{folder}: {arguments.cases} cases complete', flush=True)
     if not arguments.diagnose:
         return 0
     with Progress('diagnoses', arguments.cases, quiet=arguments.quiet) as progress:
         failures = batch.diagnose_cases(
             folder, manifest, arguments.jobs,
-            # each diagnosis gets its share of the cores
-            ['--jobs', str(max(1, (os.cpu_count() or 1) // arguments.jobs)),
+            # each diagnosis gets its share of the cores; a worker of a cluster has one
+            ['--jobs', str(1 if arguments.scheduler else
+                           max(1, (os.cpu_count() or 1) // arguments.jobs)),
              *shlex.split(arguments.diagnose_options)],
-            arguments.time_limit, lambda done, total: progress.update(done))
+            arguments.time_limit, lambda done, total: progress.update(done),
+            arguments.scheduler)
     if failures:
         print(f'{folder}: {failures} diagnoses failed, see {batch.FAILURE} in their folders; '
               'run the same command to try them again')

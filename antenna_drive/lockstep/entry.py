@@ -28,16 +28,13 @@ from types import FrameType
 from typing import Any, TYPE_CHECKING
 
 from antenna_drive.errors import UserError
-from antenna_drive.programs import end_with_parent, OK, run_program
+from antenna_drive.programs import end_with_parent, OK, PARENT, run_program
 
 if TYPE_CHECKING:
     from antenna_drive.emulator.unit import Unit
     from antenna_drive.emulator.wiring import Wiring
     from antenna_drive.parameters.schema import Value
     from rclpy.node import Node
-
-# The number of the process that a node must not outlive; set by a program that starts nodes.
-PARENT = 'ANTENNA_DRIVE_PARENT'
 
 # Makes the unit of a node: its name, the wiring, configuration files, what else was given by name.
 MakeUnit = Callable[[str, 'Wiring', Sequence[str], Mapping[str, Any]], 'Unit']

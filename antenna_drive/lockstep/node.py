@@ -31,7 +31,9 @@ from antenna_drive.lockstep.pace import LEAD_S, Pace
 from antenna_drive.lockstep.partner import ANSWER, HOLD, ON_MISS, PartnerUnit
 from antenna_drive.lockstep.partner_link import Answer, PartnerLink
 from antenna_drive.lockstep.rcl_channel import RclChannel, Unusable
-from antenna_drive.lockstep.readings import ChangeRecord, READING_QOS, Readings
+from antenna_drive.lockstep.readings import (
+    ChangeRecord, READING_OVERRIDES, READING_QOS, Readings,
+)
 from antenna_drive.lockstep.realtime import lock_memory, schedule_first_in_first_out
 from antenna_drive.lockstep.report import Report
 from antenna_drive.lockstep.ros_link import FrameLink
@@ -217,7 +219,8 @@ class DriveNode:
                 self._report.refused_values += 1
 
         self._node.create_subscription(
-            Float64, f'{self._node.get_name()}/{setting}', follow, READING_QOS)
+            Float64, f'{self._node.get_name()}/{setting}', follow, READING_QOS,
+            qos_overriding_options=READING_OVERRIDES)
 
     def _change(self, changes: dict[str, Value]) -> str:
         # in the thread of the parameter services

@@ -28,8 +28,9 @@ from typing import IO
 
 from antenna_drive.emulator.wiring import find, TEST_SIGNAL
 from antenna_drive.errors import UserError
-from antenna_drive.lockstep.entry import choose_transport, PARENT
+from antenna_drive.lockstep.entry import choose_transport
 from antenna_drive.lockstep.placement import hasten, machine_is_idle
+from antenna_drive.programs import PARENT
 
 # Nodes end within two seconds of a signal; after this something is wrong with them.
 END_PATIENCE_S = 5.0

@@ -26,10 +26,13 @@ from antenna_drive.lockstep.frame import READING_PREFIX
 from antenna_drive.parameters.schema import Value
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64, String
 
 READING_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+# Whoever reads may need another reliability or depth, over a radio link for example.
+READING_OVERRIDES = QoSOverridingOptions.with_default_policies()
 
 # A late subscriber still gets the changes of the run in progress.
 CHANGES_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE,
@@ -63,12 +66,16 @@ class Readings:
         name = node.get_name()
         self.rate_hz = rate_hz
         self._rows = [(row, 1.0, node.create_publisher(
-            Float64, f'{name}/{signal.name}', READING_QOS)) for row, signal in enumerate(signals)]
+            Float64, f'{name}/{signal.name}', READING_QOS,
+            qos_overriding_options=READING_OVERRIDES)) for row, signal in enumerate(signals)]
         names = [signal.name for signal in signals]
         if amperes is not None and 'current' in names:
             self._rows.append((names.index('current'), amperes, node.create_publisher(
-                Float64, f'{name}/armature_current', READING_QOS)))
-        self._clock = node.create_publisher(Clock, 'clock', READING_QOS) if with_clock else None
+                Float64, f'{name}/armature_current', READING_QOS,
+                qos_overriding_options=READING_OVERRIDES)))
+        self._clock = node.create_publisher(
+            Clock, 'clock', READING_QOS,
+            qos_overriding_options=READING_OVERRIDES) if with_clock else None
 
     def routes(self) -> list[tuple[int, float, Any]]:
         """Return row, scale and publisher handle of each reading; TIME is the clock's row."""

@@ -38,6 +38,9 @@ from rclpy.parameter import Parameter
 # What rclpy declares by itself.
 _RCLPY_OWN = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
 
+# Topics whose QoS is a part of the lock-step's protocol.
+_FIXED_QOS = ('/frame', '/changes')
+
 # How long a service call waits for the lock-step thread; a step takes a thousandth of this.
 PATIENCE_S = 5.0
 
@@ -116,9 +119,20 @@ class Overrides:
     """
 
     def __init__(self, node: Node) -> None:
-        """Read the overrides of a node made with automatically_declare_parameters_from_..."""
+        """
+        Read the overrides of a node made with automatically_declare_parameters_from_...
+
+        Raises
+        ------
+        ParameterError : the QoS of a topic of the lock-step is to be changed
+
+        """
         self._values: dict[str, Any] = {}
         for name, parameter in node.get_parameters_by_prefix('').items():
+            if name.startswith('qos_overrides.') and '.'.join(name.split('.')[1:-2]).endswith(
+                    _FIXED_QOS):
+                raise ParameterError(f'{name}: the lock-step needs the QoS of this topic as it '
+                                     'is; those of signals, clock and external can be changed')
             if not name.startswith(_RCLPY_OWN):
                 self._values[name] = _plain(parameter.value)
                 node.undeclare_parameter(name)

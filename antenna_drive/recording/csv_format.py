@@ -25,7 +25,7 @@ docs/recording.md describes the columns.
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 import csv
 from dataclasses import replace
@@ -42,9 +42,10 @@ from antenna_drive.parameters.schema import nearest
 from antenna_drive.recording.atomic import new_file, refuse_existing
 from antenna_drive.recording.plain import from_json, PlainDataError, to_json
 from antenna_drive.recording.recording import (
-    Change, Channel, check_name, make_channel, NANOSECONDS, Recording, RecordingError,
+    Change, Channel, check_name, IntArray, make_channel, NANOSECONDS, Recording, RecordingError,
     RecordingWarning, unit_of,
 )
+from antenna_drive.recording.row_order import Column, sorted_rows
 from antenna_drive.recording.sheet import dump_sheet, load_sheet, TestSheet
 import numpy as np
 
@@ -206,7 +207,8 @@ def read_csv(path: str | Path) -> Recording:
 
     Warns
     -----
-    RecordingWarning : the last line is not ended
+    RecordingWarning : the last line is not ended, rows were not in the order of time, or rows
+        were repeated
 
     """
     path = Path(path)
@@ -217,15 +219,14 @@ def read_csv(path: str | Path) -> Recording:
         columns = [(array('q'), array('d')) for _ in names]
         room = SAMPLES.value()
         time_column = names.index(TIME)
-        previous, count = -2**63, 0
+        previous, count, in_order = -2**63, 0, True
         for line, row in table:
             if len(row) != len(names):
                 raise RecordingError(f'{path}: line {line}: {len(row)} cells, but the header has '
                                      f'{len(names)}')
             cell = Cell(path, line, TIME)
             stamp = parse_nanoseconds(row[time_column].strip(), cell)
-            if stamp <= previous:
-                raise cell.refuse('the time is not later than in the row before')
+            in_order &= stamp > previous
             previous, count = stamp, count + 1
             room -= len(row) - 1 - row.count('')
             if room < 0:
@@ -236,14 +237,30 @@ def read_csv(path: str | Path) -> Recording:
                     stamps, values = columns[i]
                     stamps.append(stamp)
                     values.append(parse_number(text, Cell(path, line, header[i])))
+    ordered: Iterable[Column] = ((np.array(stamps, np.int64), np.array(values))
+                                 for stamps, values in columns)
+    if not in_order:
+        ordered = sorted_rows(path, TIME, *_times_and_lines(path, time_column), ordered)
     channels = {}
-    for i, (name, (stamps, values)) in enumerate(zip(names, columns, strict=True)):
+    for i, (name, (stamps_ns, numbers)) in enumerate(zip(names, ordered, strict=True)):
         if i != time_column:
             unit = unit_of(name) if header[i].strip() in FIELD_COLUMNS else _unit(header[i])
-            channels[name] = make_channel(name, unit, np.array(stamps), np.array(values))
+            channels[name] = make_channel(name, unit, stamps_ns, numbers)
     sheet_path = path.with_suffix('.yaml')
     sheet = load_sheet(sheet_path) if sheet_path.is_file() else TestSheet()
     return replace(_with_meta(path, Recording(channels), count), sheet=sheet)
+
+
+def _times_and_lines(path: Path, time_column: int) -> tuple[IntArray, IntArray]:
+    """Return time stamp and line of each row of a file that has been read; few ever need them."""
+    with open_text(path) as stream, warnings.catch_warnings():
+        warnings.simplefilter('ignore', RecordingWarning)
+        table = rows(path, stream)
+        next(table)
+        found = [(parse_nanoseconds(row[time_column].strip(), Cell(path, line, TIME)), line)
+                 for line, row in table]
+    stamps, lines = np.array(found, np.int64).T
+    return stamps, lines
 
 
 def _header(path: Path, line: int, header: list[str]) -> list[str]:

@@ -22,24 +22,22 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import as_completed, Future, ProcessPoolExecutor, ThreadPoolExecutor
 import json
 import math
-import multiprocessing
 import os
 from pathlib import Path
 import shutil
-import subprocess
-import sys
 from typing import Any
 
 from antenna_drive.errors import UserError
+from antenna_drive.subcommand import run_command
 from antenna_drive.trial import sealing
 from antenna_drive.trial.cases import draw_truths, make_recording, Truth
 from antenna_drive.trial.programme import RECORDINGS
 from antenna_drive.trial.real_antenna import FloatArray
 from antenna_drive.trial.sensors import COLUMNS
 from antenna_drive.trial.wild_programme import KEPT_BACK
+from antenna_drive.workers import workers
 import yaml
 
 VERDICT = 'verdict.json'
@@ -142,7 +140,7 @@ def _make_folder(final: Path, truth: Truth, names: Mapping[int, str]) -> None:
 
 
 def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
-               done: Done = lambda part, total: None) -> None:
+               done: Done = lambda part, total: None, scheduler: str | None = None) -> None:
     """
     Make all cases that do not exist yet.
 
@@ -156,6 +154,9 @@ def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
         number of processes
     done
         called with the number of complete cases and their total
+    scheduler
+        address of a dask.distributed scheduler whose workers make them; they see the folder
+        under the same path
 
     """
     _remove_drafts(folder)
@@ -164,39 +165,47 @@ def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
     truths = [sealing.open_truth(folder, name, manifest) for name in wanted]
     complete = len(names) - len(wanted)
     done(complete, len(names))
-    for _ in _made(folder, truths, jobs):
+    for _ in _made(folder, truths, jobs, scheduler):
         complete += 1
         done(complete, len(names))
+    _remove_drafts(folder)
 
 
-def _made(folder: Path, truths: Sequence[Truth], jobs: int) -> Iterator[None]:
-    """Make the cases of these truths, in `jobs` processes; yield after each."""
-    # The first case compiles the equations for the processes that follow.
-    alone = 1 if jobs > 1 else len(truths)
-    for truth in truths[:alone]:
+def _made(folder: Path, truths: Sequence[Truth], jobs: int,
+          scheduler: str | None) -> Iterator[None]:
+    """Make the cases of these truths; yield after each."""
+    if scheduler is None:
+        # The first case compiles the equations for the processes that follow.
+        alone = 1 if jobs > 1 else len(truths)
+        for truth in truths[:alone]:
+            make_case(folder, truth)
+            yield
+        truths = truths[alone:]
+    if truths:
+        with workers(jobs, scheduler) as pool:
+            for _, result in pool.each(_make_seen_case,
+                                       ((folder.absolute(), truth) for truth in truths)):
+                result()
+                yield
+
+
+def _make_seen_case(folder: Path, truth: Truth) -> None:
+    """Make a case, unless a worker that was killed had just completed it."""
+    _check_seen(folder)
+    if not (folder / truth['case']).exists():
         make_case(folder, truth)
-        yield
-    if truths[alone:]:
-        context = multiprocessing.get_context('spawn')
-        with ProcessPoolExecutor(jobs, mp_context=context) as pool:
-            yield from _finished([pool.submit(make_case, folder, truth)
-                                  for truth in truths[alone:]])
+
+
+def _check_seen(folder: Path) -> None:
+    if not (folder / sealing.MANIFEST).exists():
+        raise UserError(f'{folder}: a worker does not see this folder; --out must lie on a disk '
+                        'that all workers have under the same path')
 
 
 def _remove_drafts(folder: Path) -> None:
-    """Remove incomplete cases of an interrupted run."""
+    """Remove incomplete cases of an interrupted run or of a worker that was killed."""
     for draft in (*folder.glob('.case_*'), *(folder / KEPT).glob('.case_*')):
         shutil.rmtree(draft, ignore_errors=True)
-
-
-def _finished(futures: Sequence[Future[Any]]) -> Iterator[Any]:
-    """Yield results as they complete; cancel the rest after an error."""
-    try:
-        for future in as_completed(futures):
-            yield future.result()
-    finally:
-        for future in futures:
-            future.cancel()
 
 
 def diagnose_case(case: Path, options: Sequence[str], limit: float,
@@ -222,8 +231,8 @@ def diagnose_case(case: Path, options: Sequence[str], limit: float,
     """
     draft = case / f'.{VERDICT}'
     correction = [] if kept is None else ['--corrected', str(case / CORRECTED)]
-    failure = _run(['diagnose', *(str(case / f'{name}.csv') for name in RECORDINGS),
-                    '--json', str(draft), *correction, *options], limit, 'verdict')
+    failure = run_command(['diagnose', *(str(case / f'{name}.csv') for name in RECORDINGS),
+                           '--json', str(draft), *correction, *options], limit)
     (case / FAILURE).unlink(missing_ok=True)
     if draft.exists():
         try:
@@ -268,8 +277,8 @@ def predict_kept(case: Path, options: Sequence[str], kept: Path) -> bool:
         out = case / PREDICTIONS[key]
         for old in (out, out.with_suffix('.meta.json')):
             old.unlink(missing_ok=True)
-        failure = _run(['predict', str(kept), *words, '--out', str(out)], PREDICTION_LIMIT_S,
-                       'prediction')
+        failure = run_command(['predict', str(kept), *words, '--out', str(out)],
+                              PREDICTION_LIMIT_S)
         if not out.exists():
             sealing.write_whole(case / PREDICTION_FAILURE, f'{key}: {failure[-20000:]}\n')
             return False
@@ -277,17 +286,6 @@ def predict_kept(case: Path, options: Sequence[str], kept: Path) -> bool:
     sealing.write_whole(case / VERDICT, json.dumps(
         {**verdict, 'held_back': PREDICTIONS}, indent=2, ensure_ascii=False) + '\n')
     return True
-
-
-def _run(words: Sequence[str], limit: float, wanted: str) -> str:
-    """Run a command of this installation; return what it said, should its result be missing."""
-    try:
-        result = subprocess.run(
-            [sys.executable, '-m', 'antenna_drive', *words], stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, timeout=limit, check=False)
-    except subprocess.TimeoutExpired:
-        return f'no {wanted} after {limit:g} s'
-    return f'exit code {result.returncode}\n' + result.stderr.decode(errors='replace')
 
 
 def _unpredicted(case: Path) -> bool:
@@ -300,7 +298,8 @@ def _unpredicted(case: Path) -> bool:
 
 def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
                    options: Sequence[str] = (), limit: float = math.inf,
-                   done: Done = lambda part, total: None) -> int:
+                   done: Done = lambda part, total: None,
+                   scheduler: str | None = None) -> int:
     """
     Diagnose all cases that have no verdict yet, including those that failed before.
 
@@ -320,6 +319,9 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
         time limit of one diagnosis, after which it counts as failed [s]
     done
         called with the number of finished cases and their total
+    scheduler
+        address of a dask.distributed scheduler whose workers diagnose them; they see the folder
+        under the same path
 
     Returns
     -------
@@ -328,20 +330,30 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
     """
     names = list(manifest['seals'])
     wanted = [name for name in names if not (folder / name / VERDICT).exists()]
+    here = folder if scheduler is None else folder.absolute()
     kept = {name: path if path.exists() else None for name in names
-            for path in [folder / KEPT / name / f'{KEPT_BACK}.csv']}
+            for path in [here / KEPT / name / f'{KEPT_BACK}.csv']}
     complete, failures = len(names) - len(wanted), 0
     done(complete, len(names))
-    with ThreadPoolExecutor(jobs) as pool:
-        late = [pool.submit(predict_kept, folder / name, options, path)
-                for name, path in kept.items()
-                if path is not None and _unpredicted(folder / name)]
-        futures = [pool.submit(diagnose_case, folder / name, options, limit, kept[name])
-                   for name in wanted]
-        for success in _finished(futures):
-            complete += 1
-            failures += not success
-            done(complete, len(names))
-        for prediction in late:
-            prediction.result()
+    late = [(here, here / name, options, limit, path) for name, path in kept.items()
+            if path is not None and _unpredicted(folder / name)]
+    tasks = [*late, *((here, here / name, options, limit, kept[name]) for name in wanted)]
+    with workers(jobs, scheduler, threads=True) as pool:
+        for number, result in pool.each(_complete, tasks):
+            success = result()
+            if number >= len(late):
+                complete += 1
+                failures += not success
+                done(complete, len(names))
     return failures
+
+
+def _complete(folder: Path, case: Path, options: Sequence[str], limit: float,
+              kept: Path | None) -> bool:
+    """Do what a case still lacks: its diagnosis, the predictions of what was kept back."""
+    _check_seen(folder)
+    if not (case / VERDICT).exists():
+        return diagnose_case(case, options, limit, kept)
+    if kept is not None and _unpredicted(case):
+        predict_kept(case, options, kept)
+    return True

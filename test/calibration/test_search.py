@@ -74,6 +74,20 @@ def places(candidates: Sequence[FitCandidate]) -> list[tuple[float, ...]]:
     return [candidate.shares for candidate in candidates]
 
 
+def test_processes_try_the_same_candidates_in_the_same_order(tmp_path: Path) -> None:
+    """Some are given up early, and those beside them must not change that."""
+    alone = search(Linear(), 80, log=tmp_path / 'alone.log')  # type: ignore[arg-type]
+    shared = search(Linear(), 80, log=tmp_path / 'shared.log', jobs=3)  # type: ignore[arg-type]
+    assert shared == alone
+    assert (tmp_path / 'shared.log').read_text() == (tmp_path / 'alone.log').read_text()
+    # a log that was cut is continued by processes, too
+    lines = (tmp_path / 'alone.log').read_text().splitlines(keepends=True)
+    (tmp_path / 'cut.log').write_text(''.join(lines[:30]))
+    assert search(Linear(), 80, log=tmp_path / 'cut.log',  # type: ignore[arg-type]
+                  jobs=2) == alone
+    assert (tmp_path / 'cut.log').read_text() == ''.join(lines)
+
+
 def test_the_search_finds_what_the_targets_tell() -> None:
     found = search(Linear(), 800)  # type: ignore[arg-type]
     assert np.array(found.best.shares[:2]) == pytest.approx(BEST[:2], abs=5e-3)

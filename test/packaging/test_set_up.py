@@ -76,6 +76,14 @@ def test_wheels(machine: Path) -> None:
     assert 'ROS 2' not in said
 
 
+def test_more_extras(machine: Path) -> None:
+    """Whoever sets up may ask for more; one call of pip installs all."""
+    become(machine, 'Linux x86_64')
+    did = set_up(machine, **NO_ROS, EXTRAS='colcon,cluster')[2]
+    assert did.count('-m pip install') == 1
+    assert '.[ros,plot,recording,test,colcon,cluster]' in did
+
+
 def test_sourced_ros(machine: Path) -> None:
     """A sourced ROS 2 is used, and none is installed beside it."""
     code, said, did = set_up(machine, **ROS)

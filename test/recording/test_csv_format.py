@@ -19,6 +19,8 @@ import dataclasses
 from decimal import Decimal
 from pathlib import Path
 import struct
+import tempfile
+import warnings
 
 from antenna_drive.recording.csv_format import (
     Cell, FIELD_COLUMNS, format_nanoseconds, meta_path, parse_nanoseconds, read_csv, write_csv,
@@ -86,8 +88,9 @@ def test_the_test_sheet_beside_a_csv_is_read(tmp_path: Path) -> None:
     (['time_s,rate_command_rad_s', '0,1e999'], 'too large'),
     (['time_s,rate_command_rad_s', '1e10,1'], 'line 2, column time_s:.*beyond'),
     (['time_s,rate_command_rad_s', ',1'], "line 2, column time_s: '' is no number"),
-    (['time_s,rate_command_rad_s', '0.1,1', '0.1,2'], 'line 3, column time_s:.*not later'),
-    (['time_s,rate_command_rad_s', '0.1,1', '0.0,2'], 'line 3, column time_s:.*not later'),
+    (['time_s,rate_command_rad_s', '0.1,1', '0.1,2'],
+     'line 3, column time_s: the time is that of line 2, but the row is another one'),
+    (['time_s,rate_command_rad_s', '0.1,1', '0.1,'], 'line 3, column time_s:.*line 2'),
     (['time_s,rate_command_rad_s', '0,"1'], 'line 2: no CSV'),
     (['time_s,bad-name [A]', '0,1'], 'line 1, column 2:.*no name of a signal'),
     ([''], 'line 1: there is no column time_s'),
@@ -99,6 +102,34 @@ def test_what_cannot_be_read_is_refused_with_its_place(lines: list[str], words: 
         read_csv(path)
     assert str(refusal.value).startswith(f'{path}: line ')
     assert '\n' not in str(refusal.value)
+
+
+def test_repeated_rows_count_once_and_are_told(tmp_path: Path) -> None:
+    path = write(tmp_path / 'a.csv', 'time_s,rate_command_rad_s,current_1_A', '0,1,2', '0.1,3,',
+                 '0.10,3.0,', '0.2,5,6', '0.1,3,')
+    with pytest.warns(RecordingWarning) as told:
+        recording = read_csv(path)
+    assert [str(warning.message) for warning in told] == [
+        f'{path}: line 6: the time is earlier than in the row before; the rows were sorted by '
+        'time', f'{path}: line 4: the row repeats an earlier one; 2 such rows were left out']
+    command, current = recording['test_signal/rate_command'], recording['motor_1/ammeter']
+    assert command.time_ns.tolist() == [0, 100_000_000, 200_000_000]
+    assert command.values.tolist() == [1.0, 3.0, 5.0]
+    assert (current.time_ns.tolist(), current.values.tolist()) == ([0, 200_000_000], [2.0, 6.0])
+
+
+@given(st.permutations(range(12)), st.lists(st.integers(0, 11), max_size=6))
+def test_rows_in_any_order_are_the_same_recording(order: list[int], again: list[int]) -> None:
+    rows = [f'{0.25 * k},{k},{k * k if k % 3 else ""}' for k in range(12)]
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter('ignore', RecordingWarning)
+        header = 'time_s,rate_command_rad_s,encoder_rad'
+        sorted_one = read_csv(write(Path(folder, 'a.csv'), header, *rows))
+        other = read_csv(write(Path(folder, 'b.csv'), header,
+                               *(rows[k] for k in [*order, *again])))
+    for name in sorted_one.names:
+        assert other[name].time_ns.tolist() == sorted_one[name].time_ns.tolist()
+        assert other[name].values.tolist() == sorted_one[name].values.tolist()
 
 
 def test_files_that_are_no_text_are_refused(tmp_path: Path) -> None:

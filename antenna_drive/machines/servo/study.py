@@ -24,7 +24,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass
 import hashlib
 from itertools import combinations
@@ -40,7 +39,7 @@ from antenna_drive.machines.servo.catalogue import catalogue, vector
 from antenna_drive.machines.servo.log import ServoLog
 from antenna_drive.machines.servo.refit import Fit, LADDER, PARENTS
 from antenna_drive.machines.servo.rounds import Effort, lacking, plain
-from antenna_drive.workers import worker_processes
+from antenna_drive.workers import workers
 import numpy as np
 
 Progress = Callable[[float, str], None]
@@ -139,7 +138,8 @@ def _model(fit: Fit, fitted: Sequence[ServoLog], withheld: Sequence[ServoLog],
 
 def study(tests: Sequence[ServoLog], chosen: Sequence[Direction], effort: Effort,
           without: Sequence[str] = (), jobs: int = 1, keep: Path | None = None,
-          progress: Progress = lambda share, doing: None) -> dict[str, Any]:
+          progress: Progress = lambda share, doing: None,
+          scheduler: str | None = None) -> dict[str, Any]:
     """
     Compare in several directions and summarise; return plain data.
 
@@ -159,10 +159,12 @@ def study(tests: Sequence[ServoLog], chosen: Sequence[Direction], effort: Effort
         folder for the result of each direction; results found there are used again
     progress
         called with the share that is done, 0 to 1, and a description
+    scheduler
+        address of a dask.distributed scheduler whose workers compare instead of `jobs` processes
 
     Raises
     ------
-    UserError : there is no effect of a name in `without`
+    UserError : there is no effect of a name in `without`, or the scheduler has no workers
 
     """
     for name in without:
@@ -172,29 +174,20 @@ def study(tests: Sequence[ServoLog], chosen: Sequence[Direction], effort: Effort
     began = time.monotonic()
     results: dict[int, dict[str, Any]] = {}
     kept = _KeptResults(keep, tests, effort, without)
-    with worker_processes(jobs) as pool:
-        running = {}
-        for i, direction in enumerate(chosen):
-            known = kept.find(direction)
-            if known is None:
-                running[pool.submit(compared, tests, direction, effort, without)] = i
-            else:
-                results[i] = known
-        waiting = set(running)
-        try:
-            while waiting:
+    for i, direction in enumerate(chosen):
+        known = kept.find(direction)
+        if known is not None:
+            results[i] = known
+    wanted = [i for i in range(len(chosen)) if i not in results]
+    progress(len(results) / len(chosen), 'directions')
+    if wanted:
+        with workers(jobs, scheduler) as pool:
+            for number, result in pool.each(compared, (
+                    (tests, chosen[i], effort, without) for i in wanted)):
+                i = wanted[number]
+                results[i] = result()
+                kept.put(chosen[i], results[i])
                 progress(len(results) / len(chosen), 'directions')
-                done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-                for future in done:
-                    i = running[future]
-                    results[i] = future.result()
-                    kept.put(chosen[i], results[i])
-        finally:
-            # an interrupt may come between the end of a direction and its being kept
-            for future, i in running.items():
-                if i not in results and future.done() and not future.cancelled() \
-                        and future.exception() is None:
-                    kept.put(chosen[i], future.result())
     progress(1.0, 'directions')
     ordered = [results[i] for i in range(len(chosen))]
     return {'recordings': [test.name for test in tests],

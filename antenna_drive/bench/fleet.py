@@ -1,0 +1,79 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The diagnosis of several machines by one worker of a cluster, and by two."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+import tempfile
+import time
+from typing import Any
+
+from antenna_drive.bench import measuring
+from antenna_drive.errors import UserError
+from antenna_drive.fleet import diagnose_fleet, FleetMachine, machines_of, Options
+from antenna_drive.workers import workers
+
+_SEED = 20262
+# Divisible by both numbers of workers: none is idle while another does the last machine.
+MACHINES, QUICK_MACHINES = 4, 2
+
+
+def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> dict[str, Any]:
+    """
+    Measure how much faster two workers diagnose a fleet than one.
+
+    Returns
+    -------
+    wall times [s] and two_worker_speedup; the number of machines
+
+    Raises
+    ------
+    UserError : a machine cannot be diagnosed
+    ModuleNotFoundError : dask.distributed is not installed
+
+    """
+    from distributed import LocalCluster
+
+    count = QUICK_MACHINES if quick else MACHINES
+    times: dict[int, list[float]] = {1: [], 2: []}
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        progress('recordings')
+        measuring.process('antenna_drive', 'trial', '--cases', str(count), '--seed', str(_SEED),
+                          '--out', str(folder / 'trial'), '--quiet')
+        machines = machines_of(folder / 'trial')
+        for turn in range(1 if quick else repetitions):
+            for number in (1, 2):
+                progress(f'turn {turn + 1}, {number} of 2 workers')
+                with LocalCluster(n_workers=number, threads_per_worker=1,
+                                  dashboard_address=None) as cluster:
+                    times[number].append(_wall_time(
+                        machines, folder / f'{turn}-{number}', cluster.scheduler_address))
+    return {'machines': count,
+            'one_worker_s': measuring.figure(times[1], 's'),
+            'two_workers_s': measuring.figure(times[2], 's'),
+            'two_worker_speedup': measuring.ratio(times[1], times[2])}
+
+
+def _wall_time(machines: list[FleetMachine], out: Path, address: str) -> float:
+    with workers(1, address) as pool:
+        began = time.perf_counter()
+        rows = diagnose_fleet(machines, out, Options(), pool)
+        took = time.perf_counter() - began
+    for row in rows:
+        if row['failure'] is not None:
+            raise UserError(f'{row["machine"]}: {row["failure"]}')
+    return took

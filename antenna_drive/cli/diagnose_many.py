@@ -1,0 +1,100 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+r"""
+Diagnose many machines: one row a machine, a table, and a page of the fleet.
+
+Each subfolder of FOLDER with recordings is a machine. Recordings in FOLDER itself are grouped by
+their names up to the last underscore: north_a.csv and north_b.csv are of the machine north. A
+file config.yaml in a machine's subfolder is its own configuration, over those of --config.
+
+  OUT/fleet.html, fleet.json             the table
+  OUT/machines/NAME/verdict.html .json   of each machine, kept as soon as it is there
+  OUT/machines/NAME/failure.txt          why a diagnosis failed
+
+The same command resumes an interrupted one. A machine is diagnosed again if its recordings, the
+options or the sources of this package have changed, or if it failed. The exit code is 1 if a
+diagnosis failed.
+
+With --scheduler, the workers of a cluster diagnose. They are sent the recordings and need no
+disk in common.
+
+For example:
+
+  antenna-drive diagnose-many antennas/ --config my_drive.yaml
+  antenna-drive diagnose-many antennas/ --out found/ --scheduler tcp://host:8786 --json -
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+import shlex
+
+from antenna_drive.cli.output import (
+    add_json_option, check_options, give, Progress, replaced, write_json,
+)
+from antenna_drive.cli.sharing import add_worker_options
+from antenna_drive.parameters.schema import Entry
+from antenna_drive.programs import NEGATIVE, OK
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.add_argument('folder', type=Path, metavar='FOLDER', help='folder with the recordings')
+    parser.add_argument('--out', type=Path, metavar='OUT',
+                        help='folder for the results (default: FOLDER/diagnosis)')
+    parser.add_argument('--config', action='append', default=[], metavar='FILE',
+                        help='configuration of the model, a file or the name of a set in '
+                             'config/; may be given several times (default: reference)')
+    parser.add_argument('--corrected', action='store_true',
+                        help='also write corrected.yaml for each machine')
+    parser.add_argument('--diagnose-options', default='', metavar='TEXT',
+                        help="further options for each diagnosis, e.g. '--without tach_1.gain'")
+    parser.add_argument('--time-limit', type=float, default=900.0, metavar='S',
+                        help='time limit of a diagnosis, after which it counts as failed '
+                             '(default %(default)s)')
+    parser.add_argument('--memory-limit', type=float, default=4000.0, metavar='MB',
+                        help='memory that a diagnosis may ask for before it counts as failed '
+                             '(default %(default)s; on Linux)')
+    add_worker_options(parser, os.cpu_count() or 1)
+    add_json_option(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Diagnose the machines, and write table and page; 1 if a diagnosis failed."""
+    from antenna_drive.fleet import diagnose_fleet, machines_of, Options, share, summary, text
+    from antenna_drive.pages import render
+    from antenna_drive.workers import workers
+
+    check_options(arguments, jobs=Entry('', 1, whole=True), time_limit=Entry('s', 1e-3),
+                  memory_limit=Entry('MB', 1.0))
+    out = arguments.out or arguments.folder / 'diagnosis'
+    machines = machines_of(arguments.folder, out)
+    # each diagnosis gets its share of the cores; a worker of a cluster has one
+    threads = 1 if arguments.scheduler else max(1, (os.cpu_count() or 1) // arguments.jobs)
+    options = Options(
+        tuple(arguments.config), tuple(shlex.split(arguments.diagnose_options)), threads,
+        arguments.time_limit, arguments.memory_limit, arguments.corrected)
+    with (Progress('machines', len(machines)) as progress,
+          workers(arguments.jobs, arguments.scheduler, threads=True) as pool):
+        rows = diagnose_fleet(machines, out, options, pool, progress.update)
+    found = {**summary(rows), 'rows': rows}
+    write_json(found, out / 'fleet.json')
+    with replaced(out / 'fleet.html') as stream:
+        stream.write(render('fleet.html', title=f'Fleet {arguments.folder.resolve().name}',
+                            lead=f'{len(rows)} machines', rows=rows, summary=found,
+                            share=share).encode())
+    give(found, arguments.json, f'{text(rows)}\n{out / "fleet.html"}')
+    return NEGATIVE if found['failed'] else OK

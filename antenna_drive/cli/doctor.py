@@ -1,0 +1,75 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Say what of this installation is there, what works, and what to do about the rest.
+
+Each part is tried: libraries are imported, the physics computes (it is compiled if it is not yet,
+which takes up to a minute), a ROS 2 message is sent and received. With PART only these are
+examined, and each of them has to be there.
+
+Exit codes: 0 what is needed works; 1 something is installed and does not work; 3 something that
+is needed, or was named as PART, is not installed.
+
+For example:
+  antenna-drive doctor
+  antenna-drive doctor nodes recording --json -
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from antenna_drive.cli.output import add_json_option, give
+from antenna_drive.errors import UserError
+from antenna_drive.health import as_data, BROKEN, examine, Finding, MISSING, NEEDED, OK, PARTS
+from antenna_drive.programs import NEGATIVE, NOT_INSTALLED, OK as DONE
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.add_argument('parts', nargs='*', metavar='PART',
+                        help=f'what to examine: {", ".join(PARTS)} (default: all)')
+    add_json_option(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Examine the parts and say what was found."""
+    for part in arguments.parts:
+        if part not in PARTS:
+            raise UserError(f'{part}: no such part; there are {", ".join(PARTS)}')
+    wanted = arguments.parts or list(PARTS)
+    needed = set(arguments.parts or NEEDED)
+    findings: list[Finding] = []
+    for part in wanted:
+        if sys.stderr.isatty():
+            print(f'\r{part:20}\r', end='', file=sys.stderr, flush=True)
+        findings += examine(part)
+    give(as_data(findings), arguments.json, _text(findings))
+    if any(item.state == BROKEN for item in findings):
+        return NEGATIVE
+    lacking = any(item.state == MISSING and item.part in needed for item in findings)
+    return NOT_INSTALLED if lacking else DONE
+
+
+def _text(findings: list[Finding]) -> str:
+    lines = []
+    part = ''
+    for item in findings:
+        lines.append(f'{item.part if item.part != part else "":11}{item.state:8} {item.what}: '
+                     f'{item.found}')
+        if item.remedy and item.state != OK:
+            lines.append(f'{"":20}{item.remedy}')
+        part = item.part
+    return '\n'.join(lines)

@@ -1,0 +1,27 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The options of every command whose work other processes or machines can do."""
+
+from __future__ import annotations
+
+import argparse
+
+
+def add_worker_options(parser: argparse.ArgumentParser, jobs: int) -> None:
+    """Add `--jobs` and `--scheduler`, which `antenna_drive.workers.workers` takes."""
+    parser.add_argument('--jobs', type=int, default=jobs, metavar='N',
+                        help='parallel processes on this machine (default: %(default)s here)')
+    parser.add_argument('--scheduler', metavar='ADDRESS',
+                        help='let the workers of a dask.distributed scheduler do the work, '
+                             'e.g. tcp://host:8786')

@@ -1,0 +1,289 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+What of this installation is there, what works, and what to do about the rest.
+
+Each part of the package is checked by use: a library is imported, the physics computes, a ROS 2
+message is sent and received.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+import importlib
+from importlib import metadata
+import math
+import os
+from pathlib import Path
+import platform
+import re
+import shutil
+import sys
+import tempfile
+import time
+from typing import Any
+
+from antenna_drive import __version__
+from antenna_drive.errors import one_line
+from antenna_drive.remedies import REMEDIES, ROS_REMEDY
+
+OK, MISSING, BROKEN, NOTE = 'ok', 'missing', 'broken', 'note'
+# How long a message may take to come back to its own process [s].
+_LOOPBACK_S = 10.0
+_REQUIREMENT = re.compile(r'(?P<name>[\w.-]+)(\[[^\]]*\])?\s*\(?(?P<bounds>[^;()]*)\)?')
+_BOUND = re.compile(r'(>=|<|~=)\s*([\d.]+)')
+
+
+@dataclass(frozen=True)
+class Finding:
+    """
+    What was found of one thing.
+
+    Attributes
+    ----------
+    part : of the package that needs it
+    what : its name
+    state : ok, missing, broken, or note for what is no fault but good to know
+    found : version, place or error
+    remedy : what to do; '' if nothing is to be done
+
+    """
+
+    part: str
+    what: str
+    state: str
+    found: str
+    remedy: str = ''
+
+
+def _machine() -> Iterator[Finding]:
+    yield Finding('machine', 'Python', OK, f'{platform.python_version()}, {sys.executable}')
+    memory = os.sysconf('SC_PHYS_PAGES') * os.sysconf('SC_PAGE_SIZE') / 2**30
+    yield Finding('machine', 'system', OK, f'{platform.system()} {platform.machine()}, '
+                                           f'{os.cpu_count()} cores, {memory:.0f} GB')
+    program = shutil.which('antenna-drive')
+    if program is None:
+        yield Finding('machine', 'antenna-drive', NOTE, 'not on PATH',
+                      'python -m antenna_drive does the same; or add '
+                      f'{Path(sys.executable).parent} to PATH')
+    else:
+        yield Finding('machine', 'antenna-drive', OK, f'{__version__}, {program}')
+
+
+def _libraries(part: str, *modules: str) -> Callable[[], Iterator[Finding]]:
+    def check() -> Iterator[Finding]:
+        for module in modules:
+            yield _library(part, module)
+    return check
+
+
+def _library(part: str, module: str) -> Finding:
+    """Import a library and compare its version with what this package asks for."""
+    try:
+        importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        name = (error.name or '').partition('.')[0]
+        if name == module.partition('.')[0]:
+            return Finding(part, module, MISSING, 'not installed',
+                           REMEDIES.get(name, f'pip install {name}'))
+        return Finding(part, module, BROKEN, one_line(error), REMEDIES.get(name, ''))
+    except Exception as error:  # whatever a library that does not fit raises
+        return Finding(part, module, BROKEN, one_line(f'{type(error).__name__}: {error}'),
+                       'install it again in this environment')
+    distribution = {'yaml': 'PyYAML', 'jinja2': 'Jinja2'}.get(module, module)
+    try:
+        version = metadata.version(distribution)
+    except metadata.PackageNotFoundError:
+        return Finding(part, module, OK, 'found')
+    wanted = _bounds().get(distribution.lower(), '')
+    if not _within(version, wanted):
+        return Finding(part, module, BROKEN, f'{version}, wanted {wanted}',
+                       f"pip install '{distribution}{wanted}'")
+    return Finding(part, module, OK, version)
+
+
+def _bounds() -> Mapping[str, str]:
+    """Return the versions that this package asks for, by distribution."""
+    try:
+        required = metadata.requires('antenna_drive') or []
+    except metadata.PackageNotFoundError:  # run from its sources
+        return {}
+    found: dict[str, str] = {}
+    for text in required:
+        if match := _REQUIREMENT.match(text):
+            found.setdefault(match['name'].lower(), match['bounds'].replace(' ', ''))
+    return found
+
+
+def _within(version: str, bounds: str) -> bool:
+    here = _numbers(version)
+    for sign, bound in _BOUND.findall(bounds):
+        other = _numbers(bound)
+        if sign in ('>=', '~=') and here < other or sign == '<' and here >= other:
+            return False
+        if sign == '~=' and here[:len(other) - 1] != other[:-1]:
+            return False
+    return True
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    return tuple(map(int, re.findall(r'\d+', version.partition('+')[0])[:3]))
+
+
+def _physics() -> Iterator[Finding]:
+    yield from (_library('physics', module) for module in ('numpy', 'scipy', 'numba', 'yaml',
+                                                           'threadpoolctl'))
+    from antenna_drive.emulator.run import simulate
+    from antenna_drive.parameters import load
+    began = time.monotonic()
+    run = simulate(load(), duration=0.1)
+    finite = all(math.isfinite(float(run[name][-1])) for name in run.names)
+    took = time.monotonic() - began
+    yield Finding('physics', 'a run of 0.1 s', OK if finite else BROKEN,
+                  f'{took:.1f} s' if finite else 'not finite',
+                  '' if finite else 'run antenna-drive accuracy and report what it says')
+    from antenna_drive.physics.compiling import _cache_folder
+    folder = _cache_folder()
+    if folder is None:
+        yield Finding('physics', 'compiled physics', NOTE, 'is not kept: no folder can be written',
+                      'set NUMBA_CACHE_DIR to a folder that can be written')
+    else:
+        yield Finding('physics', 'compiled physics', OK, f'kept in {folder.parent}')
+
+
+def _ros() -> Iterator[Finding]:
+    found = [_library('nodes', module) for module in (
+        'rclpy', 'std_msgs', 'rosgraph_msgs', 'diagnostic_msgs')]
+    for finding in found:
+        if finding.what == 'rclpy' and finding.state == BROKEN:
+            finding = Finding(finding.part, finding.what, BROKEN, finding.found, ROS_REMEDY)
+        yield finding
+    if any(finding.state != OK for finding in found):
+        return
+    distribution = os.environ.get('ROS_DISTRO', 'none sourced: the wheels of this environment')
+    from rclpy.utilities import get_rmw_implementation_identifier
+    yield Finding('nodes', 'ROS 2', OK,
+                  f'{distribution}, {get_rmw_implementation_identifier()}')
+    yield _loopback()
+    yield _discovery()
+    yield from _ros2_run()
+    free = shutil.disk_usage('/dev/shm').free / 2**20 if Path('/dev/shm').is_dir() else None
+    if free is not None and free < 64.0:
+        yield Finding('nodes', 'shared memory', NOTE, f'{free:.0f} MB free in /dev/shm',
+                      'make room: without it messages go through the network stack')
+
+
+def _loopback() -> Finding:
+    """Send a message through ROS 2 and take it again, in a context of its own."""
+    from rclpy.context import Context
+    from rclpy.executors import SingleThreadedExecutor
+    from rclpy.node import Node
+    from std_msgs.msg import Float64
+    from antenna_drive.lockstep.entry import choose_transport
+    choose_transport(os.environ)
+    context = Context()
+    context.init(args=[])
+    try:
+        node = Node(f'doctor_{os.getpid()}', context=context)
+        got: list[float] = []
+        topic = f'doctor_{os.getpid()}'
+        publisher = node.create_publisher(Float64, topic, 1)
+        node.create_subscription(Float64, topic, lambda message: got.append(message.data), 1)
+        executor = SingleThreadedExecutor(context=context)
+        executor.add_node(node)
+        began = time.monotonic()
+        while not got and time.monotonic() - began < _LOOPBACK_S:
+            publisher.publish(Float64(data=1.0))
+            executor.spin_once(timeout_sec=0.1)
+        executor.shutdown()
+        node.destroy_node()
+    finally:
+        context.try_shutdown()
+    if got:
+        return Finding('nodes', 'a message', OK,
+                       f'sent and received in {time.monotonic() - began:.1f} s')
+    return Finding('nodes', 'a message', BROKEN, f'sent, not received within {_LOOPBACK_S:g} s',
+                   'look at RMW_IMPLEMENTATION, ROS_DOMAIN_ID, the discovery variables and the '
+                   'firewall of this machine')
+
+
+def _discovery() -> Finding:
+    domain = os.environ.get('ROS_DOMAIN_ID', '0')
+    reach = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', '')
+    return Finding('nodes', 'discovery', OK,
+                   f'domain {domain}, range {reach or "as ROS 2 has it"}')
+
+
+def _ros2_run() -> Iterator[Finding]:
+    prefixes = [Path(prefix) for prefix in os.environ.get('AMENT_PREFIX_PATH', '').split(':')
+                if prefix]
+    index = Path('share', 'ament_index', 'resource_index', 'packages', 'antenna_drive')
+    place = next((prefix for prefix in prefixes if (prefix / index).exists()), None)
+    if shutil.which('ros2') is None:
+        yield Finding('nodes', 'ros2 run', NOTE, 'the ros2 command is not on PATH',
+                      'source a ROS 2; or start the nodes without it: rate_loop_plant, '
+                      'motor_drive, torque_share, test_signal')
+    elif place is None:
+        yield Finding('nodes', 'ros2 run', NOTE,
+                      'AMENT_PREFIX_PATH does not lead to antenna_drive',
+                      f'export AMENT_PREFIX_PATH={sys.prefix}'
+                      '${AMENT_PREFIX_PATH:+:$AMENT_PREFIX_PATH}')
+    else:
+        yield Finding('nodes', 'ros2 run', OK, str(place))
+
+
+def _files() -> Iterator[Finding]:
+    for what, folder in (('this folder', Path.cwd()), ('temporary files',
+                                                       Path(tempfile.gettempdir()))):
+        free = shutil.disk_usage(folder).free / 2**30
+        if not os.access(folder, os.W_OK):
+            yield Finding('files', what, NOTE, f'{folder} cannot be written',
+                          'results need a folder that can')
+        elif free < 0.5:
+            yield Finding('files', what, NOTE, f'{folder} has {1024.0 * free:.0f} MB left',
+                          'make room: a recording of an hour takes a gigabyte')
+        else:
+            yield Finding('files', what, OK, f'{folder}, {free:.0f} GB free')
+
+
+# Parts in the order in which they are told; those of NEEDED are no choice.
+PARTS: dict[str, Callable[[], Iterator[Finding]]] = {
+    'machine': _machine,
+    'files': _files,
+    'physics': _physics,
+    'pages': _libraries('pages', 'jinja2'),
+    'nodes': _ros,
+    'recording': _libraries('recording', 'mcap'),
+    'plot': _libraries('plot', 'matplotlib'),
+    'calibrate': _libraries('calibrate', 'cma'),
+    'cluster': _libraries('cluster', 'distributed'),
+    'completion': _libraries('completion', 'shtab'),
+}
+NEEDED = ('machine', 'files', 'physics', 'pages')
+
+
+def examine(part: str) -> Iterator[Finding]:
+    """Yield what is found of a part; a fault of the check itself is a finding, too."""
+    try:
+        yield from PARTS[part]()
+    except Exception as error:  # a part that breaks must not hide the others
+        yield Finding(part, 'check', BROKEN, one_line(f'{type(error).__name__}: {error}'),
+                      'report this line, with the output of antenna-drive doctor --json -')
+
+
+def as_data(findings: list[Finding]) -> dict[str, Any]:
+    """Return findings as plain data."""
+    return {'version': __version__, 'works': all(item.state != BROKEN for item in findings),
+            'findings': [vars(item) for item in findings]}

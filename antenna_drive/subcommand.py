@@ -1,0 +1,68 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""An antenna-drive command in a process of its own, with limits on its time and memory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+from antenna_drive.programs import PARENT
+
+
+def run_command(words: Sequence[str], limit_s: float = math.inf, memory_MB: float = math.inf,
+                folder: Path | None = None) -> str:
+    """
+    Run a command of this installation; return what it said, for the case that it failed.
+
+    The process ends with this one.
+
+    Parameters
+    ----------
+    words
+        the command and its arguments
+    limit_s
+        time after which it is ended [s]
+    memory_MB
+        what it may ask for; if it asks for more, it fails (Linux)
+    folder
+        its working folder
+
+    Returns
+    -------
+    its exit code and what it wrote to standard error, or that its time was up
+
+    """
+    with subprocess.Popen(
+            [sys.executable, '-m', 'antenna_drive', *words], stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, cwd=folder,
+            env={**os.environ, PARENT: str(os.getpid())}) as process:
+        if math.isfinite(memory_MB) and sys.platform.startswith('linux'):
+            import resource
+            most = int(memory_MB * 2**20)
+            resource.prlimit(process.pid, resource.RLIMIT_DATA, (most, most))
+        try:
+            _, said = process.communicate(
+                timeout=limit_s if math.isfinite(limit_s) else None)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            return f'no result after {limit_s:g} s'
+        except BaseException:
+            process.kill()
+            raise
+    return f'exit code {process.returncode}\n' + said.decode(errors='replace')

@@ -1,0 +1,112 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What the doctor says of an installation that is whole, lacks something, or is broken."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+import sys
+from typing import Any
+
+from antenna_drive import health
+from antenna_drive.cli import main
+from antenna_drive.health import _within
+import pytest
+
+Capture = pytest.CaptureFixture[str]
+
+
+def findings(capture: Capture) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = json.loads(capture.readouterr().out)['findings']
+    return found
+
+
+def test_what_is_needed_works_here(capsys: Capture) -> None:
+    assert main(['doctor', *health.NEEDED, '--json', '-']) == 0
+    found = findings(capsys)
+    assert {item['part'] for item in found} == set(health.NEEDED)
+    assert all(item['state'] in ('ok', 'note') for item in found)
+    assert {'numpy', 'scipy', 'numba', 'a run of 0.1 s'} <= {item['what'] for item in found}
+
+
+def test_a_library_that_is_missing_is_no_fault_unless_it_was_asked_for(
+        monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    monkeypatch.setitem(sys.modules, 'cma', None)
+    assert main(['doctor', 'calibrate', '--json', '-']) == 3
+    [item] = findings(capsys)
+    assert (item['state'], item['remedy']) == ('missing', 'pip install cma')
+    monkeypatch.setattr(health, 'PARTS', {'calibrate': health.PARTS['calibrate']})
+    monkeypatch.setattr('antenna_drive.cli.doctor.PARTS', health.PARTS)
+    assert main(['doctor']) == 0
+    assert 'pip install cma' in capsys.readouterr().out
+
+
+def test_a_library_that_does_not_load_is_a_fault(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    (tmp_path / 'cma.py').write_text("raise ImportError('libx.so: no such file')")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, 'cma', raising=False)
+    assert main(['doctor', 'calibrate', '--json', '-']) == 1
+    [item] = findings(capsys)
+    assert item['state'] == 'broken'
+    assert 'libx.so: no such file' in item['found']
+
+
+def test_an_older_version_than_asked_for_is_a_fault(
+        monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    monkeypatch.setattr(health, '_bounds', lambda: {'jinja2': '>=99.0'})
+    assert main(['doctor', 'pages', '--json', '-']) == 1
+    [item] = findings(capsys)
+    assert item['found'].endswith('wanted >=99.0')
+    assert item['remedy'] == "pip install 'Jinja2>=99.0'"
+
+
+@pytest.mark.parametrize(('version', 'bounds', 'fits'), [
+    ('1.24', '>=1.24', True), ('1.24.3', '>=1.24', True), ('1.9', '>=1.24', False),
+    ('0.68.1', '<0.69,>=0.58', True), ('0.69.0', '<0.69,>=0.58', False),
+    ('9.1.2', '~=9.1', True), ('10.0', '~=9.1', False), ('2.0+local.7', '>=2.0', True),
+    ('1.0', '', True)])
+def test_versions(version: str, bounds: str, fits: bool) -> None:
+    """As PEP 440 has it, for the bounds that are used here."""
+    assert _within(version, bounds) == fits
+
+
+def test_a_check_that_fails_hides_no_other(monkeypatch: pytest.MonkeyPatch,
+                                           capsys: Capture) -> None:
+    def fails() -> Any:
+        raise RuntimeError('unforeseen')
+
+    parts = {'nodes': fails, 'pages': health.PARTS['pages']}
+    monkeypatch.setattr(health, 'PARTS', parts)
+    monkeypatch.setattr('antenna_drive.cli.doctor.PARTS', parts)
+    assert main(['doctor', '--json', '-']) == 1
+    assert [(item['part'], item['state']) for item in findings(capsys)] == [
+        ('nodes', 'broken'), ('pages', 'ok')]
+
+
+def test_no_such_part(capsys: Capture) -> None:
+    assert main(['doctor', 'node']) == 2
+    assert 'node: no such part; there are machine' in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(importlib.util.find_spec('rclpy') is None, reason='rclpy is not installed')
+def test_a_message_is_sent_and_received(fresh_domain: int, capsys: Capture) -> None:
+    assert main(['doctor', 'nodes', '--json', '-']) == 0
+    found = {item['what']: item for item in findings(capsys)}
+    assert found['a message']['state'] == 'ok'
+    assert f'domain {fresh_domain}' in found['discovery']['found']
+    assert 'rmw_' in found['ROS 2']['found']

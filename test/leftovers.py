@@ -1,0 +1,69 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Processes that tests have left behind, wherever they are in the tree of processes."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import signal
+import uuid
+
+# In the environment of every process that a session of pytest starts; also in that of a process
+# whose parent has ended, which no list of children shows.
+SESSION = 'ANTENNA_DRIVE_TEST_SESSION'
+# pytest-xdist sets it for its workers.
+WORKER = 'PYTEST_XDIST_WORKER'
+
+
+def mark(worker: bool) -> None:
+    """
+    Mark what this process starts from now on.
+
+    Parameters
+    ----------
+    worker
+        True in a worker of pytest-xdist, which shares the mark of those that started it
+
+    """
+    if not worker:
+        os.environ[SESSION] = uuid.uuid4().hex
+        os.environ.pop(WORKER, None)
+
+
+def started() -> set[int]:
+    """Return the processes that this process has started, and theirs (on Linux)."""
+    marks = {f'{name}={os.environ[name]}'.encode() for name in (SESSION, WORKER)
+             if name in os.environ}
+    found = set()
+    for path in Path('/proc').glob('[0-9]*/environ'):
+        try:
+            if marks <= set(path.read_bytes().split(b'\0')):
+                found.add(int(path.parent.name))
+        except OSError:  # ended meanwhile, or somebody else's
+            continue
+    return found - {os.getpid()}
+
+
+def end(processes: set[int]) -> list[str]:
+    """End processes at once; return their command lines."""
+    ended = []
+    for pid in sorted(processes):
+        try:
+            words = Path('/proc', str(pid), 'cmdline').read_bytes().split(b'\0')
+            os.kill(pid, signal.SIGKILL)
+        except OSError:
+            continue
+        ended.append(b' '.join(words).decode(errors='replace').strip())
+    return ended

@@ -1,0 +1,53 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Tasks for workers of other processes, which import them from here."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import resource
+
+
+def square(number: int) -> int:
+    return number * number
+
+
+def fail(number: int) -> int:
+    raise ValueError(f'task {number}')
+
+
+def end_worker(number: int) -> int:
+    os._exit(1)
+
+
+def told(folder: str, number: int, victims: int) -> int:
+    """
+    Note that a task has begun, and by whom; of some tasks, wait when begun for the first time.
+
+    The wait ends only with the worker: nobody ever writes to the pipe.
+    """
+    notes = Path(folder, f'task-{number}')
+    with notes.open('a') as stream:
+        stream.write(f'{os.getpid()}\n')
+    if number < victims and len(notes.read_text().splitlines()) == 1:
+        Path(folder, f'waiting-{number}').write_text(str(os.getpid()))
+        Path(folder, 'nothing').open().read()
+    return square(number)
+
+
+def large(megabytes: int) -> tuple[bytes, int, float]:
+    """Return bytes, the process, and the most memory that it has had so far [MB]."""
+    return (bytes(megabytes * 2**20), os.getpid(),
+            resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)

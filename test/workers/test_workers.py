@@ -1,0 +1,64 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Tasks on processes and threads of this machine: all done, bounded, and ended by an error."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from antenna_drive.workers import TaskLost, workers
+import pytest
+import worker_tasks
+
+
+@pytest.mark.parametrize('threads', [False, True])
+def test_every_task_is_done_once(threads: bool) -> None:
+    with workers(2, threads=threads) as pool:
+        found = {number: result() for number, result in pool.each(
+            worker_tasks.square, ((k,) for k in range(30)))}
+    assert found == {k: k * k for k in range(30)}
+
+
+def test_tasks_are_asked_for_as_there_is_room() -> None:
+    """A long batch is never in memory as a whole."""
+    given = []
+
+    def tasks() -> Iterator[tuple[int]]:
+        for k in range(100):
+            given.append(k)
+            yield k,
+
+    with workers(2, threads=True) as pool:
+        for done, (_, result) in enumerate(pool.each(worker_tasks.square, tasks()), start=1):
+            result()
+            # two for each worker beyond those whose results have been asked for
+            assert len(given) <= done + 4
+    assert len(given) == 100
+
+
+def test_an_error_is_that_of_its_task_and_ends_no_other() -> None:
+    with workers(2, threads=True) as pool:
+        errors = []
+        for number, result in pool.each(worker_tasks.fail, ((k,) for k in range(5))):
+            with pytest.raises(ValueError, match=f'task {number}'):
+                result()
+            errors.append(number)
+    assert sorted(errors) == list(range(5))
+
+
+def test_a_process_that_dies_is_told() -> None:
+    with pytest.raises(TaskLost, match='ended from outside'):
+        with workers(1) as pool:
+            for _, result in pool.each(worker_tasks.end_worker, [(1,)]):
+                result()
