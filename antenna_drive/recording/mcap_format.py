@@ -741,11 +741,18 @@ def _files(path: Path) -> tuple[list[Path], dict[str, int] | None]:
     files = []
     for name in names:
         file = path / name
-        if not file.resolve().is_relative_to(path.resolve()) or not name:
+        if not _lies_in(path, name):
             raise RecordingError(f'{path / METADATA}: the file {one_line(name, 60)} lies outside '
                                  'the bag')
         files.append(file)
     return files, counts
+
+
+def _lies_in(folder: Path, name: str) -> bool:
+    try:
+        return bool(name) and (folder / name).resolve().is_relative_to(folder.resolve())
+    except (ValueError, OSError):  # no name of a file: a null byte, half of a character, too long
+        return False
 
 
 def _check_counts(storage: _Storage, counts: dict[str, int] | None) -> None:

@@ -348,6 +348,8 @@ def rewrite(path: Path, **changes: object) -> None:
 @pytest.mark.parametrize(('changes', 'words'), [
     ({'storage_identifier': 'sqlite3'}, "storage 'sqlite3'.*ros2 bag convert"),
     ({'compression_mode': 'file'}, "compressed by 'file'"),
+    ({'relative_file_paths': ['run\0.mcap']}, 'lies outside the bag'),
+    ({'relative_file_paths': ['\ud800']}, 'lies outside the bag'),
     ({'relative_file_paths': ['../other.mcap']}, 'lies outside the bag'),
     ({'relative_file_paths': ['gone.mcap']}, 'gone.mcap: No such file'),
     ({'relative_file_paths': 3}, 'no description of a bag'),
