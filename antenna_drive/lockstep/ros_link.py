@@ -25,12 +25,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from antenna_drive.limits import FRAME
-from antenna_drive.lockstep.frame import FrameLayout
+from antenna_drive.lockstep.frame import FrameLayout, read_foreign
 from rclpy.callback_groups import CallbackGroup
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.serialization import deserialize_message
 from std_msgs.msg import Float64MultiArray
 
 # One second of frames at 1 kHz. Transient local: a late subscriber still gets frame 0.
@@ -147,10 +146,7 @@ def read_message(message: bytes) -> tuple[float, ...]:
     """
     if len(message) > FRAME.value():
         return ()
-    try:
-        return tuple(deserialize_message(message, Float64MultiArray).data)
-    except RuntimeError:
-        return ()
+    return read_foreign(message)
 
 
 def _never_called(message: Any) -> None:
