@@ -39,6 +39,15 @@ FRAME_QOS = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
+# Fast DDS sorts what waits to be taken by the time of its sender's clock and drops the oldest. If
+# that clock was set back, the newest frame is the oldest to a reader that is full of what a sender
+# remembers. A reader has room for all of that and as much again.
+READ_QOS = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=2 * FRAME_QOS.depth,
+    reliability=FRAME_QOS.reliability,
+    durability=FRAME_QOS.durability,
+)
 
 
 class NotForExecutors(CallbackGroup):
@@ -65,7 +74,7 @@ class FrameLink:
         self._group = NotForExecutors()
         self._subscriptions = {
             peer: node.create_subscription(
-                Float64MultiArray, f'{peer}/frame', _never_called, FRAME_QOS,
+                Float64MultiArray, f'{peer}/frame', _never_called, READ_QOS,
                 callback_group=self._group, raw=True)
             for peer in self._layouts}
         self._handles = {peer: item.handle for peer, item in self._subscriptions.items()}
