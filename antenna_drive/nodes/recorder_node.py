@@ -183,8 +183,8 @@ class _RecorderNode:
         lost = self._follower.lost
         if lost > self._told_lost:
             self._log.error(f'{lost} steps lost: the recorder or the machine is too slow, or a '
-                            'node was killed before it had sent them; -p run.observers:=[recorder] on '
-                            'test_signal makes the drive wait')
+                            'node was killed before it had sent them; '
+                            '-p run.observers:=[recorder] on test_signal makes the drive wait')
         self._told_lost = lost
         refused = self._recorder.refused + self._follower.refused
         if refused > self._told_refused:
