@@ -5,10 +5,11 @@ VENV := .venv$(ROS)
 READY := $(VENV)/ready
 PY := $(VENV)/bin/python
 PYTEST_ARGS ?=
+CAMPAIGN_ARGS ?=
 # One process for the tests that start nodes, one for the others.
 WORKERS := -n 2 --dist loadgroup --no-loadscope-reorder
 
-.PHONY: help set-up demo test trials quick lint bench clean
+.PHONY: help set-up demo test trials campaign quick lint bench clean
 
 help:
 	@echo 'make demo    set everything up, then run the saw-tooth test on the old and the new'
@@ -16,6 +17,8 @@ help:
 	@echo 'make test    the whole suite with the linters and mypy; PYTEST_ARGS="-k backlash"'
 	@echo '             runs a part'
 	@echo 'make trials  what make test leaves out because it takes minutes'
+	@echo 'make campaign  look for faults for some hours; resumable; results in out/campaign.'
+	@echo '             CAMPAIGN_ARGS="--dose medium" takes half an hour, --short ten minutes'
 	@echo 'make quick   the suite without what takes more than a few seconds'
 	@echo 'make lint    the linters and mypy alone'
 	@echo 'make bench   measure speed'
@@ -39,6 +42,9 @@ test: $(READY)
 
 trials: $(READY)
 	$(PY) -m pytest -m trial $(PYTEST_ARGS)
+
+campaign: $(READY)
+	$(VENV)/bin/antenna-drive campaign --out out/campaign --json out/campaign.json $(CAMPAIGN_ARGS)
 
 quick: $(READY)
 	$(PY) -m pytest $(WORKERS) -m 'not slow and not trial' $(PYTEST_ARGS)

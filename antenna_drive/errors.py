@@ -23,9 +23,16 @@ class UserError(Exception):
     fault of the program is not.
     """
 
+    # A file may give a megabyte where a number should be. Paths have at most 4096 characters.
+    LONGEST = 6000
+
     def __init__(self, message: str) -> None:
-        """Keep the message in one line, whatever a key or a path in it may hold."""
-        super().__init__(' '.join(message.split()))
+        """Keep the message in one line of bounded length, whatever it may quote."""
+        line = ' '.join(message.split())
+        if len(line) > self.LONGEST:
+            half = self.LONGEST // 2
+            line = f'{line[:half]} ... {line[-half:]}'
+        super().__init__(line)
 
 
 def one_line(text: object, longest: int = 120) -> str:

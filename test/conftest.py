@@ -16,12 +16,9 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
-import fcntl
 import os
-from pathlib import Path
-import tempfile
-from typing import IO
 
+from antenna_drive.campaign.domains import DomainClaim
 import hanging
 from hypothesis import settings
 from installations import install_with_colcon, install_with_pip, Installation
@@ -31,45 +28,9 @@ import pytest
 settings.register_profile('antenna_drive', deadline=None)
 settings.load_profile('antenna_drive')
 
-# Domains 0 to 101 use ports that no operating system hands out; 0 is where people work.
-DOMAINS = range(1, 102)
-
 # Fixtures of tests that no two workers run at the same time.
 ONE_AT_A_TIME = {'session_domain', 'module_domain', 'fresh_domain', 'colcon_installation',
                  'pip_installation'}
-
-
-class DomainClaim:
-    """A ROS 2 domain that no other test process on this machine has while this one holds it."""
-
-    def __init__(self) -> None:
-        """
-        Claim a free domain.
-
-        Raises
-        ------
-        RuntimeError : all of them are taken
-
-        """
-        # Start at a different place in each process, so that one that does not ask is unlikely
-        # to be met: not every test suite of a machine claims its domain.
-        start = os.getpid() % len(DOMAINS)
-        for number in (*DOMAINS[start:], *DOMAINS[:start]):
-            path = Path(tempfile.gettempdir(), f'antenna_drive-test-domain-{number}.lock')
-            lock = path.open('w')
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                lock.close()
-                continue
-            self.number = number
-            self._lock: IO[str] = lock
-            return
-        raise RuntimeError('every ROS 2 domain is taken by another test process')
-
-    def release(self) -> None:
-        """Give the domain back."""
-        self._lock.close()
 
 
 def pytest_configure(config: pytest.Config) -> None:

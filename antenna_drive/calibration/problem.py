@@ -41,7 +41,7 @@ from antenna_drive.article.measures import (
 from antenna_drive.parameters import Drive, load, ParameterError
 from antenna_drive.parameters.loading import find, MOTOR_SECTIONS, PLACES, SECTIONS
 from antenna_drive.parameters.plain_yaml import read_yaml
-from antenna_drive.parameters.schema import Entry, mapping_of, nearest
+from antenna_drive.parameters.schema import Entry, mapping_of, nearest, quoted
 from antenna_drive.parameters.sets import changed, entries, values
 
 # The circuit of an experiment that uses the configuration's own.
@@ -302,7 +302,7 @@ def read_problem(source: str | Path, start: Sequence[str] = ()) -> CalibrationPr
 def _filled(content: Mapping[str, Any], section: str) -> list[tuple[Any, Any]]:
     body = content.get(section)
     if not isinstance(body, dict) or not body:
-        raise ParameterError(f'{section}: {body!r} given, allowed is a mapping of entries')
+        raise ParameterError(f'{section}: {quoted(body)} given, allowed is a mapping of entries')
     return list(body.items())
 
 
@@ -327,7 +327,8 @@ def _free(name: str, body: Any) -> Free:
                  for end in ('low', 'high'))
     scale = table.get('scale', 'linear')
     if scale not in ('linear', 'log') or not low < high or (scale == 'log' and low <= 0.0):
-        raise ParameterError(f'{key}: low {low:g}, high {high:g}, scale {scale!r} given, allowed '
+        raise ParameterError(f'{key}: low {low:g}, high {high:g}, scale {quoted(scale)} given, '
+                             'allowed '
                              'is low below high, scale linear or, above zero, log')
     return Free(name, low, high, scale == 'log', entry.unit)
 
@@ -366,14 +367,15 @@ def _figure(name: str, body: Any, experiments: set[str]) -> Reading:
                                    'scale', 'unit'))
     for part in ('experiment', 'compared_with'):
         if table.get(part, None if part == 'compared_with' else '') not in (*experiments, None):
-            raise ParameterError(f'{key}.{part}: {table.get(part)!r} given, allowed are '
+            raise ParameterError(f'{key}.{part}: {quoted(table.get(part))} given, allowed are '
                                  f'{", ".join(sorted(experiments))}')
     if table.get('kind') not in readings.KINDS:
-        raise ParameterError(f'{key}.kind: {table.get("kind")!r} given, allowed are '
+        raise ParameterError(f'{key}.kind: {quoted(table.get("kind"))} given, allowed are '
                              f'{", ".join(readings.KINDS)}')
     signal = table.get('signal')
     if not isinstance(signal, dict) or not signal:
-        raise ParameterError(f'{key}.signal: {signal!r} given, allowed is a mapping of signals '
+        raise ParameterError(f'{key}.signal: {quoted(signal)} given, allowed is a mapping of '
+                             'signals '
                              'to weights')
     return Reading(name, str(table.get('unit', '1')), str(table['experiment']),
                    str(table['kind']),

@@ -111,7 +111,7 @@ def _read_log(path: Path) -> tuple[dict[str, Any], list[FitCandidate]]:
         return head, [_candidate(line) for line in lines[1:] if line.endswith('\n')]
     except OSError as error:
         raise UserError(f'{path}: cannot be read, {error.strerror}') from error
-    except (ValueError, KeyError, TypeError, IndexError) as error:
+    except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
         raise UserError(f'{path}: is not the log of a search: {error}') from error
 
 

@@ -81,6 +81,7 @@ COMMANDS = {
     'servo': Command('servo', 'say what the model of an ordinary servo lacks'),
     'confusability': Command('confusability', 'measure which effects can be told apart'),
     'bench': Command('bench', 'measure speed'),
+    'campaign': Command('campaign', 'look for faults: kills, garbage, damaged files, full disks'),
 }
 
 

@@ -121,7 +121,7 @@ def _recorder(path: Path) -> Recorder:
     from antenna_drive.machines.antenna.prediction import Recorder
     try:
         content = json.loads(path.read_text(encoding='utf-8'))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise UserError(f'{path}: not JSON: {error}') from error
     entries = content.get('recorder') if isinstance(content, dict) else None
     if not isinstance(entries, list):

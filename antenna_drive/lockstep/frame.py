@@ -106,6 +106,34 @@ def _cdr_prefix(label: str, length: int) -> bytes:
     return _CDR_LITTLE_ENDIAN + body
 
 
+def read_foreign(message: bytes) -> tuple[float, ...]:
+    """
+    Return the numbers of a Float64MultiArray of any layout and byte order.
+
+    ROS 2's own deserialisation writes a line to the log for each message that it cannot read, so
+    anybody could fill a disk.
+
+    Returns
+    -------
+    none at all if it is no such message
+
+    """
+    order = {b'\x00\x00': '>', b'\x00\x01': '<'}.get(message[:2])
+    if order is None:
+        return ()
+    body, place = message[4:], 4
+    try:
+        for _ in range(*struct.unpack_from(f'{order}I', body)):
+            (label,) = struct.unpack_from(f'{order}I', body, place)
+            place += 4 + label
+            place += -place % 4 + 8
+        _, count = struct.unpack_from(f'{order}II', body, place)
+        place += 8
+        return struct.unpack_from(f'{order}{count}d', body, place + (-place % 8 if count else 0))
+    except struct.error:
+        return ()
+
+
 def all_finite(numbers: Sequence[float]) -> bool:
     """Return whether no number is NaN or infinite."""
     # The sum is finite only if every term is; it may overflow though all terms are finite.

@@ -22,6 +22,7 @@ long as it keeps within what they remember, the last thousand steps.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 import os
 import time
@@ -32,10 +33,12 @@ from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.wiring import OUTPUTS
 from antenna_drive.lockstep.changes import read_record
 from antenna_drive.lockstep.entry import choose_transport
+from antenna_drive.lockstep.frame import NO_RUN
+from antenna_drive.lockstep.inbox import Frame
 from antenna_drive.lockstep.member import Guest, Member
 from antenna_drive.lockstep.readings import CHANGES_QOS
 from antenna_drive.lockstep.report import STANDSTILL_S
-from antenna_drive.lockstep.ros_link import FrameLink
+from antenna_drive.lockstep.ros_link import FRAME_QOS, FrameLink
 from antenna_drive.lockstep.serving import Serving
 import numpy as np
 from rclpy.context import Context
@@ -124,6 +127,8 @@ class Observer:
         self._run = 0.0
         self._told = -1
         self._link = FrameLink(self._node, self._member.layouts)
+        # frames of the conductor that were taken before there was room for them
+        self._ahead: deque[Frame] = deque()
         self._serving: Serving | None = None
         if on_change is not None:
             self._listen(outputs, on_change)
@@ -174,6 +179,8 @@ class Observer:
                 waiting_since = now if waiting_since is None else waiting_since
                 stands_still = now - waiting_since >= STANDSTILL_S
                 if not self._take():
+                    if stands_still:
+                        self._look_ahead()
                     self._tell()
                     self._link.wait(member.wanted(), _LONGEST_WAIT_S)
                     time.sleep(_NAP_S)
@@ -189,11 +196,40 @@ class Observer:
         """Take what has come; return whether anything has."""
         taken = False
         for peer in self._member.wanted():
-            frame = self._link.take(peer)
+            frame = self._next(peer)
             if frame is not None:
                 self._member.receive(peer, frame)
                 taken = True
         return taken
+
+    def _next(self, peer: str) -> Frame | None:
+        if self._ahead and peer == self._member.conductor:
+            return self._ahead.popleft()
+        return self._link.take(peer)
+
+    def _look_ahead(self) -> None:
+        """
+        Look for the announcement of another run behind the frames that there is no room for.
+
+        The drive may be hundreds of steps ahead of an observer. A node that is killed may not have
+        sent the observer a frame that the others have. That frame never comes, and the next
+        run is announced behind all the conductor's frames of this one.
+        """
+        member, ahead = self._member, self._ahead
+        while len(ahead) < FRAME_QOS.depth:
+            frame = self._link.take(member.conductor)
+            if frame is None:
+                break
+            ahead.append(frame)
+        begins = None
+        for place, frame in enumerate(ahead):
+            if frame[:1] == (member.run,):
+                begins = None  # this run goes on: what was announced before was an invention
+            elif frame[1:2] == (0.0,) and frame[0] != NO_RUN:
+                begins = place
+        if begins is not None:
+            for _ in range(begins + 1):
+                member.receive(member.conductor, ahead.popleft())
 
     def _tell(self) -> None:
         """Say how far we are, if that is news and somebody waits for it."""

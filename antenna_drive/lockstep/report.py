@@ -27,7 +27,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
 PERIOD_S = 1.0
-# A wait is reported after this; with the period above that is within two seconds.
+# A wait is reported after this.
 PATIENCE_S = 0.9
 # A run that goes on makes a step within this; else another that was announced takes its place.
 STANDSTILL_S = 0.2
@@ -88,6 +88,7 @@ class Report:
         if not self._told and not fault and self._waits_long(now):
             self._node.get_logger().warning(f'{self._waits_for()}')
             self._told = True
+            self._next_s = now  # people who watch /diagnostics hear of it at once too
 
     def ended(self) -> None:
         """Say once for each run how its steps and its partner's answers came."""

@@ -25,12 +25,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from antenna_drive.limits import FRAME
-from antenna_drive.lockstep.frame import FrameLayout
+from antenna_drive.lockstep.frame import FrameLayout, read_foreign
 from rclpy.callback_groups import CallbackGroup
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.serialization import deserialize_message
 from std_msgs.msg import Float64MultiArray
 
 # One second of frames at 1 kHz. Transient local: a late subscriber still gets frame 0.
@@ -39,6 +38,15 @@ FRAME_QOS = QoSProfile(
     depth=1000,
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+# Fast DDS sorts what waits to be taken by the time of its sender's clock and drops the oldest. If
+# that clock was set back, the newest frame is the oldest to a reader that is full of what a sender
+# remembers. A reader has room for all of that and as much again.
+READ_QOS = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=2 * FRAME_QOS.depth,
+    reliability=FRAME_QOS.reliability,
+    durability=FRAME_QOS.durability,
 )
 
 
@@ -66,7 +74,7 @@ class FrameLink:
         self._group = NotForExecutors()
         self._subscriptions = {
             peer: node.create_subscription(
-                Float64MultiArray, f'{peer}/frame', _never_called, FRAME_QOS,
+                Float64MultiArray, f'{peer}/frame', _never_called, READ_QOS,
                 callback_group=self._group, raw=True)
             for peer in self._layouts}
         self._handles = {peer: item.handle for peer, item in self._subscriptions.items()}
@@ -138,10 +146,7 @@ def read_message(message: bytes) -> tuple[float, ...]:
     """
     if len(message) > FRAME.value():
         return ()
-    try:
-        return tuple(deserialize_message(message, Float64MultiArray).data)
-    except RuntimeError:
-        return ()
+    return read_foreign(message)
 
 
 def _never_called(message: Any) -> None:

@@ -182,7 +182,8 @@ class _RecorderNode:
     def _look(self) -> None:
         lost = self._follower.lost
         if lost > self._told_lost:
-            self._log.error(f'{lost} steps lost: the recorder or the machine is too slow; '
+            self._log.error(f'{lost} steps lost: the recorder or the machine is too slow, or a '
+                            'node was killed before it had sent them; '
                             '-p run.observers:=[recorder] on test_signal makes the drive wait')
         self._told_lost = lost
         refused = self._recorder.refused + self._follower.refused

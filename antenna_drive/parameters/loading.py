@@ -29,7 +29,9 @@ from typing import Any, get_type_hints
 
 from antenna_drive.parameters import files
 from antenna_drive.parameters.plain_yaml import read_yaml
-from antenna_drive.parameters.schema import Entry, mapping_of, nearest, ParameterError, Value
+from antenna_drive.parameters.schema import (
+    Entry, mapping_of, nearest, ParameterError, quoted, Value,
+)
 from antenna_drive.parameters.sets import (
     Axis, Drive, Encoder, entries, Filter1, MotorDrive, TestSignal, TorqueShare, Waveform,
 )
@@ -118,7 +120,7 @@ def _read(path: Path, sections: Mapping[str, type]) -> tuple[str, _Given]:
         content = dict(mapping_of('', {} if content is None else content))
         base = content.pop('base', 'reference')
         if base not in ('reference', 'none'):
-            raise ParameterError(f'base: {base!r} given, allowed is reference or none')
+            raise ParameterError(f'base: {quoted(base)} given, allowed is reference or none')
         _take('', content, known, str(path), given)
     except ParameterError as error:
         raise ParameterError(f'{path}: {error}') from None
@@ -142,7 +144,8 @@ def _value(key: str, entry: Entry, item: Any) -> Value:
     if 'value' not in item:
         raise ParameterError(f'{key}: value is missing, allowed is {entry.allowed()}')
     if 'unit' in item and item['unit'] != entry.unit:
-        raise ParameterError(f'{key}: unit {item["unit"]!r} given, allowed is {entry.unit!r}')
+        raise ParameterError(f'{key}: unit {quoted(item["unit"])} given, allowed is '
+                             f'{entry.unit!r}')
     return _narrowed(key, entry, item).check(key, item['value'])
 
 
@@ -154,7 +157,7 @@ def _narrowed(key: str, entry: Entry, item: Mapping[str, Any]) -> Entry:
     numbers = (isinstance(bounds, list) and len(bounds) == 2
                and all(isinstance(b, (int, float)) and not isinstance(b, bool) for b in bounds))
     if not numbers or not entry.low <= bounds[0] <= bounds[1] <= entry.high:
-        raise ParameterError(f'{key}: range {bounds!r} given, allowed is [low, high] within '
+        raise ParameterError(f'{key}: range {quoted(bounds)} given, allowed is [low, high] within '
                              f'[{entry.low:g}, {entry.high:g}]')
     return replace(entry, low=float(bounds[0]), high=float(bounds[1]))
 

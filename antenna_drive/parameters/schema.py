@@ -82,25 +82,33 @@ class Entry:
         """
         if self.choices is not None:
             if value not in self.choices:
-                raise ParameterError(f'{key}: {value!r} given, allowed is {self.allowed()}')
+                raise ParameterError(f'{key}: {quoted(value)} given, allowed is {self.allowed()}')
             return str(value)
         if self.lengths is not None:
             if (not isinstance(value, (list, tuple))
                     or not self.lengths[0] <= len(value) <= self.lengths[1]):
-                raise ParameterError(f'{key}: {value!r} given, allowed is {self.allowed()}')
+                raise ParameterError(f'{key}: {quoted(value)} given, allowed is {self.allowed()}')
             return tuple(self._number(f'{key}[{i}]', item) for i, item in enumerate(value))
         return self._number(key, value)
 
     def _number(self, key: str, value: object) -> float:
         # bool is an int in Python, and YAML 1.1 reads 8.74e6 as text: both are refused
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ParameterError(f'{key}: {value!r} given, allowed is {self.allowed()}')
-        number = float(value)
+            raise ParameterError(f'{key}: {quoted(value)} given, allowed is {self.allowed()}')
+        try:
+            number = float(value)
+        except OverflowError:  # an integer beyond every float
+            number = math.inf
         if not math.isfinite(number) or not self.low <= number <= self.high:
-            raise ParameterError(f'{key}: {value!r} given, allowed is {self.allowed()}')
+            raise ParameterError(f'{key}: {quoted(value)} given, allowed is {self.allowed()}')
         if self.whole and number != int(number):
-            raise ParameterError(f'{key}: {value!r} given, allowed is {self.allowed()}')
+            raise ParameterError(f'{key}: {quoted(value)} given, allowed is {self.allowed()}')
         return int(number) if self.whole else number
+
+
+def quoted(value: object) -> str:
+    """Return a value as it was given, short enough for an error of one line."""
+    return one_line(repr(value), 80)
 
 
 def nearest(key: str, known: Iterable[str]) -> str:

@@ -33,7 +33,9 @@ from antenna_drive.emulator.wiring import OUTPUTS, signal_names
 from antenna_drive.errors import one_line
 from antenna_drive.limits import SAMPLES
 from antenna_drive.parameters.plain_yaml import read_yaml
-from antenna_drive.parameters.schema import Entry, mapping_of, nearest, ParameterError
+from antenna_drive.parameters.schema import (
+    Entry, mapping_of, nearest, ParameterError, quoted,
+)
 from antenna_drive.recording.csv_format import (
     Cell, FIELD_COLUMNS, open_text, parse_nanoseconds, parse_number, rows,
 )
@@ -165,14 +167,15 @@ def parse_map(tree: object) -> ImportMap:
     texts = {key: _text(key, top[key]) for key in _TEXT_ENTRIES if key in top}
     for key, allowed in (('delimiter', ',;\t| '), ('decimal', '.,')):
         if key in texts and (len(texts[key]) != 1 or texts[key] not in allowed):
-            raise ParameterError(f'{key}: {texts[key]!r} given, allowed is one of '
+            raise ParameterError(f'{key}: {quoted(texts[key])} given, allowed is one of '
                                  + ' '.join(repr(c) for c in allowed))
     if texts.get('decimal', '.') == texts.get('delimiter', ','):
         raise ParameterError('decimal: the same as the delimiter')
     try:
         ''.encode(texts.get('encoding', 'utf-8'))
     except (LookupError, ValueError, UnicodeError):
-        raise ParameterError(f'encoding: {texts["encoding"]!r} given, allowed is one that Python '
+        raise ParameterError(f'encoding: {quoted(texts["encoding"])} given, allowed is one that '
+                             'Python '
                              'knows, such as utf-8 or latin-1') from None
     skip = int(_SKIP_LINES.check('skip_lines', plain_value(  # type: ignore[arg-type]
         top.get('skip_lines', 0))))
@@ -192,7 +195,7 @@ def _text(key: str, value: object, choices: tuple[str, ...] | None = None) -> st
     if choices is not None:
         return str(Entry('', choices=choices).check(key, plain_value(value)))
     if not isinstance(value, str) or not value:
-        raise ParameterError(f'{key}: {plain_value(value)!r} given, allowed is a text')
+        raise ParameterError(f'{key}: {quoted(plain_value(value))} given, allowed is a text')
     return value
 
 
@@ -226,7 +229,7 @@ def _signal(key: str, name: str, body: object) -> SignalMap:
                for entry in _NUMBERS if entry in entries}
     sign = entries.get('sign', 1)
     if isinstance(sign, bool) or sign not in (1, -1):
-        raise ParameterError(f'{key}.sign: {plain_value(sign)!r} given, allowed is 1 or -1')
+        raise ParameterError(f'{key}.sign: {quoted(plain_value(sign))} given, allowed is 1 or -1')
     written = _text(f'{key}.unit', entries.get('unit', unit or None),
                     (*UNITS, COUNTS))
     if written == COUNTS:
@@ -243,7 +246,8 @@ def _signal(key: str, name: str, body: object) -> SignalMap:
         si, factor = UNITS[written]
     if unit and si != unit:
         known = [text for text, (target, _) in UNITS.items() if target == unit]
-        raise ParameterError(f'{key}.unit: {written!r} given, but {name} is in {unit}; allowed is '
+        raise ParameterError(f'{key}.unit: {quoted(written)} given, but {name} is in {unit}; '
+                             'allowed is '
                              f'one of {", ".join((*known, COUNTS))}')
     own_time = entries.get('time_column')
     return SignalMap(

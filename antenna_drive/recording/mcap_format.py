@@ -644,6 +644,8 @@ def _read_storage(path: Path, storage: _Storage) -> None:
             raise _DamageError(f'{type(error).__name__} {one_line(error)}') from None
         if footer is None or file.read(1):
             raise _DamageError('something follows the end')
+        if footer.summary_start > size:
+            raise _DamageError('the summary begins behind the end')
         if footer.summary_start and footer.summary_crc:
             file.seek(footer.summary_start)
             if zlib.crc32(file.read(size - _FOOTER_TAIL - footer.summary_start)) \
@@ -727,8 +729,8 @@ def _files(path: Path) -> tuple[list[Path], dict[str, int] | None]:
         names = info['relative_file_paths']
         counts = {topic['topic_metadata']['name']: topic['message_count']
                   for topic in info['topics_with_message_count']}
-        names = [str(name) for name in names]
-        if not all(isinstance(n, str) and isinstance(c, int) for n, c in counts.items()):
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names) or (
+                not all(isinstance(n, str) and isinstance(c, int) for n, c in counts.items())):
             raise TypeError
     except (KeyError, TypeError, AttributeError):
         raise RecordingError(f'{path / METADATA}: no description of a bag') from None
@@ -741,11 +743,18 @@ def _files(path: Path) -> tuple[list[Path], dict[str, int] | None]:
     files = []
     for name in names:
         file = path / name
-        if not file.resolve().is_relative_to(path.resolve()) or not name:
+        if not _lies_in(path, name):
             raise RecordingError(f'{path / METADATA}: the file {one_line(name, 60)} lies outside '
                                  'the bag')
         files.append(file)
     return files, counts
+
+
+def _lies_in(folder: Path, name: str) -> bool:
+    try:
+        return bool(name) and (folder / name).resolve().is_relative_to(folder.resolve())
+    except (ValueError, OSError):  # no name of a file: a null byte, half of a character, too long
+        return False
 
 
 def _check_counts(storage: _Storage, counts: dict[str, int] | None) -> None:

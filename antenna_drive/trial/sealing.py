@@ -140,7 +140,7 @@ def _read(path: Path, remedy: str) -> dict[str, Any]:
         content = json.loads(path.read_text(encoding='utf-8'))
     except FileNotFoundError:
         raise SealError(f'{path}: no such file; {remedy}') from None
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise SealError(f'{path}: cannot be read, {error}') from error
     if not isinstance(content, dict):
         raise SealError(f'{path}: not a JSON object; {remedy}')

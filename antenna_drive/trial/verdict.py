@@ -22,6 +22,8 @@ import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from antenna_drive.errors import one_line
+
 UNKNOWN, NONE = 'unknown', 'none'
 VERDICTS = ('no_gap', 'too_few_to_judge', 'explained', 'partly_explained', 'unknown_effect')
 LARGEST_SET = 5             # ids in a confusable set that is still informative
@@ -119,12 +121,12 @@ def read_verdict(path: Path) -> Verdict:
     """
     try:
         content = json.loads(path.read_text(encoding='utf-8'))
-    except (OSError, ValueError) as error:
-        raise VerdictError(f'{path}: {error}') from error
+    except (OSError, ValueError, RecursionError) as error:
+        raise VerdictError(f'{path}: {one_line(error, 300)}') from error
     try:
         return parse_verdict(content)
     except VerdictError as error:
-        raise VerdictError(f'{path}: {error}') from None
+        raise VerdictError(f'{path}: {one_line(error, 300)}') from None
 
 
 def parse_verdict(content: Any) -> Verdict:

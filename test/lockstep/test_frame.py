@@ -15,8 +15,10 @@
 
 from __future__ import annotations
 
+import struct
+
 from antenna_drive.emulator.unit import Signal
-from antenna_drive.lockstep.frame import all_finite, FrameLayout
+from antenna_drive.lockstep.frame import all_finite, FrameLayout, read_foreign
 from hypothesis import given, settings, strategies as st
 import numpy as np
 import pytest
@@ -63,6 +65,36 @@ def test_rclpy_reads_our_bytes(layout: FrameLayout, run: int) -> None:
     [dimension] = message.layout.dim
     assert dimension.size == dimension.stride == layout.length
     assert len(dimension.label.split(', ')) == layout.length
+
+
+@settings(deadline=None)
+@given(st.lists(st.tuples(names, st.integers(0, 9), st.integers(0, 9)), max_size=3),
+       st.lists(st.floats(allow_nan=False), max_size=9))
+def test_a_foreign_layout_is_read_as_rclpy_writes_it(
+        dimensions: list[tuple[str, int, int]], numbers: list[float]) -> None:
+    serialization = pytest.importorskip('rclpy.serialization', reason='rclpy is not installed')
+    messages = pytest.importorskip('std_msgs.msg', reason='std_msgs is not installed')
+    message = messages.Float64MultiArray(data=numbers)
+    message.layout.dim = [messages.MultiArrayDimension(label=label, size=size, stride=stride)
+                          for label, size, stride in dimensions]
+    assert read_foreign(serialization.serialize_message(message)) == tuple(numbers)
+
+
+def test_the_other_byte_order_is_read() -> None:
+    # no dimensions, offset 0, two numbers; big-endian
+    body = struct.pack('>III4x2d', 0, 0, 2, 1.5, -3.0)
+    assert read_foreign(b'\0\0\0\0' + body) == (1.5, -3.0)
+
+
+@given(st.binary(max_size=200), st.sampled_from([b'', b'\0\0\0\0', b'\0\1\0\0']))
+def test_garbage_has_numbers_or_none(garbage: bytes, head: bytes) -> None:
+    assert isinstance(read_foreign(head + garbage), tuple)
+
+
+def test_a_count_of_billions_is_refused_at_once() -> None:
+    for body in (struct.pack('<I', 2**32 - 1), struct.pack('<III', 0, 0, 2**32 - 1),
+                 struct.pack('<II', 1, 2**32 - 1)):
+        assert read_foreign(b'\0\1\0\0' + body + bytes(64)) in ((), (0.0,) * 8)
 
 
 def test_the_labels_name_every_number_with_its_unit() -> None:

@@ -339,6 +339,18 @@ def test_the_warning_says_up_to_where(tmp_path: Path) -> None:
         read_bag(tmp_path / 'run', partial=True)
 
 
+@pytest.mark.parametrize('start', [2**63, 2**64 - 1])
+def test_a_summary_behind_the_end_is_damage(start: int, tmp_path: Path) -> None:
+    write_bag(some_recording(100), tmp_path / 'run')
+    file = tmp_path / 'run' / 'run_0.mcap'
+    content = bytearray(file.read_bytes())
+    at = len(content) - 8 - 20  # the footer's three numbers, and the magic at the end
+    content[at:at + 8] = start.to_bytes(8, 'little')
+    file.write_bytes(content)
+    with pytest.raises(RecordingError, match='behind the end'):
+        read_bag(tmp_path / 'run')
+
+
 def rewrite(path: Path, **changes: object) -> None:
     tree = yaml.safe_load(path.read_text())
     tree['rosbag2_bagfile_information'].update(changes)
@@ -348,6 +360,10 @@ def rewrite(path: Path, **changes: object) -> None:
 @pytest.mark.parametrize(('changes', 'words'), [
     ({'storage_identifier': 'sqlite3'}, "storage 'sqlite3'.*ros2 bag convert"),
     ({'compression_mode': 'file'}, "compressed by 'file'"),
+    ({'relative_file_paths': 'x' * 100_000}, 'no description of a bag'),
+    ({'relative_file_paths': [list(range(1000))]}, 'no description of a bag'),
+    ({'relative_file_paths': ['run\0.mcap']}, 'lies outside the bag'),
+    ({'relative_file_paths': ['\ud800']}, 'lies outside the bag'),
     ({'relative_file_paths': ['../other.mcap']}, 'lies outside the bag'),
     ({'relative_file_paths': ['gone.mcap']}, 'gone.mcap: No such file'),
     ({'relative_file_paths': 3}, 'no description of a bag'),

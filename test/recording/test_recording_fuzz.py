@@ -21,12 +21,13 @@ cases of each kind, the slow one thousands; the seeds are fixed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 import random
 from typing import Any
 import warnings
 
+from antenna_drive.campaign.mutating import mutations, POISON
 from antenna_drive.errors import UserError
 from antenna_drive.recording.csv_format import read_csv, write_csv
 from antenna_drive.recording.import_map import import_csv, load_map
@@ -53,11 +54,6 @@ signals:
   rate_command_rad_s: {column: r, unit: deg/s, sign: -1}
   plant/encoder: {column: e, unit: counts, counts_per_revolution: 4096, clock_offset_s: 0.1}
 """
-# what tends to hurt readers of text
-POISON = [b'\x00', b'\xff', b'"', b"'", b',', b'\n', b'\r', b'nan', b'inf', b'1e999', b'-', b'{',
-          b'}', b'[', b']', b':', b'&a ', b'*a', b'!!python/name:os.system ', b'\xef\xbb\xbf',
-          b'9' * 400, b'2026-99-99', b'0x1', b'1_000', b'\t', b'#', b'%', b'? ', b'- ', b'|\n',
-          '\u0661\u2028\x85'.encode(), b'\xed\xa0\x80', b'12:30:45', b'<<: ', b'~', b'.e', b'=']
 
 
 def one_recording() -> Recording:
@@ -68,35 +64,6 @@ def one_recording() -> Recording:
             'test_signal/rate_command', 'motor_1/current', 'plant/encoder')},
         configuration={'axis': {'gear_ratio': 14868.0}}, notes={'source': 'fuzz'},
         sheet=parse_sheet({'circuit': 'new'}))
-
-
-def mutations(content: bytes, count: int, seed: int) -> Iterator[bytes]:
-    """Yield damaged versions: cut, flipped, zeroed, doubled, left out, inserted, or shuffled."""
-    rng = random.Random(seed)
-    for _ in range(count):
-        data = bytearray(content)
-        for _ in range(rng.choice([1, 1, 1, 2, 5])):
-            place = rng.randrange(len(data) + 1)
-            length = min(rng.choice([1, 1, 4, 8, 43, 400]), len(data) - place)
-            kind = rng.randrange(7)
-            if kind == 0:
-                del data[place:]
-            elif kind == 1 and length:
-                data[rng.randrange(place, place + length)] ^= 1 << rng.randrange(8)
-            elif kind == 2:
-                data[place:place + length] = bytes(length)
-            elif kind == 3:
-                data[place:place] = data[place:place + length]
-            elif kind == 4:
-                del data[place:place + length]
-            elif kind == 5:
-                data[place:place + length] = rng.randbytes(length)
-            else:
-                data[place:place] = rng.choice(POISON)
-            if not data:
-                break
-        if bytes(data) != content:
-            yield bytes(data)
 
 
 def outcome(read: Callable[[], Any], path: Path) -> Any:

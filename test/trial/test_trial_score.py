@@ -33,7 +33,7 @@ from antenna_drive.trial.scorecard import (
 )
 from antenna_drive.trial.sheet import CaseSheet
 from antenna_drive.trial.sizes import size_of
-from antenna_drive.trial.verdict import parse_verdict, Verdict, VerdictError
+from antenna_drive.trial.verdict import parse_verdict, read_verdict, Verdict, VerdictError
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
@@ -423,6 +423,21 @@ def test_command_refuses_a_picture_of_unknown_kind(scored_trial: Path,
     pytest.importorskip('matplotlib')
     assert main(['score', str(scored_trial), '--picture', str(scored_trial / 'x.abc')]) == 2
     assert 'x.abc' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('text', ['[' * 100_000, f'{{"verdict": "{"x" * 100_000}"}}'])
+def test_verdict_that_cannot_be_read_is_refused_in_a_line(text: str, tmp_path: Path) -> None:
+    path = tmp_path / 'verdict.json'
+    path.write_text(text)
+    with pytest.raises(VerdictError, match='verdict.json') as caught:
+        read_verdict(path)
+    assert len(str(caught.value)) < 600
+
+
+def test_manifest_nested_too_deeply_is_refused(tmp_path: Path) -> None:
+    (tmp_path / sealing.MANIFEST).write_text('[' * 100_000)
+    with pytest.raises(sealing.SealError, match='cannot be read'):
+        sealing.read_manifest(tmp_path)
 
 
 def test_command_without_verdicts_says_no(tmp_path: Path) -> None:

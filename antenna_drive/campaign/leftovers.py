@@ -1,0 +1,71 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Processes that a trial has started and left behind."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import signal
+import time
+
+# Set by the campaign for a trial; whatever the trial starts inherits it.
+TOKEN = 'ANTENNA_DRIVE_CAMPAIGN'
+
+
+def alive(token: str) -> list[int]:
+    """Return the processes with a token in their environment, without this one and zombies."""
+    wanted = f'{TOKEN}={token}'.encode()
+    found = []
+    for folder in Path('/proc').iterdir():
+        if folder.name.isdigit() and int(folder.name) != os.getpid():
+            try:
+                if wanted in (folder / 'environ').read_bytes().split(b'\0') and _runs(folder):
+                    found.append(int(folder.name))
+            except OSError:
+                continue
+    return found
+
+
+def _runs(folder: Path) -> bool:
+    return (folder / 'stat').read_text().rpartition(')')[2].split()[0] not in 'ZX'
+
+
+def wait_for_none(token: str, patience_s: float) -> list[int]:
+    """Return the processes with a token that are still there after a while."""
+    deadline = time.monotonic() + patience_s
+    while (found := alive(token)) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    return found
+
+
+def describe(pids: list[int]) -> list[str]:
+    """Return the command line of each process."""
+    lines = []
+    for pid in pids:
+        try:
+            words = Path(f'/proc/{pid}/cmdline').read_bytes().split(b'\0')
+            lines.append(f'{pid}: ' + b' '.join(words).decode(errors='replace')[:300])
+        except OSError:
+            continue
+    return lines
+
+
+def end(pids: list[int]) -> None:
+    """End processes at once."""
+    for pid in pids:
+        try:
+            os.kill(pid, signal.SIGKILL)
+        except ProcessLookupError:
+            continue

@@ -1,0 +1,52 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Listen for a drive for some seconds, and say as JSON which nodes and how many frames were seen.
+
+  python -m antenna_drive.campaign.listener SECONDS
+
+Unlike our own programs it sets nothing: who is seen is for the environment to decide.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+
+from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
+from antenna_drive.lockstep.frame import FrameLayout
+from antenna_drive.lockstep.ros_link import FrameLink
+import rclpy
+from rclpy.node import Node
+
+
+def main(arguments: list[str]) -> int:
+    """Listen."""
+    rclpy.init()
+    node = Node('listener')
+    link = FrameLink(node, {TEST_SIGNAL: FrameLayout(OUTPUTS[TEST_SIGNAL])})
+    frames, nodes = 0, set()
+    deadline = time.monotonic() + float(arguments[0])
+    while time.monotonic() < deadline:
+        link.wait([TEST_SIGNAL], 0.2)
+        while link.take(TEST_SIGNAL) is not None:
+            frames += 1
+        nodes.update(node.get_node_names())
+    print(json.dumps({'nodes': sorted(nodes), 'frames': frames}))
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,142 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Does the trials of a campaign one after the other, each in a process of its own.
+
+Each outcome is a line of OUT/outcomes.jsonl. A campaign that is started again with the same OUT
+leaves out the trials that are there already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+import json
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from typing import Any
+
+from antenna_drive.campaign import leftovers
+from antenna_drive.campaign.domains import DomainClaim
+from antenna_drive.campaign.trials import Outcome, Trial
+from antenna_drive.errors import UserError
+
+OUTCOMES, SETTINGS = 'outcomes.jsonl', 'campaign.json'
+# How long what a trial has started may take to end with it [s].
+END_S = 8.0
+
+
+class Campaign:
+    """
+    A campaign and its folder.
+
+    Attributes
+    ----------
+    outcomes : what is done, by the id of the trial
+
+    """
+
+    def __init__(self, folder: Path, settings: dict[str, Any]) -> None:
+        """
+        Open a folder, or make it.
+
+        Raises
+        ------
+        UserError : the folder holds a campaign of other settings, or cannot be written
+
+        """
+        self.folder = folder
+        self.settings = settings
+        self.outcomes: dict[str, dict[str, Any]] = {}
+        path = folder / SETTINGS
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            if not path.exists():
+                path.write_text(json.dumps(settings) + '\n', encoding='utf-8')
+            known = json.loads(path.read_text(encoding='utf-8'))
+        except OSError as error:
+            raise UserError(f'{folder}: cannot be written, {error.strerror}') from error
+        except (ValueError, RecursionError) as error:
+            raise UserError(f'{path}: no JSON, {error}; choose another folder') from None
+        if known != settings:
+            raise UserError(f'{folder}: holds a campaign with {json.dumps(known)}; continue it '
+                            'with these settings, or choose another folder')
+        log = folder / OUTCOMES
+        for line in log.read_text(encoding='utf-8').splitlines() if log.exists() else ():
+            try:
+                entry = json.loads(line)
+                self.outcomes[entry['id']] = entry
+            except (ValueError, KeyError, TypeError):
+                continue  # cut short when the campaign was interrupted: the trial is done again
+
+    def do(self, trials: Sequence[Trial], told: Callable[[Trial, dict[str, Any]], None]) -> None:
+        """Do the trials that are not done, and tell of each."""
+        for trial in trials:
+            if trial.label in self.outcomes:
+                continue
+            entry = self.one(trial)
+            self.outcomes[trial.label] = entry
+            with (self.folder / OUTCOMES).open('a', encoding='utf-8') as log:
+                # a line of its own, whatever an interruption has left
+                log.write(('\n' if log.tell() else '') + json.dumps(entry))
+            told(trial, entry)
+
+    def one(self, trial: Trial) -> dict[str, Any]:
+        """Do one trial; return its outcome with its id, seed, options, load and duration."""
+        seed = trial.seed(self.settings['seed'])
+        token = f'{os.getpid()}-{time.time_ns()}'
+        began = time.monotonic()
+        with DomainClaim() as domain, tempfile.TemporaryDirectory() as folder:
+            target = Path(folder, 'outcome.json')
+            process = subprocess.Popen(
+                [sys.executable, '-W', 'ignore', '-m', 'antenna_drive.campaign', trial.part,
+                 trial.name, str(seed), json.dumps(dict(trial.options)), str(target)],
+                env={**os.environ, leftovers.TOKEN: token, 'ROS_DOMAIN_ID': str(domain.number)},
+                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+                start_new_session=True)
+            outcome = Outcome()
+            try:
+                _, said = process.communicate(timeout=trial.patience_s)
+                outcome = _read(target, process.returncode, said)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.communicate()
+                outcome.find(f'the trial does not end within {trial.patience_s:g} s', 'hangs')
+            finally:
+                if process.poll() is None:
+                    process.send_signal(signal.SIGTERM)
+                left = leftovers.wait_for_none(token, END_S)
+                described = leftovers.describe(left)
+                leftovers.end(left)
+            for line in described:
+                outcome.find(f'a process is left: {line}', 'orphans')
+        return {'id': trial.label, 'seed': seed, 'options': dict(trial.options),
+                'wall_s': round(time.monotonic() - began, 1),
+                'load': round(os.getloadavg()[0], 1), 'counts': outcome.counts,
+                'figures': outcome.figures, 'findings': outcome.findings,
+                'skipped': outcome.skipped}
+
+
+def _read(target: Path, code: int, said: bytes) -> Outcome:
+    try:
+        return Outcome(**json.loads(target.read_text(encoding='utf-8')))
+    except (OSError, ValueError):
+        outcome = Outcome()
+        outcome.find(f'the trial ended with {code} without an outcome', 'tracebacks',
+                     said=said.decode(errors='replace')[-3000:])
+        return outcome
