@@ -72,6 +72,7 @@ COMMANDS = {
     'plot': Command('plot', 'draw the signals of a recording'),
     'report': Command('report', 'write a self-contained page about a recording'),
     'diagnose': Command('diagnose', 'say where a real drive and the model part, and why'),
+    'check-model': Command('check_model', 'tell what is wrong with a model of your own machine'),
     'predict': Command('predict', 'predict a recording that the diagnosis has not seen'),
     'trial': Command('trial', 'make sealed test cases with an independent antenna'),
     'score': Command('score', 'score the verdicts of a trial against its truths'),
