@@ -138,3 +138,31 @@ def rate_after(step: float, rate: float, torque: float, level: float, drag: floa
     impulse = step * level / inertia
     free = max(free - impulse, 0.0) if free > 0.0 else min(free + impulse, 0.0)
     return free / (1.0 + 0.5 * step * drag / inertia)
+
+
+@inner
+def presliding(share: float, rate: float, distance: float, step: float) -> float:
+    """
+    Return the share of the friction level that acts after a step, from -1 to 1 (Dahl's model).
+
+    After a reversal friction builds up over a distance. Apply level * share as a torque against
+    the motion, and no level in `rate_after`: the contact is a spring before it slides.
+
+    Parameters
+    ----------
+    share
+        before the step
+    rate
+        of the body in it [rad/s]
+    distance
+        over which friction builds up [rad]; 0 for at once
+    step
+        [s]
+
+    """
+    if rate == 0.0:
+        return share
+    side = math.copysign(1.0, rate)
+    if distance <= 0.0:
+        return side
+    return side + (share - side) * math.exp(-abs(rate) * step / distance)

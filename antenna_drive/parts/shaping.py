@@ -22,7 +22,8 @@ from antenna_drive.physics.compiling import inner, shared
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ['dead_zone', 'held', 'lagged', 'limited', 'rate_limited', 'soft_limited']
+__all__ = ['dead_zone', 'held', 'lagged', 'lagged_mean', 'limited', 'rate_limited',
+           'soft_limited']
 
 
 @inner
@@ -77,6 +78,22 @@ def lagged(value: float, source: float, time_constant: float, step: float) -> fl
     if time_constant <= 0.0:
         return source
     return source + (value - source) * math.exp(-step / time_constant)
+
+
+@inner
+def lagged_mean(value: float, source: float, time_constant: float,
+                step: float) -> tuple[float, float]:
+    """
+    Return the mean output of a first-order lag over a step, and its output at the end of it.
+
+    A machine that is driven by the mean feels a lag far below the step, too, so that a fit can
+    begin without any. Arguments are those of `lagged`.
+    """
+    if time_constant <= 0.0:
+        return source, source
+    fall = math.exp(-step / time_constant)
+    return (source + (value - source) * time_constant / step * (1.0 - fall),
+            source + (value - source) * fall)
 
 
 @shared

@@ -19,8 +19,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from antenna_drive.machines.own import (
-    check_model, effect, free, known, Log, LogError, machine, ModelError, OneTest, push,
-    reading, size, within,
+    check_model, effect, free, known, Log, LogError, machine, ModelError, OneTest, push, reading,
+    size, within,
 )
 import numpy as np
 from own.swing import log_of, logs, simulate, swing, TIME

@@ -98,3 +98,24 @@ def test_drag_that_thins_is_a_power_of_the_rate() -> None:
     law = Friction(viscous=3.0, thinning=1.0 / 3.0, thinning_rate=0.1)
     torques = [rate * levels(law, rate, 0.0, 0.0)[1] for rate in (0.1, 0.8)]
     assert torques == pytest.approx([0.3, 1.2])
+
+
+@compiled
+def built_up(distance: float, rate: float, step: float, shares: NDArray[np.float64]) -> None:
+    share = -1.0
+    for k in range(shares.size):
+        share = friction.presliding(share, rate, distance, step)
+        shares[k] = share
+
+
+def test_friction_builds_up_over_a_distance_after_a_reversal() -> None:
+    """Dahl: share = 1 - 2 exp(-x / distance), whatever the rate."""
+    for rate, step in ((0.5, 1e-3), (0.05, 1e-2)):
+        shares = np.empty(200)
+        built_up(0.02, rate, step, shares)
+        way = rate * step * np.arange(1, 201)
+        assert shares == pytest.approx(1.0 - 2.0 * np.exp(-way / 0.02), abs=1e-12)
+    built_up(0.0, 0.5, 1e-3, shares)
+    assert np.all(shares == 1.0)
+    built_up(0.02, 0.0, 1e-3, shares)
+    assert np.all(shares == -1.0)

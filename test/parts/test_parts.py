@@ -94,6 +94,20 @@ def test_a_lag_is_an_exponential_and_a_rate_limit_a_ramp() -> None:
     assert slew == pytest.approx(np.minimum(2.0 * time, 1.0), abs=1e-12)
 
 
+def test_the_mean_of_a_lag_is_its_integral_over_the_step() -> None:
+    @compiled
+    def over(time_constant: float) -> tuple[float, float]:
+        return shaping.lagged_mean(3.0, 1.0, time_constant, 0.5)
+
+    time = (np.arange(100_000) + 0.5) * 5e-6
+    mean, end = over(0.2)
+    assert mean == pytest.approx(np.mean(1.0 + 2.0 * np.exp(-time / 0.2)), rel=1e-9)
+    assert end == pytest.approx(1.0 + 2.0 * math.exp(-2.5))
+    # a lag far below the step still delays by its time: 2 tau / h
+    assert over(1e-6)[0] == pytest.approx(1.0 + 2.0 * 1e-6 / 0.5, abs=1e-12)
+    assert over(0.0) == (1.0, 1.0)
+
+
 @compiled
 def shaped(value: float) -> tuple[float, float, float, float]:
     return (shaping.limited(value, 2.0), shaping.dead_zone(value, 0.5),

@@ -27,10 +27,12 @@ from antenna_drive.machines.own.loading import load_model
 from antenna_drive.machines.own.log import Log, LogError, OneTest, read_log, read_logs
 from antenna_drive.machines.own.machine import OwnMachine
 from antenna_drive.machines.own.named_numbers import Numbers
+from antenna_drive.machines.own.unseen import Unseen, unseen
 
 __all__ = [
     'check_model', 'Checked', 'diagnose_logs', 'effect', 'form', 'free', 'known', 'load_model',
     'Log', 'LogError', 'machine', 'Model', 'ModelError', 'Numbers', 'OneTest', 'OwnMachine',
     'push', 'pushes_found', 'reading', 'read_log',
-    'read_logs', 'ripple', 'shape', 'size', 'summary_of', 'within',
+    'read_logs', 'ripple', 'shape', 'size', 'summary_of', 'Unseen', 'unseen',
+    'within',
 ]

@@ -139,6 +139,11 @@ def _rough_effects(machine: OwnMachine) -> Iterator[str]:
     for effect in machine.effects.values():
         form = effect.forms[0]
         for parameter in form.sizes:
+            if not any(_Response.at(machine, parameter, k, form.start).acts
+                       for k in _tests_of(machine, parameter)):
+                yield (f'{parameter.name}: a step of {parameter.step:g} {parameter.unit} from 0 '
+                       'changes no reading, and a search begins there; let it act from 0 on, or '
+                       'give a larger step=')
             # where the effect is there: at its edge many a law has a corner
             here = {**form.start, parameter.name: 0.25 * max(
                 parameter.low, parameter.high, key=abs)}
