@@ -92,6 +92,18 @@ def test_effects_and_pushes_that_do_nothing_are_told() -> None:
     assert "push wind: changes no reading; add test.push['wind'] where it enters" in told
 
 
+def test_an_effect_that_begins_to_act_beyond_its_first_step_is_remarked() -> None:
+    def late(numbers: Any, test: Any) -> Mapping[str, Any]:
+        found = simulate(numbers, test)
+        return {**found, 'angle': found['angle'] + max(numbers.late - 0.1, 0.0)}
+
+    checked = check_model(swing(simulate=late, effects=[
+        *swing().effects, effect('sensor.late', late=size(0.0, 1.0, 'rad'))]), logs())
+    assert checked.faults == []
+    assert any(line.startswith('sensor.late.late: a step of 0.001 rad from 0 changes no reading')
+               for line in checked.remarks)
+
+
 @pytest.mark.parametrize(('entries', 'message'), [
     ({'base': {'decay': 3.0}}, r'base: decay: 3.0 given, allowed is known\(\), within\(\)'),
     ({'base': {'start': known(1.0)}}, 'per_test: start: the name is there twice, in base too'),

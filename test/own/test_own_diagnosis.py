@@ -17,10 +17,10 @@ from __future__ import annotations
 
 from antenna_drive.diagnosis.page import contents
 from antenna_drive.errors import UserError
-from antenna_drive.machines.own import diagnose_logs, OwnMachine, summary_of
+from antenna_drive.machines.own import diagnose_logs, OwnMachine, summary_of, unseen
 from antenna_drive.pages import render
 import numpy as np
-from own.swing import logs, swing, TIME
+from own.swing import log_of, logs, NOISE, swing, TIME
 import pytest
 
 
@@ -69,6 +69,17 @@ def test_what_pushes_is_told_with_its_place_its_times_and_its_size() -> None:
             assert (item['from_s'], item['until_s']) == pytest.approx(edge, abs=0.05)
             assert item['size'] == pytest.approx(0.05, rel=0.15)
     assert 'far: wind on the swing 0.0' in summary_of(found)
+
+
+def test_a_log_that_was_not_used_is_predicted_to_the_noise_with_the_effect_only() -> None:
+    """A start that is the mean of the two that were fitted, and the same drift."""
+    found = diagnose_logs(swing(), logs({'drift': 0.01}))
+    error = unseen(found, log_of('new', 0.7, 5, {'drift': 0.01}))['angle']
+    assert error.unit == 'rad'
+    assert error.after == pytest.approx(NOISE, rel=0.2)
+    # a bias takes the mean of the drift, 0.01 t over 20 s; what it leaves is 0.2 / sqrt(12)
+    assert error.before == pytest.approx(0.2 / np.sqrt(12.0), rel=0.1)
+    assert error.configured > error.before
 
 
 def test_the_page_shows_the_models_own_parts_and_no_other_machine() -> None:

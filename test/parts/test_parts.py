@@ -57,6 +57,33 @@ def test_two_masses_on_a_shaft_swing_at_the_resonance_of_the_textbook() -> None:
     assert np.abs(twists - exact).max() < 2e-6
 
 
+def test_a_shaft_is_a_spring_and_a_damper_as_teeth_without_a_gap_are() -> None:
+    @compiled
+    def both(twist: float, rate: float) -> tuple[float, float]:
+        return (coupling.shaft_torque(twist, rate, 40.0, 0.3),
+                coupling.tooth_torque(twist, rate, 0.0, 40.0, 0.3))
+
+    for twist, rate in ((0.02, -5.0), (-0.01, 1.0), (0.0, 2.0)):
+        assert both(twist, rate) == pytest.approx((40.0 * twist + 0.3 * rate,) * 2)
+
+
+@pytest.mark.parametrize('stiffness', [30.0, 3e4])
+def test_the_steps_that_a_shaft_needs_keep_its_frequency_within_a_percent(
+        stiffness: float) -> None:
+    @compiled
+    def steps(span: float, stiffness: float) -> int:
+        return coupling.steps_for(span, stiffness, 0.0, 0.02, 0.05)
+
+    omega = math.sqrt(stiffness * (1.0 / 0.02 + 1.0 / 0.05))
+    span = 50.0 * 2.0 * math.pi / omega
+    count = steps(span, stiffness)
+    twists = np.empty(count)
+    two_masses(0.02, 0.05, 0.0, stiffness, 0.0, 1e-3, span / count, twists)
+    crossings = np.count_nonzero(np.diff(np.sign(twists)))
+    assert crossings == pytest.approx(100, abs=1)
+    assert np.abs(twists).max() < 1.2e-3
+
+
 def test_teeth_push_at_the_ends_of_the_gap_only() -> None:
     @compiled
     def torque(twist: float, rate: float) -> float:
