@@ -21,6 +21,7 @@ from antenna_drive.errors import UserError
 from antenna_drive.machines.own import load_model, read_log, read_logs
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 MAP = """
 time: {column: "T (ms)", unit: ms}
@@ -39,6 +40,27 @@ def test_a_plain_file_keeps_its_columns_and_its_gaps(tmp_path: Path) -> None:
     assert np.isnan(log.columns['x'][1])
     assert log['x'].tolist() == [1.0, 1.0, 5.0]  # an input is held
     assert log['y'].tolist() == [2.0, 3.0, 4.0]
+
+
+@pytest.mark.parametrize('suffix', ['.npz', '.mat'])
+def test_named_arrays_are_columns(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f'a{suffix}'
+    values = {'t': np.arange(5.0), 'x': np.arange(5), 'mass': np.array(2.0),
+              'note': np.array('free text')}
+    if suffix == '.npz':
+        np.savez(path, **values)  # type: ignore[arg-type]
+    else:
+        savemat(path, values)
+    log = read_log(path)
+    assert log.time.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert {name: column.tolist() for name, column in log.columns.items()} == {
+        'x': [0.0, 1.0, 2.0, 3.0, 4.0]}
+    (tmp_path / 'm.yaml').write_text(MAP)
+    with pytest.raises(UserError, match='a map is for text'):
+        read_logs([path], tmp_path / 'm.yaml')
+    path.write_bytes(b'no such file at all')
+    with pytest.raises(UserError, match=f'a{suffix}: '):
+        read_log(path)
 
 
 def test_a_map_names_columns_and_turns_units(tmp_path: Path) -> None:

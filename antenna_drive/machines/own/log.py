@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from zipfile import BadZipFile
 
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.errors import UserError
@@ -28,10 +29,13 @@ from antenna_drive.recording.import_map import import_csv, ImportMap, load_map
 from antenna_drive.recording.recording import NANOSECONDS
 from antenna_drive.recording.sheet import plain_value
 import numpy as np
+from scipy.io import loadmat
+from scipy.io.matlab import MatReadError
 
 _TIME = ('time_s', 'time', 't')
 _LEAST_SAMPLES = 2
 _CONSTANT = Entry('')
+_ARRAYS = ('.npz', '.mat')
 
 
 class LogError(UserError):
@@ -145,12 +149,13 @@ def beginning(log: Log, until: float) -> Log:
 
 def read_log(path: str | Path, import_map: ImportMap | None = None) -> Log:
     """
-    Read a CSV, and NAME.yaml beside it if it is there: constants and labels of the test.
+    Read a log, and NAME.yaml beside it if it is there: constants and labels of the test.
 
     Parameters
     ----------
     path
-        the file; without a map its columns keep their names, and time_s, time or t is the time
+        a CSV, or named arrays in a .npz of numpy or a .mat of MATLAB (not of version 7.3); without
+        a map its columns keep their names, and time_s, time or t is the time
     import_map
         which column is which, and how it is written
 
@@ -160,7 +165,12 @@ def read_log(path: str | Path, import_map: ImportMap | None = None) -> Log:
 
     """
     path = Path(path)
-    time, columns = _mapped(path, import_map) if import_map else _plain(path)
+    if path.suffix in _ARRAYS and import_map:
+        raise LogError(f'{path}: a map is for text; arrays of a {path.suffix} keep their names')
+    if path.suffix in _ARRAYS:
+        time, columns = _arrays(path)
+    else:
+        time, columns = _mapped(path, import_map) if import_map else _plain(path)
     constants, labels = _sheet(path.with_suffix('.yaml'))
     try:
         return Log(path.stem, time, columns, constants, labels)
@@ -201,11 +211,33 @@ def _plain(path: Path) -> tuple[FloatArray, dict[str, FloatArray]]:
             for name, values, text in zip(names, cells, row, strict=True):
                 text = text.strip()
                 values.append(parse_number(text, Cell(path, line, name)) if text else np.nan)
-    time = next((name for name in _TIME if name in names), '')
+    return _with_time(path, {
+        name: np.array(values) for name, values in zip(names, cells, strict=True)})
+
+
+def _arrays(path: Path) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Read the vectors of a file of named arrays; what is no vector of numbers is left out."""
+    try:
+        if path.suffix == '.npz':
+            with np.load(path, allow_pickle=False) as file:
+                found = {name: np.asarray(file[name]) for name in file.files}
+        else:
+            found = {name: np.asarray(values) for name, values in loadmat(path).items()
+                     if not name.startswith('__')}
+    except (ValueError, NotImplementedError, BadZipFile, EOFError, TypeError,
+            MatReadError) as error:
+        raise LogError(f'{path}: {error}') from None
+    return _with_time(path, {name: values.squeeze().astype(float)
+                             for name, values in found.items()
+                             if values.dtype.kind in 'biuf' and values.squeeze().ndim == 1})
+
+
+def _with_time(path: Path, columns: dict[str, FloatArray],
+               ) -> tuple[FloatArray, dict[str, FloatArray]]:
+    time = next((name for name in _TIME if name in columns), '')
     if not time:
-        raise LogError(f'{path}: no column {" or ".join(_TIME)}; with --map another column is '
-                       'the time')
-    columns = {name: np.array(values) for name, values in zip(names, cells, strict=True)}
+        raise LogError(f'{path}: no column {" or ".join(_TIME)}; with --map another column of a '
+                       'CSV is the time')
     return columns.pop(time), columns
 
 
