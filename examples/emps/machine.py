@@ -29,6 +29,9 @@ from antenna_drive.machines.own import (
 from antenna_drive.parts import compiled, friction, shaping, wave
 from antenna_drive.parts.friction import Friction
 import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 POSITION_GAIN, VELOCITY_GAIN = 160.18, 243.45    # of the loop [1/s], [V s/m]
 FORCE_PER_VOLT, VOLT_LIMIT = 35.15, 10.0         # of the drive [N/V], [V]
@@ -38,8 +41,10 @@ PARTS = 2                                        # steps of the integration in a
 
 
 @compiled
-def run(time, reference, added, force, mass, rubbing, slope, distance, offset, spring, rate, gain,
-        lag, ripple, out):
+def run(time: Array, reference: Array, added: Array, force: Array, mass: float,
+        rubbing: Friction, slope: float, distance: float, offset: float, spring: float,
+        rate: float, gain: float, lag: float, ripple: tuple[float, float, float],
+        out: Array) -> None:
     """Write the carriage's position at each sample [m] into `out`; all in SI units."""
     position, before, before_that = out[0], out[0] - 1e-3 * rate, out[0] - 2e-3 * rate
     end, bent = 0.0, 1.0
@@ -69,7 +74,7 @@ def run(time, reference, added, force, mass, rubbing, slope, distance, offset, s
         out[k + 1] = position
 
 
-def simulate(numbers: Numbers, test: OneTest) -> dict[str, np.ndarray]:
+def simulate(numbers: Numbers, test: OneTest) -> dict[str, Array]:
     """Return the position, had the machine these numbers."""
     n = numbers
     out = np.empty(test.time.size)

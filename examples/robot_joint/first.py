@@ -14,16 +14,21 @@
 """A first model of a robot joint: one stiff body in a position and a velocity loop."""
 
 from antenna_drive.machines.own import (
-    effect, free, known, machine as own_machine, push, reading, ripple, size, within,
+    effect, free, known, machine as own_machine, Numbers, OneTest, push, reading, ripple, size,
+    within,
 )
 from antenna_drive.parts import compiled, friction, loop, wave
 from antenna_drive.parts.friction import Friction
 from antenna_drive.parts.loop import Cascade
 import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 
 @compiled
-def run(time, reference, torque, cascade, rubbing, constant, inertia, ripple, out):
+def run(time: Array, reference: Array, torque: Array, cascade: Cascade, rubbing: Friction,
+        constant: float, inertia: float, ripple: tuple[float, float, float], out: Array) -> None:
     """Write angle [rad] and current [A] at each sample into `out`."""
     angle, rate, integral = out[0, 0], 0.0, 0.0
     for k in range(time.size):
@@ -40,7 +45,7 @@ def run(time, reference, torque, cascade, rubbing, constant, inertia, ripple, ou
             angle += h * rate
 
 
-def simulate(n, test):
+def simulate(n: Numbers, test: OneTest) -> dict[str, Array]:
     """Return the readings, had the joint these numbers."""
     out = np.zeros((test.time.size, 2))
     out[0, 0] = test['motor_rad'][0]

@@ -16,19 +16,24 @@
 import math
 
 from antenna_drive.machines.own import (
-    effect, free, known, machine as own_machine, push, reading, ripple, size, within,
+    effect, free, known, machine as own_machine, Numbers, OneTest, push, reading, ripple, size,
+    within,
 )
 from antenna_drive.parts import compiled, coupling, friction, loop, shaping, wave
 from antenna_drive.parts.friction import Friction
 from antenna_drive.parts.loop import Cascade
 import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 TEETH = 1e-3    # compliance of a gearbox in good order [rad/(N m)]
 
 
 @compiled
-def run(time, reference, push, cascade, rubbing, constant, motor, load, compliance, half_gap,
-        delay, ripple, out):
+def run(time: Array, reference: Array, push: Array, cascade: Cascade, rubbing: Friction,
+        constant: float, motor: float, load: float, compliance: float, half_gap: float,
+        delay: float, ripple: tuple[float, float, float], out: Array) -> None:
     """Write motor angle [rad] and current [A] at each sample into `out`."""
     q = ql = out[0, 0]
     w = wl = integral = 0.0
@@ -53,7 +58,7 @@ def run(time, reference, push, cascade, rubbing, constant, motor, load, complian
             ql += h * wl
 
 
-def simulate(n, test):
+def simulate(n: Numbers, test: OneTest) -> dict[str, Array]:
     """Return the readings, had the joint these numbers."""
     out = np.zeros((test.time.size, 2))
     out[0, 0] = n.start

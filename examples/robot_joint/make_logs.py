@@ -28,8 +28,9 @@ from pathlib import Path
 import sys
 
 import numpy as np
+from numpy.typing import NDArray
 
-FAULTS = {
+FAULTS: dict[str, dict[str, float]] = {
     'nothing': {}, 'compliance': {'compliance': 0.3}, 'backlash': {'half_gap': 0.04},
     'asymmetry': {'asymmetry': 0.25}, 'ripple': {'ripple': 0.02}, 'delay': {'delay': 0.004},
     'push': {'push': 0.06},
@@ -50,7 +51,7 @@ def sweep(t: float) -> float:
 
 
 def log_of(reference: Callable[[float], float], fault: dict[str, float],
-           seed: int) -> np.ndarray:
+           seed: int) -> NDArray[np.float64]:
     """Return time, reference, motor angle and current of a test, shape (n, 4)."""
     random = np.random.default_rng(seed)
     half_gap = fault.get('half_gap', 0.0)
@@ -75,7 +76,7 @@ def log_of(reference: Callable[[float], float], fault: dict[str, float],
         rubbing = max(min(torque, level), -level) if at_rest else math.copysign(level, w)
         return w, (torque - rubbing) / MOTOR, wl, (shaft + outside) / LOAD
 
-    y = (0.0, 0.0, 0.0, 0.0)
+    y: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
     integral, rows, h = 0.0, [], STEP / PARTS
     for k in range(round(DURATION / STEP)):
         t = k * STEP
