@@ -23,9 +23,13 @@ For example:
   antenna-drive diagnose field.csv
   antenna-drive diagnose rec_a.csv rec_b.csv rec_c.csv --config my_drive.yaml \
       --json verdict.json --report verdict.html --corrected corrected.yaml
+  antenna-drive diagnose --model my_machine.py:machine logs/*.csv --map map.yaml
 
 --corrected writes a configuration with the effects and the tolerances in it, as fitted;
 `antenna-drive predict` shows how well it predicts a recording that was not used here.
+
+--model diagnoses a machine of your own, see docs/own-machine.md; `antenna-drive check-model` tells
+beforehand what is wrong with it.
 """
 
 from __future__ import annotations
@@ -44,13 +48,17 @@ from antenna_drive.parameters.schema import Entry
 from antenna_drive.recording.files import read_recording
 
 if TYPE_CHECKING:
-    from antenna_drive.diagnosis import Settings
+    from antenna_drive.diagnosis import Diagnosis, Settings
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     parser.add_argument('recordings', nargs='+', metavar='RECORDING',
                         help='recordings of one machine: .csv, or bags (folder or .mcap)')
+    parser.add_argument('--model', metavar='FILE.py:NAME',
+                        help='diagnose a machine of your own, in the place of the drive')
+    parser.add_argument('--map', type=Path, metavar='MAP.yaml',
+                        help='with --model: which column is which, and how it is written')
     parser.add_argument('--config', action='append', default=[], metavar='FILE',
                         help='configuration of the model, a file or the name of a set in '
                              'config/; may be given several times (default: reference)')
@@ -71,11 +79,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose, and write what was asked for; 0 whatever the verdict."""
+    check_options(arguments, jobs=Entry('', 1, whole=True))
+    if arguments.model:
+        return _own_machine(arguments)
+    if arguments.map:
+        raise UserError('--map: goes with --model; antenna-drive import --map makes a recording '
+                        'of the drive')
     # the compiled physics takes a while to load: not before it is needed
     from antenna_drive.machines.antenna.diagnose import corrected, diagnose_recordings
     from antenna_drive.parameters.loading import load
 
-    check_options(arguments, jobs=Entry('', 1, whole=True))
     drive = load(*arguments.config)
     settings = _settings(arguments.threshold)
     limits = dict(_numbers('--matters', arguments.matters))
@@ -91,11 +104,7 @@ def run(arguments: argparse.Namespace) -> int:
             recordings, drive, lambda share, doing: progress.update(share), arguments.jobs,
             settings, arguments.without, limits)
     correction = corrected(drive, diagnosis)
-    if arguments.report:
-        from antenna_drive.diagnosis.page import contents
-        from antenna_drive.pages import render
-        with replaced(Path(arguments.report)) as stream:
-            stream.write(render('verdict.html', **vars(contents(diagnosis))).encode())
+    _report(arguments.report, diagnosis)
     lines = [diagnosis.summary()]
     if arguments.corrected:
         with replaced(arguments.corrected) as stream:
@@ -108,6 +117,35 @@ def run(arguments: argparse.Namespace) -> int:
     give({**diagnosis.result, 'recorder': list(correction.recorder)}, arguments.json,
          '\n'.join(lines))
     return 0
+
+
+def _own_machine(arguments: argparse.Namespace) -> int:
+    """Diagnose a machine of the user's own."""
+    from antenna_drive.machines.own import diagnose_logs, load_model, read_logs, summary_of
+
+    for option in ('config', 'corrected'):
+        if getattr(arguments, option):
+            raise UserError(f'--{option}: does not go with --model')
+    model = load_model(arguments.model)
+    with warnings_in_one_line():
+        logs = read_logs(arguments.recordings, arguments.map)
+    with Progress('diagnosis', 1.0) as progress:
+        diagnosis = diagnose_logs(
+            model, logs, lambda share, doing: progress.update(share), arguments.jobs,
+            _settings(arguments.threshold), arguments.without,
+            dict(_numbers('--matters', arguments.matters)))
+    _report(arguments.report, diagnosis)
+    give(diagnosis.result, arguments.json, summary_of(diagnosis))
+    return 0
+
+
+def _report(path: str | None, diagnosis: Diagnosis) -> None:
+    """Write the page about a diagnosis, if one was asked for."""
+    if path:
+        from antenna_drive.diagnosis.page import contents
+        from antenna_drive.pages import render
+        with replaced(Path(path)) as stream:
+            stream.write(render('verdict.html', **vars(contents(diagnosis))).encode())
 
 
 def _numbers(option: str, texts: Sequence[str]) -> Iterator[tuple[str, float]]:

@@ -31,11 +31,12 @@ from antenna_drive.diagnosis.machine import (
 from antenna_drive.diagnosis.motion import Motion
 from antenna_drive.diagnosis.ranking import rank_hypotheses, Ranking
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
+from antenna_drive.diagnosis.unknown_input import courses
 
 __all__ = [
-    'check_machine', 'Colour', 'Confusability', 'confusability', 'Course', 'DEFAULT', 'diagnose',
-    'Diagnosis', 'Diagram', 'DiagramBlock', 'DisturbanceInput', 'Effect', 'Evidence', 'Experiment',
-    'FloatArray', 'Form', 'Hypothesis', 'idle_effects', 'LeastSquares', 'Machine', 'MachineError',
-    'Motion', 'Parameter', 'Point', 'Progress', 'rank_hypotheses', 'Ranking', 'Regimes',
-    'Settings', 'TimeScales',
+    'check_machine', 'Colour', 'Confusability', 'confusability', 'Course', 'courses', 'DEFAULT',
+    'diagnose', 'Diagnosis', 'Diagram', 'DiagramBlock', 'DisturbanceInput', 'Effect', 'Evidence',
+    'Experiment', 'FloatArray', 'Form', 'Hypothesis', 'idle_effects', 'LeastSquares', 'Machine',
+    'MachineError', 'Motion', 'Parameter', 'Point', 'Progress', 'rank_hypotheses', 'Ranking',
+    'Regimes', 'Settings', 'TimeScales',
 ]

@@ -32,7 +32,9 @@ from dataclasses import dataclass
 from functools import partial
 
 from antenna_drive.diagnosis.least_squares import LeastSquares, prior_precision
-from antenna_drive.diagnosis.machine import Experiment, FloatArray, TimeScales
+from antenna_drive.diagnosis.machine import (
+    DisturbanceInput, Experiment, FloatArray, TimeScales,
+)
 from antenna_drive.diagnosis.noise import whitened
 import numpy as np
 from scipy import linalg
@@ -73,34 +75,71 @@ def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
         the nuisances as fitted without any effect
 
     """
-    here = dict(point)
-    machine = problem.machine
-    scales = machine.time_scales
-    residual = problem.residuals(here)
-    level = max(problem.noise_level(residual), 1e-9)
-    bound = problem.settings.localisation.downweighted * level
-    weight = np.where(problem.valid, np.minimum(
-        1.0, bound / np.maximum(np.abs(residual), 1e-12)), 0.0) / level ** 2
-    nuisances = problem.jacobian(here, machine.nuisances, residual, central=False).astype(float)
-    evidence = _Evidence(residual, weight, nuisances, prior_precision(machine.nuisances))
+    evidence = _Evidence.at(problem, point)
     found = []
-    for place in machine.disturbance_inputs:
-        responses: list[list[FloatArray]] = [[] for _ in problem.experiments]
-        for shift in np.arange(0.0, scales.response_s - 0.5 * scales.pulse_s, scales.pulse_s):
-            disturbed = machine.simulate_disturbed(
-                here, place, partial(_comb, shift=float(shift), scales=scales))
-            for k, experiment in enumerate(problem.experiments):
-                rows = problem.rows(k)
-                change = (residual[rows] - problem.standardised(k, disturbed[k])).reshape(
-                    experiment.measured.shape)
-                responses[k] += _responses(experiment, change, float(shift), scales)
-        found.append(Place(place.name, place.component, *evidence.judged(
-            [np.array(columns).T for columns in responses], problem)))
+    for place in problem.machine.disturbance_inputs:
+        responses, _ = _columns(problem, point, place, evidence.residual)
+        found.append(Place(place.name, place.component, *evidence.judged(responses, problem)))
+    scales = problem.machine.time_scales
     for c, channel in enumerate(problem.experiments[0].channels):
         found.append(Place(f'reading of {channel}', channel, *evidence.judged(
             [_pulses_of_reading(experiment, c, scales) for experiment in problem.experiments],
             problem)))
     return sorted(found, key=lambda place: -place.evidence)
+
+
+def courses(problem: LeastSquares, point: Mapping[str, float],
+            place: DisturbanceInput) -> list[tuple[FloatArray, FloatArray]]:
+    """
+    Return what would have to enter at a place to explain a gap, over time.
+
+    Parameters
+    ----------
+    problem
+        the machine in its experiments
+    point
+        the nuisances as fitted without any effect
+    place
+        one of the machine's disturbance inputs
+
+    Returns
+    -------
+    for each experiment times, shape (m,) [s], and the likeliest values at them, shape (m,), with
+    straight lines between, in the unit of the machine's `simulate_disturbed`
+
+    """
+    evidence = _Evidence.at(problem, point)
+    responses, times = _columns(problem, point, place, evidence.residual)
+    heights = evidence.heights(responses, problem)
+    found, first = [], 0
+    for moments in times:
+        order = np.argsort(moments)
+        found.append((moments[order], heights[first:first + moments.size][order]))
+        first += moments.size
+    return found
+
+
+def _columns(problem: LeastSquares, point: Mapping[str, float], place: DisturbanceInput,
+             residual: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
+    """
+    Return the response to each pulse at a place, and when each pulse has its peak [s].
+
+    Both are for each experiment; responses have the shape (n c, pulses), peaks (pulses,).
+    """
+    here, scales = dict(point), problem.machine.time_scales
+    responses: list[list[FloatArray]] = [[] for _ in problem.experiments]
+    peaks: list[list[float]] = [[] for _ in problem.experiments]
+    for shift in np.arange(0.0, scales.response_s - 0.5 * scales.pulse_s, scales.pulse_s):
+        disturbed = problem.machine.simulate_disturbed(
+            here, place, partial(_comb, shift=float(shift), scales=scales))
+        for k, experiment in enumerate(problem.experiments):
+            change = (residual[problem.rows(k)] - problem.standardised(k, disturbed[k])).reshape(
+                experiment.measured.shape)
+            for start, response in _responses(experiment, change, float(shift), scales):
+                responses[k].append(response)
+                peaks[k].append(start + scales.pulse_s)
+    return ([np.array(columns).T for columns in responses],
+            [np.array(moments) for moments in peaks])
 
 
 def components(found: Sequence[Place], caution: float) -> dict[str, float]:
@@ -140,9 +179,8 @@ def _comb(time: FloatArray, shift: float, scales: TimeScales) -> FloatArray:
 
 
 def _responses(experiment: Experiment, change: FloatArray, shift: float,
-               scales: TimeScales) -> list[FloatArray]:
-    """Return the response to each pulse of a comb, without what remains of earlier pulses."""
-    found = []
+               scales: TimeScales) -> Iterator[tuple[float, FloatArray]]:
+    """Yield start and response of each pulse of a comb, without the rest of earlier pulses."""
     end = float(experiment.time[-1]) - 2.0 * scales.pulse_s
     for start, sign in _starts(shift, end, scales):
         first, last = np.searchsorted(experiment.time, [start, start + scales.response_s])
@@ -150,8 +188,7 @@ def _responses(experiment: Experiment, change: FloatArray, shift: float,
             continue  # before the first sample
         response = np.zeros_like(change)
         response[first:last] = sign * (change[first:last] - change[first])
-        found.append(response.ravel())
-    return found
+        yield start, response.ravel()
 
 
 def _pulses_of_reading(experiment: Experiment, channel: int, scales: TimeScales) -> FloatArray:
@@ -170,9 +207,22 @@ def _pulses_of_reading(experiment: Experiment, channel: int, scales: TimeScales)
 class _Evidence:
     """The residual that is to be explained, with the nuisances projected out."""
 
+    @classmethod
+    def at(cls, problem: LeastSquares, point: Mapping[str, float]) -> _Evidence:
+        """Return that of a problem whose nuisances have been fitted."""
+        here = dict(point)
+        residual = problem.residuals(here)
+        level = max(problem.noise_level(residual), 1e-9)
+        bound = problem.settings.localisation.downweighted * level
+        weight = np.where(problem.valid, np.minimum(
+            1.0, bound / np.maximum(np.abs(residual), 1e-12)), 0.0) / level ** 2
+        nuisances = problem.machine.nuisances
+        jacobian = problem.jacobian(here, nuisances, residual, central=False).astype(float)
+        return cls(residual, weight, jacobian, prior_precision(nuisances))
+
     def __init__(self, residual: FloatArray, weight: FloatArray, nuisances: FloatArray,
                  prior: FloatArray) -> None:
-        self._residual, self._weight = residual, weight
+        self.residual, self._weight = residual, weight
         weighted = nuisances * weight[:, np.newaxis]
         square = nuisances.T @ weighted + np.diag(prior)
         self._inverse = np.linalg.pinv(square, hermitian=True)
@@ -185,12 +235,20 @@ class _Evidence:
     def judged(self, responses: Sequence[FloatArray],
                problem: LeastSquares) -> tuple[float, float]:
         """Return the evidence for an input with these responses, and the share it explains."""
+        return self._judged(responses, problem)[:2]
+
+    def heights(self, responses: Sequence[FloatArray], problem: LeastSquares) -> FloatArray:
+        """Return the likeliest factor of each response, shape (pulses of all experiments,)."""
+        return self._judged(responses, problem)[2]
+
+    def _judged(self, responses: Sequence[FloatArray],
+                problem: LeastSquares) -> tuple[float, float, FloatArray]:
         squares, slopes, crosses = [], [], []
         for k, columns in enumerate(responses):
             rows = problem.rows(k)
             weighted = columns * self._weight[rows, np.newaxis]
             squares.append(columns.T @ weighted)
-            slopes.append(weighted.T @ self._residual[rows])
+            slopes.append(weighted.T @ self.residual[rows])
             crosses.append(self._weighted[rows].T @ columns)
         cross = np.concatenate(crosses, axis=1)
         projected = cross.T @ self._inverse
@@ -198,11 +256,12 @@ class _Evidence:
         slope = np.concatenate(slopes) - projected @ self._slope
         size = float(np.trace(square)) / len(square)
         if size <= 0.0:
-            return 0.0, 0.0
+            return 0.0, 0.0, np.zeros(len(square))
         values, vectors = np.linalg.eigh(0.5 * (square + square.T) / size)
         values = np.maximum(values, 0.0)
-        along = (vectors.T @ slope) ** 2 / size
-        best, share = 0.0, 0.0
+        turned = vectors.T @ slope
+        along = turned ** 2 / size
+        best, share, heights = 0.0, 0.0, np.zeros(len(square))
         for ratio in _RATIOS:
             left = self._energy - float(np.sum(along / (values + 1.0 / ratio)))
             left = max(left / self._energy, 1e-9)
@@ -210,4 +269,5 @@ class _Evidence:
                                + float(np.sum(np.log1p(ratio * values))))
             if evidence > best:
                 best, share = float(evidence), 1.0 - left
-        return best, share
+                heights = vectors @ (turned / (values + 1.0 / ratio)) / size
+        return best, share, heights

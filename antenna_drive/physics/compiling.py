@@ -64,7 +64,8 @@ class Compiled:
         if folder:
             numba.config.CACHE_DIR = str(folder)
         try:
-            return numba.njit(cache=folder is not None, **_OPTIONS, **self._options)(self.function)
+            return numba.njit(cache=folder is not None, **{**_OPTIONS, **self._options})(
+                self.function)
         finally:
             numba.config.CACHE_DIR = before
 
@@ -94,6 +95,15 @@ def shared(function: Function) -> Function:
 def compiled(function: Function) -> Function:
     """Compile a function that Python calls, and keep the result on disk."""
     return cast(Function, Compiled(function, _cache_folder))
+
+
+def compiled_with(function: Function, sources: frozenset[Path]) -> Function:
+    """
+    Compile a function of another room, or of a user, that Python calls, and keep it on disk.
+
+    It may allocate arrays. What is kept becomes stale with any source in the folders `sources`.
+    """
+    return cast(Function, Compiled(function, partial(_cache_folder, sources), _nrt=True))
 
 
 def generated(name: str, text: str, names: Mapping[str, Any], sources: frozenset[Path]) -> Any:

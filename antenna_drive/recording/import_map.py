@@ -55,7 +55,9 @@ UNITS: dict[str, tuple[str, float]] = {
     'mdeg/s': ('rad/s', math.pi / 180000), 'arcsec/s': ('rad/s', math.pi / 648000),
     'rpm': ('rad/s', math.pi / 30), 'rev/s': ('rad/s', 2 * math.pi),
     'A': ('A', 1.0), 'mA': ('A', 1e-3), 'V': ('V', 1.0), 'mV': ('V', 1e-3),
-    'N m': ('N m', 1.0), 'kN m': ('N m', 1e3), '1': ('1', 1.0),
+    'N m': ('N m', 1.0), 'kN m': ('N m', 1e3), 'N': ('N', 1.0), 'kN': ('N', 1e3),
+    'm': ('m', 1.0), 'mm': ('m', 1e-3), 'um': ('m', 1e-6),
+    'm/s': ('m/s', 1.0), 'mm/s': ('m/s', 1e-3), '1': ('1', 1.0),
 }
 COUNTS = 'counts'
 TIME_UNITS = {'s': NANOSECONDS, 'ms': 1_000_000, 'us': 1_000, 'ns': 1}
@@ -257,7 +259,7 @@ def _signal(key: str, name: str, body: object) -> SignalMap:
         nanoseconds(numbers.get('clock_offset_s', 0.0)))
 
 
-def import_csv(path: str | Path, import_map: ImportMap) -> Recording:
+def import_csv(path: str | Path, import_map: ImportMap, sheet: bool = True) -> Recording:
     """
     Read a CSV as a map describes it.
 
@@ -267,6 +269,8 @@ def import_csv(path: str | Path, import_map: ImportMap) -> Recording:
         the file; a test sheet NAME.yaml beside NAME.csv is taken along
     import_map
         what the file holds
+    sheet
+        False to leave the test sheet alone: it may be one of another machine
 
     Raises
     ------
@@ -325,8 +329,9 @@ def import_csv(path: str | Path, import_map: ImportMap) -> Recording:
     for name, (stamps_ns, values) in samples.items():
         channels[name] = make_channel(name, import_map.signals[name].unit,
                                       np.array(stamps_ns, dtype=np.int64) - origin, values)
-    sheet = path.with_suffix('.yaml')
-    return Recording(channels, sheet=load_sheet(sheet) if sheet.is_file() else TestSheet(),
+    beside = path.with_suffix('.yaml')
+    return Recording(channels,
+                     sheet=load_sheet(beside) if sheet and beside.is_file() else TestSheet(),
                      notes={'source': path.name, 'import_map': import_map.source})
 
 

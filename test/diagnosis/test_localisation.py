@@ -16,8 +16,8 @@
 from __future__ import annotations
 
 from antenna_drive.diagnosis import (
-    Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Hypothesis, LeastSquares,
-    Machine, Parameter, Point, Regimes, TimeScales,
+    Course, courses, DisturbanceInput, Effect, Experiment, FloatArray, Form, Hypothesis,
+    LeastSquares, Machine, Parameter, Point, Regimes, TimeScales,
 )
 from antenna_drive.diagnosis.localisation import of_effects, of_the_unknown
 from antenna_drive.diagnosis.verdict import Answer, LackOfFit
@@ -101,6 +101,18 @@ def test_an_unknown_force_lies_where_it_acts(side: str) -> None:
     assert places[0].name == f'force on the {side}'
     assert places[0].explained > 0.9
     assert found[0]['component'] == side and found[0]['signal'] == f'seen {side}'
+
+
+def test_the_course_of_an_unknown_force_is_the_force() -> None:
+    course = smooth(1)
+    machine = TwoLags(course, 0.0 * TIME)
+    problem = LeastSquares(machine)
+    none = problem.fit(problem.start(machine.nuisances, {}), 10)
+    [(times, values)] = courses(problem, none.point(), machine.disturbance_inputs[0])
+    assert np.all(np.diff(times) > 0.0)
+    inner = slice(10, -10)
+    error = values[inner] - np.interp(times[inner], TIME, course)
+    assert float(np.sqrt(np.mean(error ** 2))) < 0.1 * float(np.std(course))
 
 
 def test_what_is_too_fast_for_a_pulse_lies_in_its_reading() -> None:

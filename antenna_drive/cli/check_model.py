@@ -1,0 +1,59 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+r"""
+Tell what is wrong with a model of your own machine, before any fit.
+
+The model is simulated with the logs of its tests. Found are readings with a wrong shape or NaN,
+numbers that nobody asks for, effects that do nothing, bounds without the neutral value, a
+simulation that is not the same twice, and derivatives that are noise. docs/own-machine.md leads to
+a first model.
+
+For example:
+
+  antenna-drive check-model my_machine.py:machine logs/*.csv
+  antenna-drive check-model my_machine.py logs/*.csv --map map.yaml
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from antenna_drive.cli.output import add_json_option, give
+from antenna_drive.cli.reading import warnings_in_one_line
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.add_argument('model', metavar='FILE.py:NAME', help='Python file and name of the model')
+    parser.add_argument('logs', nargs='+', type=Path, metavar='LOG.csv', help='logs of its tests')
+    parser.add_argument('--map', type=Path, metavar='MAP.yaml',
+                        help='which column is which, and how it is written')
+    add_json_option(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Check, and print what was found; 1 if something is wrong."""
+    from antenna_drive.machines.own import check_model, load_model, read_logs
+
+    model = load_model(arguments.model)
+    with warnings_in_one_line():
+        logs = read_logs(arguments.logs, arguments.map)
+    checked = check_model(model, logs)
+    lines = [f'wrong: {line}' for line in checked.faults]
+    lines += checked.remarks
+    lines.append(f'{len(checked.faults)} to mend' if checked.faults else 'nothing is wrong')
+    give({'faults': list(checked.faults), 'remarks': list(checked.remarks)}, arguments.json,
+         '\n'.join(lines))
+    return 1 if checked.faults else 0

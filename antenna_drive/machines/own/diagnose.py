@@ -1,0 +1,140 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The diagnosis of a machine of one's own.
+
+Examples
+--------
+>>> from antenna_drive.machines.own import diagnose_logs, load_model, read_log  # doctest: +SKIP
+>>> found = diagnose_logs(load_model('my_machine.py'), [read_log('a.csv')])     # doctest: +SKIP
+>>> print(found.summary())                                                      # doctest: +SKIP
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from antenna_drive.diagnosis import (
+    DEFAULT, diagnose, Diagnosis, LeastSquares, Point, Progress, Settings,
+)
+from antenna_drive.errors import UserError
+from antenna_drive.machines.own.declaration import Model
+from antenna_drive.machines.own.log import Log
+from antenna_drive.machines.own.machine import OwnMachine
+from antenna_drive.machines.own.pushes import pushes
+from antenna_drive.parameters.schema import nearest
+
+# Pushes that the summary lists.
+_LISTED = 6
+
+
+def diagnose_logs(model: Model, logs: Sequence[Log],
+                  progress: Progress = lambda share, doing: None, threads: int = 2,
+                  settings: Settings = DEFAULT, without: Sequence[str] = (),
+                  limits: Mapping[str, float] | None = None) -> Diagnosis:
+    """
+    Say where a machine and its model part, which effect is behind it, and how far it goes.
+
+    Parameters
+    ----------
+    model
+        of the machine
+    logs
+        of its tests
+    progress
+        called with the share that is done, 0 to 1, and what is being done
+    threads
+        how many hypotheses are fitted at once
+    settings
+        thresholds
+    without
+        effects that the catalogue shall lack
+    limits
+        for some readings, the remainder beyond noise from which it matters
+
+    Returns
+    -------
+    the diagnosis. Its result has two more entries than docs/diagnosis.md lists: `numbers`, the
+    simulation's numbers as fitted, and, where something enters that no effect names, `pushes`:
+    test, place, from_s, until_s, size and unit of each push
+
+    Raises
+    ------
+    UserError : model or logs cannot be used; the message says what is wrong
+
+    """
+    machine = OwnMachine(model, logs)
+    for effect in without:
+        if effect not in machine.effects:
+            raise UserError(f'{effect}: no such effect{nearest(effect, machine.effects)}; there '
+                            f'are {", ".join(machine.effects)}')
+    for name in limits or ():
+        if name not in model.readings:
+            raise UserError(f'{name}: no such reading{nearest(name, model.readings)}; there are '
+                            f'{", ".join(model.readings)}')
+    found = diagnose(machine.without(without), progress, threads, settings, limits)
+    found.result['numbers'] = numbers_as_fitted(machine, found.best.state.point())
+    found.result['pushes'] = pushes_found(found, settings)
+    return found
+
+
+def numbers_as_fitted(machine: OwnMachine, point: Point) -> dict[str, Any]:
+    """Return every number of the simulation as fitted, per test where it is a test's own."""
+    model = machine.model
+    fitted = [machine.numbers(point, k) for k in range(len(machine.logs))]
+    numbers: dict[str, Any] = {
+        name: {'value': fitted[0][name], 'configured': item.value, 'unit': item.unit}
+        for name, item in model.base.items()}
+    for name, item in model.per_test.items():
+        for log, values in zip(machine.logs, fitted, strict=True):
+            numbers[f'{name}[{log.name}]'] = {
+                'value': values[name], 'configured': item.value, 'unit': item.unit}
+    known = {p.name for p in machine.nuisances}
+    for parameter in point:
+        name = machine.number_of(parameter)
+        if parameter in known or not name:
+            continue
+        numbers[name] = {'value': fitted[0][name], 'configured': None}
+        if '@' in parameter:
+            order = f'{name.rpartition("_")[0]}_order'
+            numbers[order] = {'value': fitted[0][order], 'configured': None, 'unit': '1/rev'}
+    return numbers
+
+
+def pushes_found(diagnosis: Diagnosis, settings: Settings = DEFAULT) -> list[dict[str, Any]]:
+    """Return when something enters that no effect names, and how strongly; empty for nothing."""
+    machine = diagnosis.machine
+    assert isinstance(machine, OwnMachine)
+    labels = {place.name: place for place in machine.disturbance_inputs}
+    best = next(iter(diagnosis.result['may_enter_at']), None)
+    if best is None or best['name'] not in labels:
+        return []
+    place = machine.model.push[machine.push_at(best['name'])]
+    problem = LeastSquares(machine, settings=settings)
+    return [{'place': best['name'], **vars(item), 'unit': place.unit} for item in pushes(
+        problem, diagnosis.none.state.point(), labels[best['name']])]
+
+
+def summary_of(diagnosis: Diagnosis) -> str:
+    """Return the verdict in a few lines, with what pushes and when."""
+    lines = [diagnosis.summary()]
+    for item in diagnosis.result['pushes'][:_LISTED]:
+        lines.append(f'  {item["test"]}: {item["place"]} {item["size"]:.3g} {item["unit"]} from '
+                     f'{item["from_s"]:.2f} to {item["until_s"]:.2f} s')
+    more = len(diagnosis.result['pushes']) - _LISTED
+    if more > 0:
+        lines.append(f'  and {more} more, see the JSON')
+    return '\n'.join(lines)

@@ -1,0 +1,74 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Load a model from a Python file: 'my_machine.py:machine'."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+import sys
+import traceback
+
+from antenna_drive.errors import UserError
+from antenna_drive.machines.own.declaration import Model, ModelError
+from antenna_drive.parameters.schema import nearest
+
+_USUAL_NAME = 'machine'
+
+
+def load_model(place: str) -> Model:
+    """
+    Return the model that a Python file names.
+
+    Parameters
+    ----------
+    place
+        'FILE.py:NAME', or 'FILE.py' if the name is 'machine'
+
+    Raises
+    ------
+    ModelError : there is no such file or name, or the file fails; the message says at which line
+
+    """
+    text, mark, name = place.rpartition(':')
+    if not mark or not name.isidentifier():
+        text, name = place, _USUAL_NAME
+    path = Path(text).resolve()
+    if not path.is_file() or path.suffix != '.py':
+        raise ModelError(f'--model {place}: no such Python file; give FILE.py:NAME')
+    title = f'antenna_drive_model_{path.stem}'
+    spec = importlib.util.spec_from_file_location(title, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    # compiled functions and modules beside the file are found as in a program that is run
+    sys.modules[title] = module
+    if str(path.parent) not in sys.path:
+        sys.path.insert(0, str(path.parent))
+    try:
+        spec.loader.exec_module(module)
+    except UserError as error:
+        raise ModelError(f'{text}: {error}') from None
+    except Exception as error:
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__)
+                 if frame.filename == str(path)]
+        if isinstance(error, SyntaxError):
+            lines = [error.lineno]
+        where = f'line {lines[-1]}: ' if lines else ''
+        raise ModelError(f'{text}: {where}{type(error).__name__}: {error}') from error
+    found = getattr(module, name, None)
+    if not isinstance(found, Model):
+        models = [key for key, value in vars(module).items() if isinstance(value, Model)]
+        raise ModelError(f'{text}: {name} is no machine{nearest(name, models)}; write '
+                         f'{name} = machine(simulate=..., base=..., readings=...)')
+    return found

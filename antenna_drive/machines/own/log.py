@@ -1,0 +1,279 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Logs of tests, as they come from a file or from Python, and the test that a simulation gets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from zipfile import BadZipFile
+
+from antenna_drive.diagnosis import FloatArray
+from antenna_drive.errors import UserError
+from antenna_drive.parameters.plain_yaml import read_yaml
+from antenna_drive.parameters.schema import Entry, mapping_of, nearest, ParameterError
+from antenna_drive.recording.csv_format import Cell, open_text, parse_number, rows
+from antenna_drive.recording.import_map import import_csv, ImportMap, load_map
+from antenna_drive.recording.recording import NANOSECONDS
+from antenna_drive.recording.sheet import plain_value
+import numpy as np
+from scipy.io import loadmat
+from scipy.io.matlab import MatReadError
+
+_TIME = ('time_s', 'time', 't')
+_LEAST_SAMPLES = 2
+_CONSTANT = Entry('')
+_ARRAYS = ('.npz', '.mat')
+
+
+class LogError(UserError):
+    """A log cannot be used; the message names file, column and remedy."""
+
+
+@dataclass(frozen=True)
+class Log:
+    """
+    What was recorded in one test.
+
+    Attributes
+    ----------
+    name : for people
+    time : of the samples, rising, shape (n,) [s]
+    columns : shape (n,) each, as recorded; NaN where there is no sample
+    constants : what the tester knows of this test, such as a mass
+    labels : what was different in this test, such as load: A
+
+    """
+
+    name: str
+    time: FloatArray
+    columns: Mapping[str, FloatArray]
+    constants: Mapping[str, float] = field(default_factory=dict)
+    labels: Mapping[str, str] = field(default_factory=dict)
+    _held: dict[str, FloatArray] = field(init=False, repr=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """
+        Make the samples arrays of numbers.
+
+        Raises
+        ------
+        LogError : the time does not rise, or a column has another number of samples
+
+        """
+        time = np.array(self.time, float)
+        if time.ndim != 1 or time.size < _LEAST_SAMPLES or not np.all(np.diff(time) > 0.0):
+            raise LogError(f'{self.name}: time: two or more increasing times are needed')
+        columns = {name: np.array(values, float) for name, values in self.columns.items()}
+        for name, values in columns.items():
+            if values.shape != time.shape:
+                raise LogError(f'{self.name}: {name}: shape {values.shape} given, allowed is '
+                               f'{time.shape}, as the time has')
+        object.__setattr__(self, 'time', time)
+        object.__setattr__(self, 'columns', columns)
+        object.__setattr__(self, '_held', {name: _held(v) for name, v in columns.items()})
+
+    def __getitem__(self, column: str) -> FloatArray:
+        """
+        Return a column, shape (n,); where it has no sample, the last one before holds.
+
+        Raises
+        ------
+        LogError : there is no such column
+
+        """
+        try:
+            return self._held[column]
+        except KeyError:
+            raise LogError(f'{self.name}: no column {column}{nearest(column, self.columns)}; '
+                           f'there are {", ".join(self.columns)}') from None
+
+
+@dataclass(frozen=True)
+class OneTest:
+    """
+    What a simulation gets of a test.
+
+    Attributes
+    ----------
+    log : the test's log, perhaps only its beginning
+    push : what enters at each place of the model, shape (n,); zero unless something does
+
+    """
+
+    log: Log
+    push: Mapping[str, FloatArray]
+
+    @property
+    def name(self) -> str:
+        """Return the test's name."""
+        return self.log.name
+
+    @property
+    def time(self) -> FloatArray:
+        """Return the times of the samples, shape (n,) [s]."""
+        return self.log.time
+
+    @property
+    def constants(self) -> Mapping[str, float]:
+        """Return what the tester knows of this test."""
+        return self.log.constants
+
+    def __getitem__(self, column: str) -> FloatArray:
+        """Return a column of the log, shape (n,)."""
+        return self.log[column]
+
+
+def beginning(log: Log, until: float) -> Log:
+    """Return a log's samples up to a time after its first [s]."""
+    count = max(int(np.searchsorted(log.time, log.time[0] + until, side='right')),
+                _LEAST_SAMPLES)
+    if count >= log.time.size:
+        return log
+    return Log(log.name, log.time[:count],
+               {name: values[:count] for name, values in log.columns.items()},
+               log.constants, log.labels)
+
+
+def read_log(path: str | Path, import_map: ImportMap | None = None) -> Log:
+    """
+    Read a log, and NAME.yaml beside it if it is there: constants and labels of the test.
+
+    Parameters
+    ----------
+    path
+        a CSV, or named arrays in a .npz of numpy or a .mat of MATLAB (not of version 7.3); without
+        a map its columns keep their names, and time_s, time or t is the time
+    import_map
+        which column is which, and how it is written
+
+    Raises
+    ------
+    LogError, RecordingError : a cell, a row or a column cannot be read; one line says where
+
+    """
+    path = Path(path)
+    if path.suffix in _ARRAYS and import_map:
+        raise LogError(f'{path}: a map is for text; arrays of a {path.suffix} keep their names')
+    if path.suffix in _ARRAYS:
+        time, columns = _arrays(path)
+    else:
+        time, columns = _mapped(path, import_map) if import_map else _plain(path)
+    constants, labels = _sheet(path.with_suffix('.yaml'))
+    try:
+        return Log(path.stem, time, columns, constants, labels)
+    except LogError as error:
+        raise LogError(f'{path}: {str(error).partition(": ")[2]}') from None
+
+
+def read_logs(paths: Sequence[str | Path], map_path: str | Path | None = None) -> list[Log]:
+    """
+    Read several files with one map.
+
+    Raises
+    ------
+    LogError, RecordingError, ParameterError : as `read_log` and `load_map`; two files of one name
+
+    """
+    import_map = load_map(map_path) if map_path else None
+    logs = [read_log(path, import_map) for path in paths]
+    names = [log.name for log in logs]
+    for name in names:
+        if names.count(name) > 1:
+            raise LogError(f'{name}: two files of this name are given; rename one of them')
+    return logs
+
+
+def _plain(path: Path) -> tuple[FloatArray, dict[str, FloatArray]]:
+    with open_text(path, 'utf-8-sig') as stream:
+        table = rows(path, stream, ',')
+        line, header = next(table, (1, []))
+        names = [cell.strip() for cell in header]
+        if len(set(names)) < len(names):
+            raise LogError(f'{path}: line {line}: a column is there twice')
+        cells = [[] for _ in names]  # type: list[list[float]]
+        for line, row in table:
+            if len(row) != len(names):
+                raise LogError(f'{path}: line {line}: {len(row)} cells, but the header has '
+                               f'{len(names)}')
+            for name, values, text in zip(names, cells, row, strict=True):
+                text = text.strip()
+                values.append(parse_number(text, Cell(path, line, name)) if text else np.nan)
+    return _with_time(path, {
+        name: np.array(values) for name, values in zip(names, cells, strict=True)})
+
+
+def _arrays(path: Path) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Read the vectors of a file of named arrays; what is no vector of numbers is left out."""
+    try:
+        if path.suffix == '.npz':
+            with np.load(path, allow_pickle=False) as file:
+                found = {name: np.asarray(file[name]) for name in file.files}
+        else:
+            found = {name: np.asarray(values) for name, values in loadmat(path).items()
+                     if not name.startswith('__')}
+    except (ValueError, NotImplementedError, BadZipFile, EOFError, TypeError,
+            MatReadError) as error:
+        raise LogError(f'{path}: {error}') from None
+    return _with_time(path, {name: values.squeeze().astype(float)
+                             for name, values in found.items()
+                             if values.dtype.kind in 'biuf' and values.squeeze().ndim == 1})
+
+
+def _with_time(path: Path, columns: dict[str, FloatArray],
+               ) -> tuple[FloatArray, dict[str, FloatArray]]:
+    time = next((name for name in _TIME if name in columns), '')
+    if not time:
+        raise LogError(f'{path}: no column {" or ".join(_TIME)}; with --map another column of a '
+                       'CSV is the time')
+    return columns.pop(time), columns
+
+
+def _mapped(path: Path, import_map: ImportMap) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Read a file with a map; the signal with most samples gives the times."""
+    recording = import_csv(path, import_map, sheet=False)
+    stamps = max((channel.time_ns for channel in recording.channels.values()), key=len)
+    if len(stamps) < _LEAST_SAMPLES:
+        raise LogError(f'{path}: fewer than {_LEAST_SAMPLES} samples')
+    columns = {}
+    for name, channel in recording.channels.items():
+        columns[name] = np.full(len(stamps), np.nan)
+        place = np.searchsorted(stamps, channel.time_ns)
+        columns[name][np.minimum(place, len(stamps) - 1)] = channel.values
+    return stamps / NANOSECONDS, columns
+
+
+def _sheet(path: Path) -> tuple[dict[str, float], dict[str, str]]:
+    """Return constants and labels of a test sheet, if there is one."""
+    if not path.is_file():
+        return {}, {}
+    try:
+        top = mapping_of('', read_yaml(path), ('constants', 'labels'))
+        constants = mapping_of('constants', top.get('constants', {}))
+        labels = mapping_of('labels', top.get('labels', {}))
+        numbers = {name: float(_CONSTANT.check(f'constants.{name}', plain_value(  # type: ignore
+            value))) for name, value in constants.items()}
+    except ParameterError as error:
+        raise LogError(f'{path}: {error}') from None
+    return numbers, {name: str(value) for name, value in labels.items()}
+
+
+def _held(values: FloatArray) -> FloatArray:
+    """Return values with the last one before in the place of each that is missing."""
+    there = np.isfinite(values)
+    if there.all() or not there.any():
+        return values
+    last = np.maximum.accumulate(np.where(there, np.arange(values.size), 0))
+    return np.where(np.isfinite(values[last]), values[last], values[there][0])

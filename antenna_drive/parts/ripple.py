@@ -1,0 +1,40 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What repeats with an angle: torque ripple, a cyclic error of a scale, a bent screw."""
+
+from __future__ import annotations
+
+import math
+
+from antenna_drive.physics.compiling import inner
+
+
+@inner
+def wave(angle: float, order: float, cosine: float, sine: float) -> float:
+    """
+    Return a wave in the unit of its amplitudes.
+
+    Parameters
+    ----------
+    angle
+        that it follows [rad]
+    order
+        cycles per revolution
+    cosine, sine
+        amplitudes of its two parts
+
+    """
+    if cosine == 0.0 and sine == 0.0:
+        return 0.0
+    return cosine * math.cos(order * angle) + sine * math.sin(order * angle)

@@ -1,0 +1,137 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Logs from files: plain, mapped, with a sheet; and models from files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from antenna_drive.errors import UserError
+from antenna_drive.machines.own import load_model, read_log, read_logs
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+MAP = """
+time: {column: "T (ms)", unit: ms}
+delimiter: ";"
+signals:
+  angle: {column: POS, unit: counts, counts_per_revolution: 360}
+  force: {column: F, unit: kN, sign: -1}
+"""
+
+
+def test_a_plain_file_keeps_its_columns_and_its_gaps(tmp_path: Path) -> None:
+    path = tmp_path / 'a.csv'
+    path.write_text('time_s,x,y\n0,1,2\n0.1,,3\n0.2,5,4\n')
+    log = read_log(path)
+    assert log.name == 'a' and log.time.tolist() == [0.0, 0.1, 0.2]
+    assert np.isnan(log.columns['x'][1])
+    assert log['x'].tolist() == [1.0, 1.0, 5.0]  # an input is held
+    assert log['y'].tolist() == [2.0, 3.0, 4.0]
+
+
+@pytest.mark.parametrize('suffix', ['.npz', '.mat'])
+def test_named_arrays_are_columns(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f'a{suffix}'
+    values = {'t': np.arange(5.0), 'x': np.arange(5), 'mass': np.array(2.0),
+              'note': np.array('free text')}
+    if suffix == '.npz':
+        np.savez(path, **values)  # type: ignore[arg-type]
+    else:
+        savemat(path, values)
+    log = read_log(path)
+    assert log.time.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert {name: column.tolist() for name, column in log.columns.items()} == {
+        'x': [0.0, 1.0, 2.0, 3.0, 4.0]}
+    (tmp_path / 'm.yaml').write_text(MAP)
+    with pytest.raises(UserError, match='a map is for text'):
+        read_logs([path], tmp_path / 'm.yaml')
+    path.write_bytes(b'no such file at all')
+    with pytest.raises(UserError, match=f'a{suffix}: '):
+        read_log(path)
+
+
+def test_a_map_names_columns_and_turns_units(tmp_path: Path) -> None:
+    (tmp_path / 'm.yaml').write_text(MAP)
+    (tmp_path / 'b.csv').write_text('T (ms);POS;F\n0;0;1\n10;90;2\n20;;3\n')
+    [log] = read_logs([tmp_path / 'b.csv'], tmp_path / 'm.yaml')
+    assert log.time == pytest.approx([0.0, 0.01, 0.02])
+    assert log['force'] == pytest.approx([-1e3, -2e3, -3e3])
+    assert log.columns['angle'][:2] == pytest.approx([0.0, np.pi / 2])
+    assert np.isnan(log.columns['angle'][2])
+
+
+def test_a_sheet_beside_a_log_tells_constants_and_labels(tmp_path: Path) -> None:
+    (tmp_path / 'c.csv').write_text('time_s,x\n0,1\n1,2\n')
+    (tmp_path / 'c.yaml').write_text('constants: {mass: 2}\nlabels: {load: A}\n')
+    log = read_log(tmp_path / 'c.csv')
+    assert log.constants == {'mass': 2.0} and log.labels == {'load': 'A'}
+
+
+@pytest.mark.parametrize(('text', 'sheet', 'message'), [
+    ('x,y\n0,1\n1,2\n', '', 'd.csv: no column time_s or time or t; with --map another'),
+    ('time_s,x,x\n0,1,1\n', '', 'a column is there twice'),
+    ('time_s,x\n0,1\n1\n', '', 'line 3: 1 cells, but the header has 2'),
+    ('time_s,x\n0,1\n1,a\n', '', "line 3, column x: 'a' is no number"),
+    ('time_s,x\n1,1\n0,2\n', '', 'd.csv: time: two or more increasing times'),
+    ('time_s,x\n0,1\n1,2\n', 'constants: {mass: heavy}', 'd.yaml: constants.mass'),
+    ('time_s,x\n0,1\n1,2\n', 'weights: {}', 'd.yaml: weights'),
+])
+def test_a_file_that_cannot_be_read_is_refused_in_a_line(
+        tmp_path: Path, text: str, sheet: str, message: str) -> None:
+    (tmp_path / 'd.csv').write_text(text)
+    if sheet:
+        (tmp_path / 'd.yaml').write_text(sheet)
+    with pytest.raises(UserError) as error:
+        read_log(tmp_path / 'd.csv')
+    assert message in str(error.value)
+
+
+def test_two_files_of_one_name_are_refused(tmp_path: Path) -> None:
+    for folder in ('a', 'b'):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / 'x.csv').write_text('time_s,x\n0,1\n1,2\n')
+    with pytest.raises(UserError, match='two files of this name'):
+        read_logs([tmp_path / 'a' / 'x.csv', tmp_path / 'b' / 'x.csv'])
+
+
+GOOD = """
+from antenna_drive.machines.own import known, machine, reading
+drive = machine(lambda n, t: {'x': n.a * t.time}, {'a': known(1.0)}, {'x': reading('m', 0.1)})
+"""
+
+
+@pytest.mark.parametrize(('text', 'name', 'message'), [
+    (GOOD, 'driv', 'driv is no machine, did you mean drive?'),
+    (GOOD, '', 'machine is no machine'),
+    ('x = 1\ny = 1 / 0\n', 'drive', 'line 2: ZeroDivisionError: division by zero'),
+    ('x = (\n', 'drive', 'line 1: SyntaxError'),
+    ('import not_there_at_all\n', 'drive', "No module named 'not_there_at_all'"),
+])
+def test_a_model_that_cannot_be_loaded_is_told_with_its_line(
+        tmp_path: Path, text: str, name: str, message: str) -> None:
+    path = tmp_path / 'model.py'
+    path.write_text(text)
+    with pytest.raises(UserError) as error:
+        load_model(f'{path}:{name}' if name else str(path))
+    assert message in str(error.value) and '\n' not in str(error.value)
+    with pytest.raises(UserError, match='no such Python file'):
+        load_model(str(tmp_path / 'none.py:drive'))
+
+
+def test_a_model_is_loaded_by_its_name(tmp_path: Path) -> None:
+    path = tmp_path / 'model.py'
+    path.write_text(GOOD)
+    assert load_model(f'{path}:drive').base['a'].value == 1.0

@@ -1,0 +1,78 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The two commands for a machine of one's own, as a user types them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from antenna_drive.cli import main
+import numpy as np
+from own.swing import log_of
+import pytest
+
+MODEL = 'from own.swing import swing\nmachine = swing()\n'
+DEAF = ('from own.swing import simulate, swing\n'
+        'machine = swing(simulate=lambda n, t: {"angle": t.time, "rate": t.time})\n')
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Return a folder with a model and two logs of a swing whose sensor drifts."""
+    (tmp_path / 'model.py').write_text(MODEL)
+    (tmp_path / 'deaf.py').write_text(DEAF)
+    for name, start, seed in (('far', 1.0, 1), ('near', 0.4, 2)):
+        log = log_of(name, start, seed, {'drift': 0.01})
+        names = ['turn', 'angle', 'rate']
+        np.savetxt(tmp_path / f'{name}.csv', np.column_stack(
+            [log.time, *(log[column] for column in names)]), delimiter=',', comments='',
+            header=','.join(['time_s', *names]))
+    return tmp_path
+
+
+def test_diagnose_writes_verdict_and_page(folder: Path,
+                                          capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['diagnose', '--model', f'{folder}/model.py:machine', f'{folder}/far.csv',
+                 f'{folder}/near.csv', '--json', f'{folder}/v.json',
+                 '--report', f'{folder}/v.html', '--matters', 'angle=0.1']) == 0
+    assert 'sensor.drift' in capsys.readouterr().out
+    verdict = json.loads((folder / 'v.json').read_text())
+    assert verdict['which'][0]['effects'] == ['sensor.drift']
+    assert verdict['numbers']['drift']['value'] == pytest.approx(0.01, rel=0.05)
+    assert '<!doctype html>' in (folder / 'v.html').read_text()
+
+
+@pytest.mark.parametrize(('options', 'message'), [
+    (['--model', 'none.py', 'a.csv'], 'no such Python file'),
+    (['--model', 'x.py', 'a.csv', '--config', 'reference'], '--config: does not go with --model'),
+    (['--model', 'x.py', 'a.csv', '--corrected', 'c.yaml'], '--corrected: does not go with'),
+    (['a.csv', '--map', 'm.yaml'], '--map: goes with --model'),
+])
+def test_options_that_do_not_go_together(options: list[str], message: str,
+                                         capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['diagnose', *options]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_check_model_says_yes_or_what_is_wrong(folder: Path,
+                                               capsys: pytest.CaptureFixture[str]) -> None:
+    logs = [f'{folder}/far.csv', f'{folder}/near.csv']
+    assert main(['check-model', f'{folder}/model.py', *logs]) == 0
+    assert capsys.readouterr().out.endswith('nothing is wrong\n')
+    assert main(['check-model', f'{folder}/deaf.py', *logs, '--json', f'{folder}/c.json']) == 1
+    out = capsys.readouterr().out
+    assert 'wrong: decay: the simulation never asks for numbers.decay' in out
+    faults = json.loads((folder / 'c.json').read_text())['faults']
+    assert out.endswith(f'{len(faults)} to mend\n')

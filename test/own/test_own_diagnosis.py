@@ -1,0 +1,116 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A model in, the missing effect out: its name and size, and when something pushes."""
+
+from __future__ import annotations
+
+from antenna_drive.diagnosis.page import contents
+from antenna_drive.errors import UserError
+from antenna_drive.machines.own import diagnose_logs, OwnMachine, summary_of, unseen
+from antenna_drive.pages import render
+import numpy as np
+from own.swing import log_of, logs, NOISE, swing, TIME
+import pytest
+
+
+def test_nothing_is_named_where_nothing_is_wrong() -> None:
+    found = diagnose_logs(swing(), logs())
+    assert found.result['verdict'] == 'no_gap'
+    assert found.result['pushes'] == []
+    numbers = found.result['numbers']
+    assert numbers['decay']['value'] == pytest.approx(0.104, abs=1e-3)
+    assert numbers['bias']['value'] == pytest.approx(0.05, abs=1e-3)
+    assert numbers['start[near]']['value'] == pytest.approx(0.4, abs=2e-3)
+    assert numbers['pulsation'] == {'value': 2.0, 'configured': 2.0, 'unit': 'rad/s'}
+
+
+def test_the_missing_effect_is_named_with_its_size() -> None:
+    found = diagnose_logs(swing(), logs({'drift': 0.01}))
+    first = found.result['which'][0]
+    assert found.result['verdict'] == 'explained' and first['effects'] == ['sensor.drift']
+    drift = first['parameters']['sensor.drift.drift']
+    assert drift['value'] == pytest.approx(0.01, rel=0.05) and drift['unit'] == 'rad/s'
+    assert found.result['numbers']['drift']['value'] == drift['value']
+
+
+def test_the_order_of_a_ripple_is_found() -> None:
+    found = diagnose_logs(swing(), logs({'wave_sine': 0.01, 'wave_order': 17.0}))
+    assert found.result['which'][0]['effects'] == ['sensor.wave']
+    numbers = found.result['numbers']
+    assert numbers['wave_order']['value'] == 17.0
+    assert numbers['wave_sine']['value'] == pytest.approx(0.01, rel=0.05)
+    assert 'wave_sine@17 = ' in found.summary()
+
+
+def test_what_pushes_is_told_with_its_place_its_times_and_its_size() -> None:
+    """Three pushes of one size: within 50 ms, and the size within 15 percent."""
+    edges = ((3.0, 4.5), (8.0, 9.0), (14.0, 16.5))
+    wind = 0.0 * TIME
+    for begin, end in edges:
+        wind[(TIME >= begin) & (TIME < end)] = 0.05
+    found = diagnose_logs(swing(), logs(wind=wind), without=['sensor.slip', 'sensor.drift'])
+    assert found.result['verdict'] in ('unknown_effect', 'partly_explained')
+    assert found.result['may_enter_at'][0]['name'] == 'wind on the swing'
+    for name in ('far', 'near'):
+        told = [item for item in found.result['pushes'] if item['test'] == name]
+        assert [item['unit'] for item in told] == ['rad'] * 3
+        for item, edge in zip(told, edges, strict=True):
+            assert (item['from_s'], item['until_s']) == pytest.approx(edge, abs=0.05)
+            assert item['size'] == pytest.approx(0.05, rel=0.15)
+    assert 'far: wind on the swing 0.0' in summary_of(found)
+
+
+def test_a_log_that_was_not_used_is_predicted_to_the_noise_with_the_effect_only() -> None:
+    """A start that is the mean of the two that were fitted, and the same drift."""
+    found = diagnose_logs(swing(), logs({'drift': 0.01}))
+    error = unseen(found, log_of('new', 0.7, 5, {'drift': 0.01}))['angle']
+    assert error.unit == 'rad'
+    assert error.after == pytest.approx(NOISE, rel=0.2)
+    # a bias takes the mean of the drift, 0.01 t over 20 s; what it leaves is 0.2 / sqrt(12)
+    assert error.before == pytest.approx(0.2 / np.sqrt(12.0), rel=0.1)
+    assert error.configured > error.before
+
+
+def test_the_page_shows_the_models_own_parts_and_no_other_machine() -> None:
+    page = render('verdict.html', **vars(contents(diagnose_logs(
+        swing(blocks=('swing', 'sensor')), logs({'drift': 0.01})))))
+    for word in ('>sensor', '>swing', 'it warms up', 'rad/s', 'sensor.drift'):
+        assert word in page
+    text = page.split('<body>')[1].split('<script')[0].lower()
+    for word in ('antenna', 'elevation', 'tachometer', 'motor', 'drive', 'bias'):
+        assert word not in text, word
+
+
+def test_a_number_of_one_test_acts_on_it_alone() -> None:
+    machine = OwnMachine(swing(), logs())
+    before, after = machine.simulate([{}, {'start[near]': 0.2}])
+    assert np.array_equal(before[0], after[0])  # type: ignore[arg-type]
+    change = np.asarray(after[1])[:, 0] - np.asarray(before[1])[:, 0]
+    assert change[0] == pytest.approx(0.2)
+
+
+def test_the_beginning_of_a_test_is_simulated_as_in_the_whole() -> None:
+    machine = OwnMachine(swing(), logs())
+    [whole], [part] = (machine.simulate([{}], [0], until) for until in (np.inf, 5.0))
+    first = machine.experiments[0].time <= 5.0
+    assert np.array_equal(np.asarray(whole[0])[first][:-1], np.asarray(part[0])[first][:-1])
+    assert np.isnan(np.asarray(part[0])[~first]).all()
+
+
+@pytest.mark.parametrize(('options', 'message'), [
+    ({'without': ['sensor.drif']}, 'did you mean sensor.drift?'),
+    ({'limits': {'angel': 1.0}}, 'did you mean angle?')])
+def test_names_that_are_not_there_are_told(options: dict[str, object], message: str) -> None:
+    with pytest.raises(UserError, match=message.replace('?', r'\?')):
+        diagnose_logs(swing(), logs(), **options)  # type: ignore[arg-type]

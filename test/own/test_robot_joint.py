@@ -1,0 +1,55 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The robot joint: logs of a program of its own, and the fault that it was given is named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import runpy
+from typing import Any
+
+from antenna_drive.machines.own import check_model, diagnose_logs, load_model, Log
+import pytest
+
+FOLDER = Path(__file__).resolve().parents[2] / 'examples' / 'robot_joint'
+MODEL = load_model(str(FOLDER / 'machine.py'))
+MAKER = runpy.run_path(str(FOLDER / 'make_logs.py'))
+
+
+def logs_of(fault: str) -> list[Log]:
+    made = []
+    for seed, name in enumerate(('steps', 'sweep')):
+        rows: Any = MAKER['log_of'](MAKER[name], MAKER['FAULTS'][fault], seed)
+        made.append(Log(name, rows[:, 0], {'reference_rad': rows[:, 1], 'motor_rad': rows[:, 2],
+                                           'current_A': rows[:, 3]}))
+    return made
+
+
+def test_a_joint_in_good_order_has_no_gap() -> None:
+    logs = logs_of('nothing')
+    assert check_model(MODEL, logs).faults == []
+    assert diagnose_logs(MODEL, logs).result['verdict'] == 'no_gap'
+
+
+@pytest.mark.parametrize(('fault', 'effect', 'number', 'size'), [
+    ('compliance', 'gearbox.compliance', 'compliance', 0.3),
+    ('backlash', 'gearbox.backlash', 'half_gap', 0.04),
+    ('asymmetry', 'motor.friction_asymmetry', 'asymmetry', 0.25),
+    ('ripple', 'motor.ripple', 'ripple_sine@6', 0.02),
+    ('delay', 'controller.delay', 'delay', 0.004)])
+def test_the_fault_of_a_joint_is_named_with_its_size(fault: str, effect: str, number: str,
+                                                     size: float) -> None:
+    first = diagnose_logs(MODEL, logs_of(fault)).result['which'][0]
+    assert first['effects'] == [effect]
+    assert first['parameters'][f'{effect}.{number}']['value'] == pytest.approx(size, rel=0.1)
