@@ -77,6 +77,10 @@ def tree_mutations(tree: Any, write: Callable[[Any], bytes], count: int, seed: i
         mappings, lists and scalars
     write
         returns the text of such a tree
+    count
+        how many texts are tried; those that `write` refuses are left out
+    seed
+        of the changes
 
     """
     rng = random.Random(seed)

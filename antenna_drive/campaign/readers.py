@@ -144,10 +144,12 @@ def _unchecked(bag: Path) -> bytes:
 
 def reader(name: str, folder: Path) -> Reader:
     """
-    Return a reader by its name in `trials.READERS`.
+    Return a reader by its name.
 
     Parameters
     ----------
+    name
+        one of `trials.READERS`
     folder
         where its files are; what it needs beside the file to be damaged is put there
 

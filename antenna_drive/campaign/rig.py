@@ -178,14 +178,22 @@ class Rig:
 
         Parameters
         ----------
+        outcome
+            of the trial, which is told what is found
         folder
             where a recorder records
         recorder, observers
             members to start beside the nodes, in processes of their own
+        namespace
+            of the drive
         order
             the processes in the order of their start
         conductor
             the command of another node in the place of test_signal
+        exchange
+            of all nodes: auto or python
+        environment
+            of all processes; None for this one's
         commands
             commands of further processes, by name
         waited_for
@@ -194,6 +202,8 @@ class Rig:
             of the test signal
         nap_s, keep
             how long the watcher takes for each step [s], and how many it keeps of each run
+        said
+            hears /diagnostics; None for a listener of the rig's own
         run
             the parameters run.* of test_signal
 

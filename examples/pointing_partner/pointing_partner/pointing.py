@@ -19,6 +19,8 @@ own rate with a rate command. A slow or missing answer is the drive's concern: s
 partner.deadline and partner.on_miss of the node in whose place this program works.
 """
 
+from typing import Any
+
 import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
@@ -31,11 +33,11 @@ class Pointing(Node):
     def __init__(self) -> None:
         """Follow the stand-in whose name is the parameter `drive`."""
         super().__init__('pointing')
-        self._angle = self.declare_parameter('angle', 2e-4)  # to be held [rad]
-        self._gain = self.declare_parameter('gain', 2.0)  # rate for each rad of error [1/s]
-        self._limit = self.declare_parameter('limit', 1e-3)  # of the rate [rad/s]
-        drive = self.declare_parameter('drive', 'test_signal').value
-        rate_hz = self.declare_parameter('rate', 100.0).value
+        self._angle: Any = self.declare_parameter('angle', 2e-4)  # to be held [rad]
+        self._gain: Any = self.declare_parameter('gain', 2.0)  # rate for each rad of error [1/s]
+        self._limit: Any = self.declare_parameter('limit', 1e-3)  # of the rate [rad/s]
+        drive: Any = self.declare_parameter('drive', 'test_signal').value
+        rate_hz: Any = self.declare_parameter('rate', 100.0).value
         self._newest: Float64MultiArray | None = None
         self._answer = self.create_publisher(Float64MultiArray, f'{drive}/answer', 10)
         self.create_subscription(
