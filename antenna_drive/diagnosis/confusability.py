@@ -34,6 +34,8 @@ from scipy import linalg
 
 # share of a single-precision column's power that may be rounding
 _ROUNDING = 1e-6
+# relative precision of a product of such columns
+_SINGLE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,10 @@ def visibility(problem: LeastSquares, state: FitState,
 
     """
     machine, settings = problem.machine, problem.settings
-    factor = linalg.cho_factor(state.hessian + np.diag(proper_precision(state.parameters)))
+    known = state.hessian + np.diag(proper_precision(state.parameters))
+    # the Hessian is of single precision: nearly parallel columns may leave it indefinite
+    scale = np.sqrt(np.diag(known))
+    factor = linalg.cho_factor(known / np.outer(scale, scale) + _SINGLE * np.eye(scale.size))
     ids, units, sizes, remainders = [], [], [], []
     price = settings.penalty.effect + settings.penalty.parameter
     for i, effect in enumerate(machine.effects.values()):
@@ -129,7 +134,7 @@ def visibility(problem: LeastSquares, state: FitState,
         column = problem.jacobian({**state.point(), **form.start}, [first], state.residual,
                                   central=False)[:, 0]
         cross = state.jacobian.T @ column
-        imitated = linalg.cho_solve(factor, cross)
+        imitated = linalg.cho_solve(factor, cross / scale) / scale
         power = float(column @ column - cross @ imitated)
         ids.append(effect.id)
         units.append(first.unit)

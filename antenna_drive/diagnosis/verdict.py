@@ -227,7 +227,10 @@ def also_seen(hypotheses: Sequence[Hypothesis], settings: Settings,
         if len(extra) != 1 or not set(top.named) < set(hypothesis.effects):
             continue
         effect = extra.pop()
-        without = min(h.cost for h in hypotheses if set(h.effects) == set(top.named))
+        without = min((h.cost for h in hypotheses if set(h.effects) == set(top.named)),
+                      default=None)
+        if without is None:
+            continue  # nothing tells what the effect gains beside those that are named
         gain = (without - hypothesis.cost) / inflation
         if gain > settings.penalty.effect and gain > found.get(effect, {}).get('gain', 0.0):
             found[effect] = {'effect': effect, 'gain': gain,

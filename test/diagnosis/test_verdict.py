@@ -150,6 +150,13 @@ def test_a_partner_within_its_tolerance_leaves_the_first_effect_alone() -> None:
     assert first.probability == pytest.approx(0.95, abs=1e-3)
 
 
+def test_a_partner_of_nobody_who_was_fitted_alone_is_not_listed() -> None:
+    none, other = fitted((), 20000.0), fitted(('axis.gain',), 15000.0)
+    pair = within_tolerance(fitted(('axis.inertia', 'motor.gain'), 3000.0), 'motor.gain')
+    assert rank([none, other, pair], 0.05, DEFAULT)[0].effects == ('axis.inertia',)
+    assert also_seen([none, other, pair], DEFAULT) == []
+
+
 def test_a_small_partner_is_listed_apart() -> None:
     none, single = fitted((), 20000.0), fitted(('axis.inertia',), 1000.0)
     pair = fitted(('axis.inertia', 'motor.gain'), 900.0)
