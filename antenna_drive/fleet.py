@@ -34,11 +34,11 @@ import shutil
 import tempfile
 from typing import Any
 
-from antenna_drive.cluster import fingerprint
 from antenna_drive.drafts import drafted
 from antenna_drive.errors import one_line, UserError
 from antenna_drive.subcommand import run_command
 from antenna_drive.workers import TaskLost, Workers
+from antenna_drive.workers.cluster import fingerprint
 
 MACHINES = 'machines'           # folder of what was found, one folder a machine
 VERDICT, PAGE, CORRECTED = 'verdict.json', 'verdict.html', 'corrected.yaml'

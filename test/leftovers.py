@@ -16,9 +16,9 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
-import signal
 import uuid
+
+from antenna_drive.campaign import leftovers
 
 # In the environment of every process that a session of pytest starts; also in that of a process
 # whose parent has ended, which no list of children shows.
@@ -44,26 +44,12 @@ def mark(worker: bool) -> None:
 
 def started() -> set[int]:
     """Return the processes that this process has started, and theirs (on Linux)."""
-    marks = {f'{name}={os.environ[name]}'.encode() for name in (SESSION, WORKER)
-             if name in os.environ}
-    found = set()
-    for path in Path('/proc').glob('[0-9]*/environ'):
-        try:
-            if marks <= set(path.read_bytes().split(b'\0')):
-                found.add(int(path.parent.name))
-        except OSError:  # ended meanwhile, or somebody else's
-            continue
-    return found - {os.getpid()}
+    return set(leftovers.alive({
+        name: os.environ[name] for name in (SESSION, WORKER) if name in os.environ}))
 
 
 def end(processes: set[int]) -> list[str]:
     """End processes at once; return their command lines."""
-    ended = []
-    for pid in sorted(processes):
-        try:
-            words = Path('/proc', str(pid), 'cmdline').read_bytes().split(b'\0')
-            os.kill(pid, signal.SIGKILL)
-        except OSError:
-            continue
-        ended.append(b' '.join(words).decode(errors='replace').strip())
-    return ended
+    commands = leftovers.commands(sorted(processes))
+    leftovers.end(commands)
+    return list(commands.values())

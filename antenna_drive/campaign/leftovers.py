@@ -15,6 +15,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 import os
 from pathlib import Path
 import signal
@@ -24,14 +25,19 @@ import time
 TOKEN = 'ANTENNA_DRIVE_CAMPAIGN'
 
 
-def alive(token: str) -> list[int]:
-    """Return the processes with a token in their environment, without this one and zombies."""
-    wanted = f'{TOKEN}={token}'.encode()
+def alive(marks: Mapping[str, str]) -> list[int]:
+    """
+    Return the processes with all these variables in their environment (on Linux).
+
+    Neither this one nor zombies are among them.
+    """
+    wanted = {f'{name}={value}'.encode() for name, value in marks.items()}
     found = []
     for folder in Path('/proc').iterdir():
         if folder.name.isdigit() and int(folder.name) != os.getpid():
             try:
-                if wanted in (folder / 'environ').read_bytes().split(b'\0') and _runs(folder):
+                environment = set((folder / 'environ').read_bytes().split(b'\0'))
+                if wanted <= environment and _runs(folder):
                     found.append(int(folder.name))
             except OSError:
                 continue
@@ -45,24 +51,24 @@ def _runs(folder: Path) -> bool:
 def wait_for_none(token: str, patience_s: float) -> list[int]:
     """Return the processes with a token that are still there after a while."""
     deadline = time.monotonic() + patience_s
-    while (found := alive(token)) and time.monotonic() < deadline:
+    while (found := alive({TOKEN: token})) and time.monotonic() < deadline:
         time.sleep(0.1)
     return found
 
 
-def describe(pids: list[int]) -> list[str]:
-    """Return the command line of each process."""
-    lines = []
+def commands(pids: Iterable[int]) -> dict[int, str]:
+    """Return the command line of each process that is still there."""
+    found = {}
     for pid in pids:
         try:
             words = Path(f'/proc/{pid}/cmdline').read_bytes().split(b'\0')
-            lines.append(f'{pid}: ' + b' '.join(words).decode(errors='replace')[:300])
         except OSError:
             continue
-    return lines
+        found[pid] = b' '.join(words).decode(errors='replace').strip()[:300]
+    return found
 
 
-def end(pids: list[int]) -> None:
+def end(pids: Iterable[int]) -> None:
     """End processes at once."""
     for pid in pids:
         try:

@@ -63,7 +63,7 @@ def run(name: str, options: Mapping[str, Any], rng: random.Random) -> Outcome:
             if found:
                 outcome.find(f'{len(found)} processes are left after {number.name} to '
                              f'{command[0]}', 'orphans',
-                             processes=leftovers.describe(found), **detail)
+                             processes=leftovers.commands(found), **detail)
                 leftovers.end(found)
             said.seek(0)
             text = said.read()

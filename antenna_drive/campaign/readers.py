@@ -93,11 +93,12 @@ class Reader(NamedTuple):
     write: Callable[[Any], bytes] | None = None
 
 
-def _recording() -> Recording:
+def one_recording(samples: int = 60) -> Recording:
+    """Return a small recording with configuration, notes and sheet."""
     rng = np.random.default_rng(7)
-    time = np.arange(60) * 1e-3
+    time = np.arange(samples) * 1e-3
     return Recording.from_arrays(
-        time, {name: rng.standard_normal(60) for name in (
+        time, {name: rng.standard_normal(samples) for name in (
             'test_signal/rate_command', 'motor_1/current', 'plant/encoder')},
         configuration={'axis': {'gear_ratio': 14868.0}}, notes={'source': 'campaign'},
         sheet=parse_sheet({'circuit': 'new'}))
@@ -157,7 +158,7 @@ def reader(name: str, folder: Path) -> Reader:
     if name.startswith('bag'):
         return _bag_reader(name, folder)
     if name == 'csv':
-        write_csv(_recording(), folder / 'run.csv')
+        write_csv(one_recording(), folder / 'run.csv')
         return Reader('run.csv', (folder / 'run.csv').read_bytes(),
                       lambda path: read_csv(path / 'run.csv'))
     if name == 'sheet':
@@ -199,7 +200,7 @@ def reader(name: str, folder: Path) -> Reader:
 
 
 def _bag_reader(name: str, folder: Path) -> Reader:
-    write_bag(_recording(), folder / 'run')
+    write_bag(one_recording(), folder / 'run')
     bag, metadata = folder / 'run' / 'run_0.mcap', folder / 'run' / 'metadata.yaml'
     if name == 'bag_metadata':
         return _yaml_reader('run/metadata.yaml', metadata.read_bytes(),

@@ -121,10 +121,10 @@ class Campaign:
                 if process.poll() is None:
                     process.send_signal(signal.SIGTERM)
                 left = leftovers.wait_for_none(token, END_S)
-                described = leftovers.describe(left)
+                commands = leftovers.commands(left)
                 leftovers.end(left)
-            for line in described:
-                outcome.find(f'a process is left: {line}', 'orphans')
+            for pid, command in commands.items():
+                outcome.find(f'a process is left: {pid}: {command}', 'orphans')
         return {'id': trial.label, 'seed': seed, 'options': dict(trial.options),
                 'wall_s': round(time.monotonic() - began, 1),
                 'load': round(os.getloadavg()[0], 1), 'counts': outcome.counts,

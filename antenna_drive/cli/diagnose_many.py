@@ -45,7 +45,7 @@ import shlex
 from antenna_drive.cli.output import (
     add_json_option, check_options, give, Progress, replaced, write_json,
 )
-from antenna_drive.cli.sharing import add_worker_options
+from antenna_drive.cli.sharing import add_diagnosis_options, add_worker_options
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.programs import NEGATIVE, OK
 
@@ -60,11 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              'config/; may be given several times (default: reference)')
     parser.add_argument('--corrected', action='store_true',
                         help='also write corrected.yaml for each machine')
-    parser.add_argument('--diagnose-options', default='', metavar='TEXT',
-                        help="further options for each diagnosis, e.g. '--without tach_1.gain'")
-    parser.add_argument('--time-limit', type=float, default=900.0, metavar='S',
-                        help='time limit of a diagnosis, after which it counts as failed '
-                             '(default %(default)s)')
+    add_diagnosis_options(parser, '--without tach_1.gain')
     parser.add_argument('--memory-limit', type=float, default=4000.0, metavar='MB',
                         help='memory that a diagnosis may ask for before it counts as failed '
                              '(default %(default)s; on Linux)')

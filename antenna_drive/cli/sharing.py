@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The options of every command whose work other processes or machines can do."""
+"""The options of commands whose work other processes or machines can do."""
 
 from __future__ import annotations
 
@@ -25,3 +25,12 @@ def add_worker_options(parser: argparse.ArgumentParser, jobs: int) -> None:
     parser.add_argument('--scheduler', metavar='ADDRESS',
                         help='let the workers of a dask.distributed scheduler do the work, '
                              'e.g. tcp://host:8786')
+
+
+def add_diagnosis_options(parser: argparse.ArgumentParser, example: str) -> None:
+    """Add `--diagnose-options` and `--time-limit`, for diagnoses in processes of their own."""
+    parser.add_argument('--diagnose-options', default='', metavar='TEXT',
+                        help=f"further options for each diagnosis, e.g. '{example}'")
+    parser.add_argument('--time-limit', type=float, default=900.0, metavar='S',
+                        help='time limit of a diagnosis, after which it counts as failed '
+                             '(default %(default)s)')

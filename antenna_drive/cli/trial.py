@@ -50,7 +50,7 @@ from pathlib import Path
 import shlex
 
 from antenna_drive.cli.output import check_options, Progress
-from antenna_drive.cli.sharing import add_worker_options
+from antenna_drive.cli.sharing import add_diagnosis_options, add_worker_options
 from antenna_drive.errors import UserError
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.trial import batch, sealing
@@ -84,11 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_worker_options(parser, os.cpu_count() or 1)
     parser.add_argument('--diagnose', action='store_true',
                         help='diagnose each case as well')
-    parser.add_argument('--diagnose-options', default='', metavar='TEXT',
-                        help="further options for the diagnosis, e.g. '--config my.yaml'")
-    parser.add_argument('--time-limit', type=float, default=900.0, metavar='S',
-                        help='time limit of a diagnosis, after which it counts as failed '
-                             '(default %(default)s)')
+    add_diagnosis_options(parser, '--config my.yaml')
     parser.add_argument('--quiet', action='store_true', help='show no progress')
 
 

@@ -82,14 +82,21 @@ def covariance(state: FitState, inflated: float, settings: IntervalSettings) -> 
         thresholds
 
     """
-    known = state.hessian / inflated
-    scale = np.sqrt(np.maximum(np.diag(known), 1e-30))
-    values, vectors = np.linalg.eigh(known / np.outer(scale, scale))
-    sure = np.maximum(values - settings.derivative_error ** 2, 0.0)
-    total = np.outer(scale, scale) * ((vectors * sure) @ vectors.T)
-    total += np.diag(proper_precision(state.parameters))
+    return _covariance(state, _known(state, settings) / inflated)
+
+
+def _covariance(state: FitState, known: FloatArray) -> FloatArray:
+    total = known + np.diag(proper_precision(state.parameters))
     unit = np.sqrt(np.diag(total))
     return np.asarray(np.linalg.inv(total / np.outer(unit, unit)) / np.outer(unit, unit))
+
+
+def _known(state: FitState, settings: IntervalSettings) -> FloatArray:
+    """Return the Hessian without the directions that derivatives do not determine."""
+    scale = np.sqrt(np.maximum(np.diag(state.hessian), 1e-30))
+    values, vectors = np.linalg.eigh(state.hessian / np.outer(scale, scale))
+    sure = np.maximum(values - settings.derivative_error ** 2, 0.0)
+    return np.asarray(np.outer(scale, scale) * ((vectors * sure) @ vectors.T))
 
 
 def values_with_intervals(hypothesis: Hypothesis, inflated: Callable[[str], float],
@@ -109,10 +116,11 @@ def values_with_intervals(hypothesis: Hypothesis, inflated: Callable[[str], floa
     """
     state = hypothesis.state
     names = [p.name for p in state.parameters]
+    known = _known(state, settings)
     found = {}
     for parameter, value in hypothesis.values:
         place = names.index(parameter.name)
-        variance = covariance(state, inflated(parameter.name), settings)[place, place]
+        variance = _covariance(state, known / inflated(parameter.name))[place, place]
         half_width = _TWO_SIDED_95 * math.hypot(
             float(variance) ** 0.5, _same_number(parameter, value),
             settings.model_error * value)

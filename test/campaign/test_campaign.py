@@ -107,10 +107,10 @@ def test_a_process_that_is_left_is_seen_and_ended() -> None:
                              env={**os.environ, leftovers.TOKEN: token})
     try:
         assert leftovers.wait_for_none(token, 0.0) == [child.pid]
-        assert 'time.sleep' in leftovers.describe([child.pid])[0]
+        assert 'time.sleep' in leftovers.commands([child.pid])[child.pid]
         leftovers.end([child.pid])
         assert child.wait(30.0) == -9
-        assert leftovers.alive(token) == []
+        assert leftovers.alive({leftovers.TOKEN: token}) == []
     finally:
         child.kill()
         child.wait()

@@ -20,6 +20,7 @@ from pathlib import Path
 import re
 import subprocess
 import sys
+import time
 
 import leftovers
 import pytest
@@ -101,7 +102,10 @@ def test_only_what_this_session_has_started_is_found() -> None:
     with subprocess.Popen(['sleep', '3600']) as ours, \
             subprocess.Popen(['sleep', '3600'], env={}) as other:
         try:
-            found = leftovers.started()
+            # The environment of a process can be read only a moment after it was started.
+            deadline = time.monotonic() + 10
+            while ours.pid not in (found := leftovers.started()) and time.monotonic() < deadline:
+                time.sleep(0.01)
             assert ours.pid in found
             assert other.pid not in found
             assert leftovers.end({ours.pid}) == ['sleep 3600']

@@ -28,42 +28,18 @@ from typing import Any
 import warnings
 
 from antenna_drive.campaign.mutating import mutations, POISON
+from antenna_drive.campaign.readers import MAP, one_recording, SHEET
 from antenna_drive.errors import UserError
 from antenna_drive.recording.csv_format import read_csv, write_csv
 from antenna_drive.recording.import_map import import_csv, load_map
 from antenna_drive.recording.mcap_format import read_bag, write_bag
-from antenna_drive.recording.recording import Recording, RecordingError, RecordingWarning
-from antenna_drive.recording.sheet import load_sheet, parse_sheet
+from antenna_drive.recording.recording import RecordingError, RecordingWarning
+from antenna_drive.recording.sheet import load_sheet
 from hypothesis import given, HealthCheck, settings, strategies as st
-import numpy as np
 import pytest
 
 FEW, MANY = 300, 5000
 COUNTS = [pytest.param(FEW, id='few'), pytest.param(MANY, id='many', marks=pytest.mark.trial)]
-SHEET = """\
-circuit: new
-bias: {type: fixed_step, voltage_V: 5.69, at_s: 1.0}
-waveform: {type: multisine, amplitude_deg_s: 0.1, frequencies_hz: [0.1, 0.7], weights: [1, 2]}
-sensors: {encoder_bits: 21, tach_noise_rad_s: 0.0035}
-elevation_deg: 45.0
-"""
-MAP = """\
-time: {column: t, unit: ms, offset_s: 0.5}
-skip_lines: 1
-signals:
-  rate_command_rad_s: {column: r, unit: deg/s, sign: -1}
-  plant/encoder: {column: e, unit: counts, counts_per_revolution: 4096, clock_offset_s: 0.1}
-"""
-
-
-def one_recording() -> Recording:
-    rng = np.random.default_rng(7)
-    time = np.arange(120) * 1e-3
-    return Recording.from_arrays(
-        time, {name: rng.standard_normal(120) for name in (
-            'test_signal/rate_command', 'motor_1/current', 'plant/encoder')},
-        configuration={'axis': {'gear_ratio': 14868.0}}, notes={'source': 'fuzz'},
-        sheet=parse_sheet({'circuit': 'new'}))
 
 
 def outcome(read: Callable[[], Any], path: Path) -> Any:
@@ -80,7 +56,7 @@ def outcome(read: Callable[[], Any], path: Path) -> Any:
 
 @pytest.mark.parametrize('count', COUNTS)
 def test_damaged_storage_is_refused_or_harmless(count: int, tmp_path: Path) -> None:
-    recording = one_recording()
+    recording = one_recording(120)
     write_bag(recording, tmp_path / 'run')
     file = tmp_path / 'run' / 'run_0.mcap'
     refused = 0
@@ -94,7 +70,7 @@ def test_damaged_storage_is_refused_or_harmless(count: int, tmp_path: Path) -> N
 
 @pytest.mark.parametrize('count', COUNTS)
 def test_a_part_of_damaged_storage_is_true_and_told(count: int, tmp_path: Path) -> None:
-    recording = one_recording()
+    recording = one_recording(120)
     write_bag(recording, tmp_path / 'run')
     file = tmp_path / 'run' / 'run_0.mcap'
     content = file.read_bytes()
@@ -110,7 +86,7 @@ def test_a_part_of_damaged_storage_is_true_and_told(count: int, tmp_path: Path) 
 
 @pytest.mark.parametrize('count', COUNTS)
 def test_a_part_of_mutated_storage_never_breaks_the_reader(count: int, tmp_path: Path) -> None:
-    recording = one_recording()
+    recording = one_recording(120)
     write_bag(recording, tmp_path / 'run')
     file = tmp_path / 'run' / 'run_0.mcap'
     for data in mutations(file.read_bytes(), count, seed=3):
@@ -126,7 +102,7 @@ def test_a_part_of_mutated_storage_never_breaks_the_reader(count: int, tmp_path:
 
 @pytest.mark.parametrize('count', COUNTS)
 def test_damaged_metadata_is_refused_or_harmless(count: int, tmp_path: Path) -> None:
-    recording = one_recording()
+    recording = one_recording(120)
     write_bag(recording, tmp_path / 'run')
     file = tmp_path / 'run' / 'metadata.yaml'
     for data in mutations(file.read_bytes(), count, seed=4):
@@ -137,7 +113,7 @@ def test_damaged_metadata_is_refused_or_harmless(count: int, tmp_path: Path) -> 
 
 @pytest.mark.parametrize('count', COUNTS)
 def test_cut_csv_is_refused(count: int, tmp_path: Path) -> None:
-    recording = one_recording()
+    recording = one_recording(120)
     path = tmp_path / 'run.csv'
     write_csv(recording, path)
     content = path.read_bytes()
@@ -153,7 +129,7 @@ def test_cut_csv_is_refused(count: int, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('count', COUNTS)
 def test_mutated_csv_is_refused_or_read_as_it_stands(count: int, tmp_path: Path) -> None:
-    recording = one_recording()
+    recording = one_recording(120)
     path = tmp_path / 'run.csv'
     write_csv(recording, path)
     content = path.read_bytes()

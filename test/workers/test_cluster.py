@@ -25,10 +25,10 @@ import sys
 import threading
 
 from antenna_drive.cli import main
-from antenna_drive.cluster import cluster as connected, fingerprint
 from antenna_drive.errors import UserError
 from antenna_drive.trial import batch
 from antenna_drive.workers import TaskLost, workers
+from antenna_drive.workers.cluster import cluster as connected, fingerprint
 import pytest
 import worker_tasks
 
@@ -137,7 +137,7 @@ def test_trial_with_two_workers_killed(four: Cluster, tmp_path: Path) -> None:
 def test_a_cluster_that_goes_away(who: str, said: str, tmp_path: Path,
                                   monkeypatch: pytest.MonkeyPatch) -> None:
     """It ends the batch in one line; nobody waits for ever."""
-    monkeypatch.setattr('antenna_drive.cluster.PATIENCE_S', 3.0)
+    monkeypatch.setattr('antenna_drive.workers.cluster.PATIENCE_S', 3.0)
     os.mkfifo(tmp_path / 'nothing')
 
     def kill() -> None:
@@ -224,14 +224,14 @@ def test_diagnoses_of_a_trial_with_two_workers_killed(
 
 def test_nobody_there(monkeypatch: pytest.MonkeyPatch) -> None:
     """A scheduler that does not answer is one line, with its address."""
-    monkeypatch.setattr('antenna_drive.cluster.CONNECT_S', 1.0)
+    monkeypatch.setattr('antenna_drive.workers.cluster.CONNECT_S', 1.0)
     with pytest.raises(UserError, match='--scheduler tcp://127.0.0.1:1: no scheduler answers'):
         with workers(1, 'tcp://127.0.0.1:1'):
             pass
 
 
 def test_no_workers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('antenna_drive.cluster.CONNECT_S', 3.0)
+    monkeypatch.setattr('antenna_drive.workers.cluster.CONNECT_S', 3.0)
     with cluster(tmp_path, 0) as found:
         with pytest.raises(UserError, match=f'dask worker {found.address}'):
             with connected(found.address):
@@ -241,7 +241,7 @@ def test_no_workers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_other_sources_are_refused(steady: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
     """A worker with another version would give other results without a word."""
     assert fingerprint() == fingerprint()
-    monkeypatch.setattr('antenna_drive.cluster.fingerprint', lambda: 'another')
+    monkeypatch.setattr('antenna_drive.workers.cluster.fingerprint', lambda: 'another')
     with workers(1, steady.address) as pool:
         for _, result in pool.each(worker_tasks.square, [(2,)]):
             with pytest.raises(UserError, match='has another antenna_drive'):

@@ -31,7 +31,8 @@ import time
 from typing import Any
 
 from antenna_drive.errors import UserError
-from antenna_drive.workers import expect_overflow, Result, TaskLost, Workers
+from antenna_drive.workers.processes import expect_overflow
+from antenna_drive.workers.tasks import Result, TaskLost, Workers
 
 # How long a scheduler may take to answer, and may be without any worker [s].
 CONNECT_S = 10.0
@@ -142,7 +143,7 @@ def _done_there(wanted: str, function: Callable[..., Result],
 @cache
 def fingerprint() -> str:
     """Return a digest of the sources and data of this package: equal for the same code alone."""
-    folder = Path(__file__).parent
+    folder = Path(__file__).parents[1]
     digest = hashlib.sha256()
     for path in sorted(folder.rglob('*')):
         if path.suffix in ('.py', '.yaml'):
