@@ -31,7 +31,7 @@ from antenna_drive.diagnosis.check import check_machine
 from antenna_drive.diagnosis.confusability import could_hide
 from antenna_drive.diagnosis.elimination import backward_elimination, forward_selection
 from antenna_drive.diagnosis.evidence import Evidence
-from antenna_drive.diagnosis.held_out import held_out
+from antenna_drive.diagnosis.held_out import held_out, refuted
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.intervals import inflation, values_with_intervals
 from antenna_drive.diagnosis.lack_of_fit import lack_of_fit, remains, residual_tests
@@ -191,6 +191,12 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
     none, best = hypotheses[0], best.with_jacobian(problem)
     progress(0.9, 'withheld data')
     reach = held_out(problem, none, best, threads)
+    notes = list(machine.notes)
+    if refuted(reach):
+        notes.append(f'{" + ".join(best.effects)} fits best and closes nothing of the gap of '
+                     'withheld data: no effect is named')
+        hypotheses, best = [none], none.with_jacobian(problem)
+        reach = held_out(problem, none, best, threads)
     inflated = dict(zip((p.name for p in best.state.parameters),
                         inflation(problem, best.state).tolist(), strict=True))
     evidence = _evidence(problem, hypotheses, best, reach['explained_fraction']['ci95'][1],
@@ -219,7 +225,7 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         'may_enter_at': [vars(place) for place in places if place.evidence > 0.0],
         'fits': evidence.as_data(),
         'seconds': time.monotonic() - began,
-        'notes': list(machine.notes),
+        'notes': notes,
     }
     progress(1.0, 'done')
     return Diagnosis(result, problem.machine, none, best)

@@ -126,6 +126,13 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis,
             if not form.is_course]}
 
 
+def refuted(reach: Mapping[str, Any]) -> bool:
+    """Return whether effects close nothing of the gap of withheld data; all could be judged."""
+    most = reach['explained_fraction']['ci95'][1]
+    return most is not None and most <= 0.0 and not any(
+        fold['judged'] and fold['cannot_be_judged'] for fold in reach['folds'])
+
+
 def _reason(folds: Sequence[_Fold]) -> str:
     """Return why nothing could be judged."""
     reasons = dict.fromkeys(f'{effect}: {reason}' for fold in folds

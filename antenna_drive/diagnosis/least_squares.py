@@ -213,8 +213,10 @@ class LeastSquares:
         variants, only, plan = [], [], []
         for j, item in enumerate(parameters):
             here = point.get(item.name, 0.0)
-            up = here + item.step <= item.high
-            down = here - item.step >= item.low
+            # a value at a bound may be off it by a rounding error
+            room = item.step * (1.0 - 1e-9)
+            up = here + room <= item.high
+            down = here - room >= item.low
             sides = [s for s, there in ((1.0, up), (-1.0, down)) if there]
             if not central and len(sides) == 2:
                 sides = sides[:1]

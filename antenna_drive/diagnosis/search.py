@@ -37,7 +37,7 @@ from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.least_squares import (
     FitState, Jacobian, LeastSquares, with_initial_conditions,
 )
-from antenna_drive.diagnosis.machine import Parameter
+from antenna_drive.diagnosis.machine import Effect, Form, Parameter
 from antenna_drive.diagnosis.noise import same_noise, with_estimated_noise
 from antenna_drive.diagnosis.screening import (
     jacobian_of_form, rescaled, scan, screened, sensitivities, Sensitivity,
@@ -166,7 +166,7 @@ class Search:
         leading = self._sorted(lambda h: self._continued(h, options.iterations),
                                found[:options.finalists])
         leading[:2] = self._sorted(self._settled, leading[:2])
-        leading.sort(key=self._priced)
+        leading = self._with_relatives(leading)
         return [*leading[:options.bases], *(h.without_jacobian() for h in leading[options.bases:])]
 
     def _added(self, base: Hypothesis, item: Sensitivity, columns: Jacobian) -> Hypothesis:
@@ -201,6 +201,47 @@ class Search:
         state = self.problem.start(hypothesis.state.parameters, point)
         return replace(hypothesis, state=self.problem.fit(
             state, self.settings.settling_iterations))
+
+    def _with_relatives(self, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """
+        Return single effects with those that do the same in other places, the best first.
+
+        Each begins with the nuisances of the best single effect and at a size that does as much.
+        From far away its fit may have ended elsewhere, and 'both motors' then lost to one.
+        """
+        best, effects = singles[0], self.machine.effects
+        effect = effects[best.effects[0]]
+        wholes = [e for e in effects.values() if effect.id in e.parts]
+        relatives = [
+            *((effects[part], float(len(effect.parts))) for part in effect.parts),
+            *((whole, 1.0 / len(whole.parts)) for whole in wholes),
+            *((effects[part], 1.0) for whole in wholes for part in whole.parts
+              if part != effect.id)]
+        found = {(h.effects, h.forms): h for h in singles}
+        for new in self._pool.map(lambda item: self._moved(best, *item), relatives):
+            known = found.get((new.effects, new.forms))
+            if known is None or self._priced(new) < self._priced(known):
+                found[new.effects, new.forms] = new
+        return sorted(found.values(), key=self._priced)
+
+    def _moved(self, base: Hypothesis, effect: Effect, factor: float) -> Hypothesis:
+        """Fit an effect in the place of a hypothesis' only one, from that one times a factor."""
+        was = base.forms[0]
+        form = self.machine.counterpart(was, self.machine.effects[base.effects[0]], effect)
+        point = base.state.point()
+        for old, new in zip(was.parameters, form.parameters, strict=True):
+            point[new.name] = point.pop(old.name) * (1.0 if new.is_shape else factor)
+        return Hypothesis((effect.id,), (form,), self._in_place_of(base, (form,), point))
+
+    def _in_place_of(self, base: Hypothesis, forms: Sequence[Form],
+                     point: dict[str, float]) -> FitState:
+        """Fit effects in the place of a hypothesis' only one, from a point."""
+        state = base.state
+        kept = [j for j, p in enumerate(state.parameters) if p not in base.forms[0].parameters]
+        start = self.problem.start_from(
+            [state.parameters[j] for j in kept], state.jacobian[:, kept],
+            [p for form in forms for p in form.parameters], point)
+        return self.problem.fit(start, self.settings.iterations)
 
     # -- pairs ---------------------------------------------------------------------------------
 
@@ -252,17 +293,12 @@ class Search:
             return []
         forms = tuple(self.machine.counterpart(base.forms[0], effect, self.machine.effects[part])
                       for part in effect.parts)
-        state, point = base.state, base.state.point()
+        point = base.state.point()
         whole = base.forms[0].parameters
         for p, *own in zip(whole, *(form.parameters for form in forms), strict=True):
             value = point.pop(p.name)
             point.update({part.name: value for part in own})
-        kept = [j for j, p in enumerate(state.parameters) if p not in whole]
-        start = self.problem.start_from(
-            [state.parameters[j] for j in kept], state.jacobian[:, kept],
-            [p for form in forms for p in form.parameters], point)
-        return [Hypothesis(effect.parts, forms,
-                           self.problem.fit(start, self.settings.iterations))]
+        return [Hypothesis(effect.parts, forms, self._in_place_of(base, forms, point))]
 
     # -- the whole tests -------------------------------------------------------------------------
 

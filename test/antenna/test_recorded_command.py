@@ -104,6 +104,43 @@ def test_a_jump_among_missing_rows_may_come_at_any_time_between() -> None:
     np.testing.assert_allclose(moved(places)[beside], wanted[beside], rtol=0.0, atol=1e-12)
 
 
+def lacking(command: Callable[[FloatArray], FloatArray], begin: float,
+            end: float) -> RecordedCommand:
+    """Return a recorded command without the rows between two times."""
+    time = np.arange(0.0, 12.0, PERIOD)
+    time = time[(time < begin) | (time > end)]
+    return RecordedCommand.of(time, command(time))
+
+
+def test_straight_lines_go_on_where_rows_are_missing() -> None:
+    """A ramp is no jump, however far it gets among them; nor is a corner that both sides tell."""
+    def triangle(time: FloatArray) -> FloatArray:
+        return np.asarray(np.interp(time, [0.0, 3.0, 6.0, 9.0, 12.0], [0.0, 1.0, 0.0, 1.0, 0.0]))
+
+    for begin, end in ((4.0, 4.5), (5.85, 6.2)):
+        command = lacking(triangle, begin, end)
+        assert command.jumps.size == command.holes.size == 0
+        places = np.linspace(0.1, 11.9, 4999)
+        np.testing.assert_allclose(command(places), triangle(places), rtol=0.0, atol=1e-9)
+
+
+def test_what_nobody_recorded_is_open_within_a_hole() -> None:
+    """A slow sine is told by what is around the hole, a fast one is not; its mean may be found."""
+    omega = 2.0 * np.pi * 3.0
+    assert lacking(lambda t: np.asarray(np.sin(t)), 4.0, 4.1).holes.size == 0
+    command = lacking(lambda t: np.asarray(np.sin(omega * t)), 4.0, 4.27)
+    (begin, end), = command.holes
+    assert 4.0 - PERIOD <= begin <= 4.0 and 4.27 <= end <= 4.27 + PERIOD
+    assert command.jumps.size == 0 and command.doubt[0] > 0.1
+    places = np.linspace(begin, end, 20001)
+    changed = command.with_mean(0, 0.25)
+    assert np.mean(changed(places) - command(places)) == pytest.approx(0.25, rel=1e-3)
+    outside = np.r_[np.linspace(1.0, begin, 999), np.linspace(end, 11.0, 999)]
+    np.testing.assert_array_equal(changed(outside), command(outside))
+    np.testing.assert_allclose(command.part(2.0, 10.0).holes, command.holes - 2.0)
+    assert command.part(5.0, 10.0).holes.size == 0
+
+
 @pytest.mark.parametrize('hertz', [0.3, 2.0, 5.0])
 def test_a_sine_is_smooth_between_its_samples(hertz: float) -> None:
     omega = 2.0 * np.pi * hertz

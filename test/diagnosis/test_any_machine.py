@@ -196,3 +196,14 @@ def test_an_effect_that_widens_the_gap_explains_nothing_of_it() -> None:
     assert share_text({'value': -8453.94, 'ci95': [-9e5, -12.0]}) == (
         'nothing of the gap: with the effect it is wider')
     assert share_text({'value': 0.9, 'ci95': [-0.2, 0.99]}) == '90 % of the gap (0 to 99 %)'
+
+
+def test_what_closes_nothing_of_withheld_data_is_not_named() -> None:
+    """A step of another sign in each test fits both together, and predicts neither."""
+    body, other = Body({'heater.step.size': 0.5}), Body({'heater.step.size': -0.25})
+    body.experiments = (body.experiments[0], other.experiments[1])
+    result = diagnose(body).result
+    assert result['verdict'] == 'unknown_effect'
+    assert {name for entry in result['which'] for name in entry['effects']} == {'none', 'unknown'}
+    assert any(note.startswith('heater.step fits best') for note in result['notes'])
+    assert result['statements']['named']['best_of_catalogue'] == []

@@ -23,7 +23,7 @@ from antenna_drive.diagnosis import (
     Colour, Effect, Experiment, FloatArray, Form, Hypothesis, LeastSquares, Machine, Parameter,
     Point,
 )
-from antenna_drive.diagnosis.held_out import block_sums, explained_fraction, held_out
+from antenna_drive.diagnosis.held_out import block_sums, explained_fraction, held_out, refuted
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
@@ -84,6 +84,15 @@ def test_an_effect_that_turns_its_sign_explains_less_than_nothing_elsewhere() ->
     fraction = judged(Ramp([0.5, -0.5]))['explained_fraction']
     assert isinstance(fraction, dict) and fraction['bounds'] == [-1.0, 1.0]
     assert fraction['value'] == -1.0 and fraction['ci95'][1] < 0.0
+
+
+def test_only_what_could_be_judged_in_full_is_refuted() -> None:
+    turned = judged(Ramp([0.5, -0.5]))
+    assert refuted(turned)
+    assert not refuted(judged(Ramp([0.5, 0.5])))
+    assert not refuted(judged(Ramp([0.5, 0.5], shows=(1.0, 0.0))))
+    turned['folds'][0]['cannot_be_judged'] = {'spring.damping': 'its numbers belong to one test'}
+    assert not refuted(turned)
 
 
 def test_an_exact_correction_explains_all_within_its_interval() -> None:

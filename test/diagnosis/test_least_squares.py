@@ -15,6 +15,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import math
 from typing import Any
 
@@ -75,6 +76,17 @@ def test_central_differences_are_the_derivative() -> None:
     time = problem.experiments[0].time
     assert columns[:, 0] == pytest.approx(np.full(400, 100.0), rel=1e-4)
     assert columns[:, 1] == pytest.approx(-100.0 * time * np.exp(-0.5 * time), abs=1e-2)
+
+
+def test_a_rounding_error_at_a_bound_leaves_the_derivative() -> None:
+    """A difference quotient that reaches from one bound to the other needs all the room."""
+    switch = replace(RATE, high=1.0, step=1.0)
+    problem = LeastSquares(Decay(0.7, 0.01))
+    for value in (1.0, np.nextafter(1.0, 0.0), 0.0, 5e-17):
+        point = {'offset': 0.0, 'rate': float(value)}
+        found = problem.jacobian(point, [switch], problem.residuals(point), central=True)
+        time = problem.experiments[0].time
+        np.testing.assert_allclose(found[:, 0], (np.exp(-time) - 1.0) / 0.01, rtol=1e-5)
 
 
 def test_what_was_not_measured_counts_for_nothing() -> None:

@@ -318,7 +318,7 @@ def _quantisation(digit: float) -> Form:
     """
     if not digit:
         return _form(_number('step', 'rad', 0.0, 1e-2, 1e-5, Digit()))
-    turn = AntennaParameter('turn', '1', -0.5, 0.5, 0.02, on_readings=True, is_shape=True,
+    turn = AntennaParameter('turn', '1', -1.0, 1.0, 0.02, on_readings=True, is_shape=True,
                             modifier=DigitTurn())
     return _form(_number('step', 'rad', 0.0, digit, digit, Digit()), turn, name='digits seen')
 

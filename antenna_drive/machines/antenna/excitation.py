@@ -34,6 +34,7 @@ from antenna_drive.parameters.sets import Waveform
 from antenna_drive.physics import signal_generator
 from antenna_drive.recording import sheet as sheets
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
@@ -55,6 +56,8 @@ _FEWEST_ON_A_GRID, _GRID_OVER_INTERVAL = 6, 8.0
 _APART_S = 1e-9
 # An interval between samples longer than this many usual ones lacks rows.
 _LACKS_ROWS = 1.5
+# ... and its command is not told by those around it if they part by this share of its range.
+_IN_DOUBT = 0.01
 _PARABOLA = np.linalg.inv(np.vander(_PLACES, 3, increasing=True))
 
 
@@ -128,6 +131,9 @@ class RecordedCommand:
     jumps : times at which the command jumps, shape (k,) [s]
     slack : by how much each jump may be off because rows are missing, shape (k,) [s]; 0 where
         none are
+    holes : begin and end of each interval whose rows are missing and not told by those around
+        it, shape (h, 2) [s]
+    doubt : by how much the command may be off in the middle of each hole, shape (h,) [rad/s]
 
     """
 
@@ -136,14 +142,18 @@ class RecordedCommand:
     slope: FloatArray
     jumps: FloatArray
     slack: FloatArray
+    holes: FloatArray
+    doubt: FloatArray
 
     @classmethod
     def of(cls, time: FloatArray, value: FloatArray) -> RecordedCommand:
         """Take the samples of a command, shape (n,), and find its jumps."""
-        change = np.abs(np.diff(value))
+        change, doubt = np.abs(np.diff(value)), _doubt(time, value)
         usual = np.median(change) + 1e-12
         around = np.maximum(np.r_[change[1:], 0.0], np.r_[0.0, change[:-1]])
         large = (change > 0.05 * np.ptp(value)) & (change > 20.0 * usual) & (change > 4.0 * around)
+        # straight lines go on where rows are missing, and curves turn in it
+        large &= np.isnan(doubt) | ((doubt > _IN_DOUBT * np.ptp(value)) & _level(time, value))
         k = np.flatnonzero(large)
         jumps, regular = regular_times(time[k], time[k + 1])
         width = time[k + 1] - time[k]
@@ -159,8 +169,13 @@ class RecordedCommand:
         # the three pieces of an interval with a jump: the middle one is the jump
         pieces = np.insert(
             np.where(large[:, np.newaxis], 0.0, slopes), np.repeat(k, 2), 0.0, axis=0)
+        open_ = np.nan_to_num(doubt) > _IN_DOUBT * np.ptp(value)
+        open_[k] = False
+        open_[_corners(time, value)[0]] = False
+        h = np.flatnonzero(open_)
         return cls(times[order], values[order], pieces, jumps,
-                   np.where(lacking, 0.5 * width - _APART_S, 0.0))._with_corners(time, value)
+                   np.where(lacking, 0.5 * width - _APART_S, 0.0),
+                   np.column_stack([time[h], time[h + 1]]), doubt[h])._with_corners(time, value)
 
     def _with_corners(self, time: FloatArray, value: FloatArray) -> RecordedCommand:
         """Return the command with a corner wherever straight lines meet between two samples."""
@@ -193,9 +208,10 @@ class RecordedCommand:
         first = max(int(np.searchsorted(self.time, begin, side='right')) - 1, 0)
         last = int(np.searchsorted(self.time, end)) + 1
         inside = (self.jumps > begin) & (self.jumps < end)
+        felt = (self.holes[:, 0] > begin) & (self.holes[:, 1] < end)
         return RecordedCommand(self.time[first:last] - begin, self.value[first:last],
                                self.slope[first:last - 1], self.jumps[inside] - begin,
-                               self.slack[inside])
+                               self.slack[inside], self.holes[felt] - begin, self.doubt[felt])
 
     def with_jump(self, number: int, later: float) -> RecordedCommand:
         """Return the command with one of its jumps later [s], by less than its slack."""
@@ -205,6 +221,46 @@ class RecordedCommand:
         time[right - 1:right + 1] += later
         jumps[number] += later
         return replace(self, time=time, jumps=jumps)
+
+    def with_mean(self, number: int, more: float) -> RecordedCommand:
+        """Return the command with another mean in one of its holes, by so much [rad/s]."""
+        begin, end = self.holes[number]
+        piece = int(np.searchsorted(self.time, 0.5 * (begin + end))) - 1
+        slope = self.slope.copy()
+        # a cubic that begins and ends as before: its mean is a twelfth of the slopes' difference
+        slope[piece] += 6.0 * more / (end - begin) * np.array([1.0, -1.0])
+        return replace(self, slope=slope)
+
+
+def _doubt(time: FloatArray, value: FloatArray) -> FloatArray:
+    """
+    Return by how much the two sides of each interval part in its middle, shape (n - 1,).
+
+    Each side is taken on as a line and as a parabola. It is NaN where no rows are missing.
+    """
+    width = np.diff(time)
+    doubt = np.full(width.size, np.nan)
+    for i in np.flatnonzero(width > _LACKS_ROWS * np.median(width)):
+        middle = 0.5 * (time[i] + time[i + 1])
+        doubt[i] = min((abs(_taken_on(time[i - n:i + 1], value[i - n:i + 1], middle)
+                            - _taken_on(time[i + 1:i + 2 + n], value[i + 1:i + 2 + n], middle))
+                        for n in (1, 2) if n <= i < width.size - n), default=0.0)
+    return doubt
+
+
+def _taken_on(time: FloatArray, value: FloatArray, at: float) -> float:
+    """Return the value of the polynomial through a few samples at a time."""
+    return float(Polynomial.fit(time, value, time.size - 1)(at))
+
+
+def _level(time: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
+    """Return which intervals have straight lines on both sides, shape (n - 1,)."""
+    slope = np.diff(value) / np.diff(time)
+    bend = np.abs(np.diff(slope, prepend=slope[:1]))
+    # between the two intervals before, and between the two behind
+    before, behind = np.r_[0.0, bend[:-1]], np.r_[bend[2:], 0.0, 0.0]
+    return np.asarray(np.maximum(before, behind) * np.diff(time)
+                      < _STRAIGHT * np.abs(np.diff(value)))
 
 
 def _smooth(time: FloatArray, value: FloatArray) -> NDArray[np.bool_]:

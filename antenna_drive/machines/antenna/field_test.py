@@ -24,7 +24,7 @@ from typing import Any
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.emulator import batch
 from antenna_drive.machines.antenna.excitation import (
-    Bias, CommandedRate, Longest, schedule, SheetCommand,
+    Bias, CommandedRate, Longest, RecordedCommand, schedule, SheetCommand,
 )
 from antenna_drive.machines.antenna.field_recording import (
     BIAS, CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldRecording, Note, TACH_1, TACH_2, UNITS,
@@ -54,6 +54,9 @@ _STEP_S = 5.3e-3
 _SWEEP, _LOOKS = 2.0, 2000
 # The angle at the beginning of a window is read in this time [s].
 _ANGLE_S = 0.1
+# What the command did in a hole of the recording is forgotten after this time, as far as the mean
+# in it does not tell [s].
+_FORGOTTEN_S = 2.0
 
 
 @dataclass(frozen=True)
@@ -160,6 +163,10 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
     time = recording.thinned(window.compared, window.end)
     measured, slope = recording.measured(time)
     sensors = SensorModel.of(recording.sheet.sensors)
+    command = recording.command_between(window.begin, window.compared, time[-1])
+    if isinstance(command, RecordedCommand):
+        for begin, end in command.holes + window.begin:
+            measured[(time > begin) & (time < end + _FORGOTTEN_S)] = np.nan
     rest = time < recording.onset
     for tach in (TACH_1, TACH_2):
         measured[rest, tach] = np.where(
@@ -174,7 +181,7 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
     if not math.isinf(window.end):
         name = f'{name} {window.compared:.0f}-{time[-1]:.0f} s'
     test = FieldTest(
-        name, record_of(drive), recording.command_between(window.begin, window.compared, time[-1]),
+        name, record_of(drive), command,
         bias.later(window.begin), time - window.begin, measured, slope,
         sensors, jitter_of(recording.command, recording.rates.time_s, recording.rates.values),
         recording.period, recording.sheet.tolerances or sheets.Tolerances(), window.known_start)

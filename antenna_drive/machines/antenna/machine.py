@@ -22,7 +22,7 @@ import copy
 from dataclasses import dataclass, replace
 import math
 from threading import Lock
-from typing import Any
+from typing import Any, TypeAlias
 
 from antenna_drive.diagnosis import (
     Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Motion, Parameter,
@@ -75,6 +75,10 @@ _STARTS = np.linspace(-0.95, 0.95, 13)
 # Runs that are kept, and tables of steps: a test has one for each bias voltage and each wave.
 _KEPT_RUNS = 60
 _KEPT_PLANS = 24
+# By number: late jumps of the command [s], or other means in its holes [rad/s].
+_Numbered: TypeAlias = tuple[tuple[int, float], ...]
+# Test, longest step, delay of the command [s], what it did unrecorded, source of the bias.
+_PlanKey: TypeAlias = tuple[int, Longest, float, tuple[_Numbered, _Numbered], Bias]
 
 
 @dataclass(frozen=True)
@@ -117,7 +121,7 @@ class AntennaMachine(Machine):
         """Prepare the tests and take the sensors' noise from a first run."""
         self._executor = ThreadPoolExecutor(threads)
         self._runs: OrderedDict[_Job, FloatArray] = OrderedDict()
-        self._plans: OrderedDict[tuple[int, Longest, Bias], batch.Schedule] = OrderedDict()
+        self._plans: OrderedDict[_PlanKey, batch.Schedule] = OrderedDict()
         self._lock = Lock()
         self._longest_step = LONGEST_STEP
         self._low_fidelity: AntennaMachine | None = None
@@ -384,28 +388,30 @@ class AntennaMachine(Machine):
     def _plan(self, k: int, run: RunSetup, longest: Longest) -> batch.Schedule:
         """Return the steps of a run."""
         test = self._tests[k]
-        command = test.command
-        for number, later in run.late_jumps.items():
-            assert isinstance(command, RecordedCommand)
-            command = command.with_jump(number, later)
-        if run.delay or run.late_jumps:
-            plan = schedule(command, run.bias, test.output_times, longest, run.delay)
-        else:
-            plan = self._kept((k, longest, run.bias), lambda: with_bias(self._kept(
-                (k, longest, test.bias),
-                lambda: schedule(test.command, test.bias, test.output_times, longest)), run.bias))
+        unrecorded = (tuple(run.late_jumps.items()), tuple(run.hole_means.items()))
+
+        def planned() -> batch.Schedule:
+            command = test.command
+            if isinstance(command, RecordedCommand):
+                for number, later in run.late_jumps.items():
+                    command = command.with_jump(number, later)
+                for number, more in run.hole_means.items():
+                    command = command.with_mean(number, more)
+            return schedule(command, test.bias, test.output_times, longest, run.delay)
+
+        key = (k, longest, run.delay, unrecorded)
+        plan = self._kept((*key, run.bias), lambda: with_bias(
+            self._kept((*key, test.bias), planned), run.bias))
         return plan if run.gust is None else with_torque(plan, *gust.course(run.gust))
 
-    def _kept(self, key: tuple[int, Longest, Bias],
-              made: Callable[[], batch.Schedule]) -> batch.Schedule:
+    def _kept(self, key: _PlanKey, made: Callable[[], batch.Schedule]) -> batch.Schedule:
         """Return the table of steps of a test, made if it is not known."""
-        plan = self._plans.get(key)
-        if plan is None:
-            plan = made()
-            with self._lock:
-                self._plans[key] = plan
-                while len(self._plans) > _KEPT_PLANS:
-                    self._plans.popitem(last=False)
+        plan = self._plans.get(key) or made()
+        with self._lock:
+            self._plans[key] = plan
+            self._plans.move_to_end(key)
+            while len(self._plans) > _KEPT_PLANS:
+                self._plans.popitem(last=False)
         return plan
 
     def _read(self, k: int, out: FloatArray, point: Point) -> FloatArray:

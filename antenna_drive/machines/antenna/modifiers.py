@@ -47,6 +47,7 @@ class RunSetup:
     bias : source of the bias voltage, where the share circuit is not connected
     gust : torque on the axis at its knots [N m]; None for none
     late_jumps : by how much jumps of the command come later, by number [s]
+    hole_means : by how much the mean of the command is higher in its holes, by number [rad/s]
     waves : parts of each wave
 
     """
@@ -57,6 +58,7 @@ class RunSetup:
     bias: Bias
     gust: FloatArray | None = None
     late_jumps: dict[int, float] = field(default_factory=dict)
+    hole_means: dict[int, float] = field(default_factory=dict)
     waves: dict[WaveShape, list[float]] = field(default_factory=dict)
 
     def change(self, path: str, how: str, value: float) -> None:
@@ -246,6 +248,16 @@ class UnrecordedJump(RunModifier):
 
     def apply(self, run: RunSetup, value: float) -> None:
         run.late_jumps[self.number] = value
+
+
+@dataclass(frozen=True)
+class UnrecordedMean(RunModifier):
+    """Lets the command have another mean in a hole of the recording."""
+
+    number: int
+
+    def apply(self, run: RunSetup, value: float) -> None:
+        run.hole_means[self.number] = value
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from antenna_drive.machines.antenna.field_test import (
 )
 from antenna_drive.machines.antenna.modifiers import (
     add, AntennaParameter, ChannelDelay, ClockRate, ClockShift, JumpTime, Modifier, ReadingGain,
-    ReadingModifier, ReadingZero, scale, SupplyGain, UnrecordedJump,
+    ReadingModifier, ReadingZero, scale, SupplyGain, UnrecordedJump, UnrecordedMean,
 )
 from antenna_drive.recording.sheet import Tolerances
 
@@ -161,6 +161,10 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
             # of those before a window the last ones alone are still felt in it
             elif test.time[0] - _FELT_S < begin < test.time[-1]:
                 yield _within(name, 's', half, JumpTime(begin - half, end - half), k)
+
+        for i, ((begin, _), doubt) in enumerate(zip(command.holes, command.doubt, strict=True)):
+            yield _within(f'hole:{test.name}:{begin:.3f}', 'rad/s', 2.0 * float(doubt),
+                          UnrecordedMean(i), k)
 
     given = allowed([test])
     if given.clock_ppm:
