@@ -38,6 +38,8 @@ from antenna_drive.diagnosis.settings import IntervalSettings
 import numpy as np
 
 _TWO_SIDED_95 = 1.96
+# Share of a variance that data of single precision can account for.
+_BY_DATA = 1e-6
 
 
 def inflation(problem: LeastSquares, state: FitState) -> FloatArray:
@@ -65,7 +67,9 @@ def inflation(problem: LeastSquares, state: FitState) -> FloatArray:
     spread = covariance(state, 1.0, problem.settings.interval)
     found = np.sum(np.square(scores.astype(float) @ spread), axis=0)
     independent = np.sum((state.hessian @ spread) * spread, axis=0)
-    return np.asarray(np.maximum(found / np.maximum(independent, 1e-30), 1.0))
+    # a value that priors alone determine has no scatter to compare
+    by_data = independent > _BY_DATA * np.diag(spread)
+    return np.where(by_data, np.maximum(found / np.where(by_data, independent, 1.0), 1.0), 1.0)
 
 
 def covariance(state: FitState, inflated: float, settings: IntervalSettings) -> FloatArray:

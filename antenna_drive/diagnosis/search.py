@@ -27,7 +27,7 @@ The search for effects: from the nuisances alone over single effects to pairs.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -86,12 +86,12 @@ class Search:
         self.progress(0.15, 'sensitivity to each effect')
         self._take_sensitivities(none.state)
         self.progress(0.25, 'single effects')
-        singles = self._at_lower_noise(self._singles(none))
+        singles = self._converging(self._at_lower_noise(self._singles(none)))
         self.progress(0.5, 'pairs of effects')
         pairs = self._pairs(singles)
         if pairs:
             scale = self.problem.scale
-            pairs = self._at_lower_noise(pairs)
+            pairs = self._converging(self._at_lower_noise(pairs))
             # costs compare at one and the same noise only
             singles = [replace(h, state=self.problem.rescaled(h.state, scale)) for h in singles]
         self.progress(0.7, 'the best in full')
@@ -134,10 +134,30 @@ class Search:
             self.sensitivities = rescaled(self.sensitivities, self.problem.scale / problem.scale)
             self.problem = problem
             finalists = found[:self.settings.finalists]
-            shared = self._shared_jacobian(problem, best.point(), finalists)
+            shared = self._shared_jacobian(problem, best, finalists)
             found = self._sorted(partial(
                 self._refitted, problem, shared, self.settings.iterations), finalists)
         return found
+
+    def _converging(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """
+        Go on with the best few fits, with fresh derivatives, as long as that gains much.
+
+        A fit that has stopped early hides what its effect can do, and what a partner adds.
+        """
+        count = self.settings.bases
+        return sorted([*self._pool.map(self._went_on, hypotheses[:count]), *hypotheses[count:]],
+                      key=self._priced)
+
+    def _went_on(self, hypothesis: Hypothesis) -> Hypothesis:
+        state, options = hypothesis.state, self.settings
+        for _ in range(options.converging_passes):
+            before = state.cost
+            state = self.problem.fit(self.problem.refreshed(state, central=False),
+                                     options.settling_iterations)
+            if before - state.cost < max(options.settled, options.final_gain * before):
+                break
+        return replace(hypothesis, state=state)
 
     # -- single effects ------------------------------------------------------------------------
 
@@ -206,23 +226,28 @@ class Search:
         """
         Return single effects with those that do the same in other places, the best first.
 
-        Each begins with the nuisances of the best single effect and at a size that does as much.
-        From far away its fit may have ended elsewhere, and 'both motors' then lost to one.
+        Each begins with the nuisances of one of the best and at a size that does as much. From
+        far away its fit may have ended elsewhere, and 'both motors' then lost to one.
         """
-        best, effects = singles[0], self.machine.effects
-        effect = effects[best.effects[0]]
-        wholes = [e for e in effects.values() if effect.id in e.parts]
-        relatives = [
-            *((effects[part], float(len(effect.parts))) for part in effect.parts),
-            *((whole, 1.0 / len(whole.parts)) for whole in wholes),
-            *((effects[part], 1.0) for whole in wholes for part in whole.parts
-              if part != effect.id)]
         found = {(h.effects, h.forms): h for h in singles}
-        for new in self._pool.map(lambda item: self._moved(best, *item), relatives):
+        relatives = [(base, *item) for base in singles[:self.settings.bases]
+                     for item in self._relatives(base)]
+        for new in self._pool.map(lambda item: self._moved(*item), relatives):
             known = found.get((new.effects, new.forms))
             if known is None or self._priced(new) < self._priced(known):
                 found[new.effects, new.forms] = new
         return sorted(found.values(), key=self._priced)
+
+    def _relatives(self, base: Hypothesis) -> Iterator[tuple[Effect, float]]:
+        """Yield an effect in other places, with the factor of its size that does as much."""
+        effects = self.machine.effects
+        effect = effects[base.effects[0]]
+        for part in effect.parts:
+            yield effects[part], float(len(effect.parts))
+        for whole in effects.values():
+            if effect.id in whole.parts:
+                yield whole, 1.0 / len(whole.parts)
+                yield from ((effects[part], 1.0) for part in whole.parts if part != effect.id)
 
     def _moved(self, base: Hypothesis, effect: Effect, factor: float) -> Hypothesis:
         """Fit an effect in the place of a hypothesis' only one, from that one times a factor."""
@@ -327,7 +352,7 @@ class Search:
         before = np.inf
         for number in range(options.passes):
             self.progress(0.7 + 0.3 * number / options.passes, 'the best in full')
-            shared = self._shared_jacobian(whole, anchor.state.point(), chosen)
+            shared = self._shared_jacobian(whole, anchor.state, chosen)
             # the first pass is never the last, and only the last one's Hessian is asked for
             refitted = partial(self._refitted_in_full, shared, number > 0)
             chosen = self._sorted(refitted, chosen)
@@ -396,6 +421,10 @@ class Search:
 
         return list(self._pool.map(added, promising))
 
+    def leaves_much(self, hypothesis: Hypothesis) -> bool:
+        """Return whether a hypothesis leaves more than noise in the whole tests."""
+        return self.whole.noise_level(hypothesis.state.residual) > self.settings.wanting
+
     def judged_by(self, best: Hypothesis,
                   hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """
@@ -421,25 +450,30 @@ class Search:
         names = {p.name for p in hypothesis.forms[gone].parameters}
         state, values = hypothesis.state, hypothesis.state.point()
         free = {p.name: p for p in self.machine.nuisances}
-        own: list[Parameter] = [
-            free.get(p.name, p) for p in state.parameters if p.name not in names]
+        kept = [j for j, p in enumerate(state.parameters) if p.name not in names]
+        own: list[Parameter] = [free.get(p.name, p) for p in (state.parameters[j] for j in kept)]
         point = self.machine.absorb({p.name: values[p.name] for p in own},
                                     {name: values[name] for name in names})
-        bare = replace(state, parameters=tuple(own), x=np.array([point[p.name] for p in own]))
+        bare = replace(
+            state.without_jacobian(), parameters=tuple(own),
+            x=np.array([point[p.name] for p in own]),
+            kept_hessian=None if state.kept_hessian is None
+            else state.kept_hessian[np.ix_(kept, kept)])
         return Hypothesis(
             tuple(e for i, e in enumerate(hypothesis.effects) if i != gone),
             tuple(f for i, f in enumerate(hypothesis.forms) if i != gone), bare)
 
-    def _shared_jacobian(self, problem: LeastSquares, point: dict[str, float],
+    def _shared_jacobian(self, problem: LeastSquares, state: FitState,
                          hypotheses: Sequence[Hypothesis]) -> _SharedJacobian:
-        """Take the derivatives at a point that several hypotheses share."""
+        """Take the derivatives where a fit has ended, which several hypotheses share."""
+        point, steps = state.point(), problem.local_steps(state)
         residual = problem.residuals(point)
         # a course has so many parameters that its derivatives are worth sharing, and the
         # prediction is nearly linear in them
         courses = {form for h in hypotheses for form in h.forms if form.is_course}
         return _SharedJacobian(
-            problem.jacobian(point, self.machine.nuisances, residual, central=False),
-            {form.name: problem.jacobian(point, form.parameters, residual, central=False)
+            problem.jacobian(point, self.machine.nuisances, residual, False, steps),
+            {form.name: problem.jacobian(point, form.parameters, residual, False, steps)
              for form in courses})
 
     def _refitted_in_full(self, shared: _SharedJacobian, keep_hessian: bool,

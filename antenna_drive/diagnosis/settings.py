@@ -50,6 +50,11 @@ class FitSettings:
         1e-2, '1', 'least damping after a step that failed, before it grows')
     damping_growth: float = _setting(8.0, '1', 'growth of the damping after a step that failed')
     damping_decay: float = _setting(5.0, '1', 'decay of the damping after a good step')
+    local_step: float = _setting(
+        3.0, 'noise sigma', 'change of the prediction by the step of a fresh difference quotient',
+        'trial 6')
+    least_step: float = _setting(
+        0.01, '1', 'the least such step, as a share of the usual one')
     good_step: float = _setting(
         0.5, '1', 'share of the expected gain from which a step counts as good')
     least_gain: float = _setting(
@@ -116,6 +121,9 @@ class SearchSettings:
     first_iterations: int = _setting(5, '1', 'iterations of a first fit of an effect')
     iterations: int = _setting(8, '1', 'iterations of a further fit')
     pair_iterations: int = _setting(6, '1', "iterations of a pair's further fit")
+    converging_passes: int = _setting(
+        2, '1', 'passes of the best fits, with fresh derivatives, before they are given partners',
+        'trial 6')
     settling_iterations: int = _setting(10, '1', 'iterations of a fit with fresh derivatives')
     full_iterations: int = _setting(6, '1', 'iterations of a fit to the whole tests')
     most_effects: int = _setting(4, '1', 'greatest number of effects of a hypothesis')
