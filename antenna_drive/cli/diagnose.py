@@ -56,7 +56,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('recordings', nargs='+', metavar='RECORDING',
                         help='recordings of one machine: .csv, or bags (folder or .mcap)')
     parser.add_argument('--model', metavar='FILE.py:NAME',
-                        help='diagnose a machine of your own, in the place of the drive')
+                        help='diagnose a machine of your own in the place of the drive; also '
+                             'FILE.yaml')
     parser.add_argument('--map', type=Path, metavar='MAP.yaml',
                         help='with --model: which column is which, and how it is written')
     parser.add_argument('--config', action='append', default=[], metavar='FILE',
