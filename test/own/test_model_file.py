@@ -58,11 +58,12 @@ class StandIn:
 
     parallel = True
     longest_step_s = 0.05
+    START = 10.0
 
     def __init__(self, path: Path, ports: Ports) -> None:
-        """Let every place be 10 in the program's own file."""
+        """Let every place have the same value in the program's own file."""
         self.ports = ports
-        self.defaults = np.full(len(ports.places), 10.0)
+        self.defaults = np.full(len(ports.places), self.START)
         self.values: dict[str, float] = {}
 
     def run(self, values: FloatArray, start_s: float, step_s: float,
@@ -169,6 +170,21 @@ def test_a_constant_that_the_sheet_lacks_is_told(tmp_path: Path,
                                                 'constants: {mass: weight}'))
     with pytest.raises(ModelError, match='test: constants: weight: not in the sheet'):
         machine.predict({}, 0)
+
+
+def test_a_stiffness_of_nothing_has_no_compliance(tmp_path: Path,
+                                                  stand_in: list[StandIn]) -> None:
+    machine = machine_of(tmp_path)
+    with pytest.raises(ModelError, match='twist.adds_to_inverse: stiffness: it is 0'):
+        machine.predict({'level': -10.0}, 0)
+
+
+def test_a_number_adds_only_to_what_has_a_value(tmp_path: Path, stand_in: list[StandIn],
+                                                monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(StandIn, 'START', np.nan)
+    with pytest.raises(ModelError, match='grows.scales: other: any.xml gives it no value'):
+        machine_of(tmp_path, TEXT.replace('scales: stiffness', 'scales: other').replace(
+            'share: 0.1', 'value: 10.0, share: 0.1'))
 
 
 def test_a_file_that_is_not_there_is_told(tmp_path: Path) -> None:

@@ -118,6 +118,11 @@ def _model(path: Path, top: Mapping[str, Any]) -> Model:
     _check_actions(actions, inputs)
     simulator = _simulator(program[0], path.parent / _text(program[0], top[program[0]]), ports)
     defaults = dict(zip(ports.places, simulator.defaults.tolist(), strict=True))
+    given = {*starts, *constants, *(item.target for item in actions if item.act == 'sets')}
+    for item in actions:
+        if item.target not in given and math.isnan(defaults.get(item.target, 0.0)):
+            raise ModelError(f'{item.key}: {item.target}: {top[program[0]]} gives it no value; '
+                             'let a number set it first')
     longest = (_number('step_s', top['step_s'], _POSITIVE) if 'step_s' in top
                else simulator.longest_step_s)
     simulate = _Simulation(
@@ -188,6 +193,9 @@ class _Simulation:
             elif item.act == 'adds':
                 values[item.target] += change
             elif item.act == 'adds_to_inverse':
+                if values[item.target] == 0.0:
+                    raise ModelError(f'{item.key}: {item.target}: it is 0, which has no inverse; '
+                                     'add to it, or set it')
                 values[item.target] = 1.0 / (1.0 / values[item.target] + change)
         return np.array(list(values.values()))
 
