@@ -104,6 +104,14 @@ def test_inputs_and_pushes_turn_it(tmp_path: Path) -> None:
     np.testing.assert_allclose(pushed[:, 0], moved, atol=2e-8)
 
 
+def test_neither_inputs_nor_pushes_are_needed(tmp_path: Path) -> None:
+    log = log_of()
+    yaml = YAML.replace('inputs: {motor: torque}\n', '').partition('push:')[0]
+    expected = np.column_stack(free_course(log.time - 5.0, 0.3, 0.4, 8.0, 2.0))
+    np.testing.assert_allclose(machine_of(tmp_path, log, yaml).predict({}, 0), expected,
+                               atol=2e-8)
+
+
 def test_runs_leave_nothing_behind_in_any_thread(tmp_path: Path) -> None:
     machine = machine_of(tmp_path, log_of())
     points = [{}, {'inertia': 0.3}, {'disc.damping.damping': 0.6}, {}]

@@ -73,8 +73,11 @@ class FmuModel:
         """Unpack the file, find the variables and make an instance."""
         self._path = path
         self._said = ''
+        # lives as long as this object
+        self._folder = TemporaryDirectory(prefix='antenna_drive_fmu_')
         try:
             described = fmpy.read_model_description(str(path), validate=False)
+            fmpy.extract(str(path), self._folder.name)
         except Exception as error:  # fmpy and the libraries below it raise many kinds
             raise ModelError(f'{path}: no FMU that can be read: {one_line(error)}') from None
         self._version = described.fmiVersion[:1]
@@ -94,9 +97,6 @@ class FmuModel:
         self._inputs = self._references(
             self._checked({**ports.inputs, **ports.pushes}, 'input'))
         self._outputs = self._references(self._checked(ports.outputs))
-        # lives as long as this object
-        self._folder = TemporaryDirectory(prefix='antenna_drive_fmu_')
-        fmpy.extract(str(path), self._folder.name)
         self._slave = self._instance()
 
     def run(self, values: FloatArray, start_s: float, step_s: float,

@@ -15,7 +15,7 @@
 A model file: a few lines of YAML make a machine of a MuJoCo model or an FMU.
 
 The entries are those of `declaration.machine`. Each number also says what it does in the
-simulation program: it sets, adds to, scales or softens a parameter, or delays an input.
+simulation program: it changes a parameter, or delays an input (docs/own-machine.md).
 """
 
 from __future__ import annotations

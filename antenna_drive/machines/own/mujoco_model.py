@@ -91,7 +91,9 @@ class MujocoModel:
         spare = _Worker(self._model)
         self.defaults = np.array([float(spare.cell(place, key)[0])
                                   for place, key in ports.places.items()])
-        actuators = [self._id(mujoco.mjtObj.mjOBJ_ACTUATOR, 'actuator', *item)
+        # since MuJoCo 4 an actuator may have several controls; its first one is meant
+        controls = getattr(self._model, 'actuator_ctrladr', range(self._model.nu))
+        actuators = [controls[self._id(mujoco.mjtObj.mjOBJ_ACTUATOR, 'actuator', *item)]
                      for item in ports.inputs.items()]
         joints = [self._id(mujoco.mjtObj.mjOBJ_JOINT, 'joint', *item)
                   for item in ports.pushes.items()]
