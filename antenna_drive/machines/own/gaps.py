@@ -24,7 +24,7 @@ from collections.abc import Sequence
 
 from antenna_drive.machines.own.log import Log
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import CubicHermiteSpline
 
 # A command is known in a gap where the rates before and after it tell the way across it up to this
 # share of its range.
@@ -67,12 +67,16 @@ def without_gaps(log: Log, commands: Sequence[str], settles_s: float = 0.0) -> L
     unknown = np.zeros(every.size, dtype=bool)
     for name in commands:
         values = log[name]
-        columns[name] = np.asarray(PchipInterpolator(rows, values)(every))
+        columns[name] = np.interp(every, rows, values)
         rates = np.diff(values) / counts
         for k in np.flatnonzero(counts > 1):
-            across = 0.5 * (rates[max(k - 1, 0)] + rates[min(k + 1, rates.size - 1)])
-            if abs(rates[k] - across) * counts[k] > _KNOWN * np.ptp(values):
+            around = [rates[max(k - 1, 0)], rates[min(k + 1, rates.size - 1)]]
+            if abs(rates[k] - np.mean(around)) * counts[k] > _KNOWN * np.ptp(values):
                 unknown |= (time > log.time[k]) & (time <= log.time[k + 1] + settles_s)
+                continue
+            across = CubicHermiteSpline(rows[k:k + 2], values[k:k + 2], around)
+            lost = every[rows[k] + 1:rows[k + 1]]
+            columns[name][lost] = across(lost)
     for name in columns.keys() - set(commands):
         columns[name][unknown] = np.nan
     return Log(log.name, time, columns, log.constants, log.labels)

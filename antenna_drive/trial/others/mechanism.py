@@ -268,10 +268,16 @@ def simulate(m: Mechanism, reference: FloatArray, ticks: int, begin: int, start:
             demand -= m.dead_zone * math.tanh(demand / m.dead_zone)
         for part in range(PARTS):
             now = t + part * h
+            # each lag follows the mean of the one before it
+            mean = 0.5 * (one + demand + (one - demand) * slow)
             one = demand + (one - demand) * slow
-            two = one + (two - one) * slow
-            three = two + (three - two) * slow
-            after = three + (flowing - three) * fall
+            end = mean + (two - mean) * slow
+            mean, two = 0.5 * (two + end), end
+            end = mean + (three - mean) * slow
+            mean, three = 0.5 * (three + end), end
+            if m.delay <= 0.0:
+                mean = demand
+            after = mean + (flowing - mean) * fall
             middle = 0.5 * (flowing + after)
             flowing = after
             bent = bristles(m, now, bent, q, w, 0.5 * h)

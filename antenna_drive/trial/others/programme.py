@@ -50,7 +50,7 @@ def draw_tests(table: Mapping[str, Any], random: np.random.Generator) -> list[Te
     shapes = ('steps', str(random.choice(['triangle', 'sine'])),
               str(random.choice(['chirp', 'multisine'])))
     return [{'shape': shape, 'duration_s': duration, **_DRAW[shape](table, duration, random)}
-            for shape in shapes for duration in [round(_between(*DURATION_S, random), 2)]]
+            for shape in shapes for duration in [round(_between(DURATION_S, random), 2)]]
 
 
 def reference(test: Test, times: FloatArray) -> FloatArray:
@@ -99,15 +99,15 @@ def _amplitude(test: Test, frequency: FloatArray) -> FloatArray:
                       test['acceleration'] / turn ** 2)
 
 
-def _between(low: float, high: float, random: np.random.Generator) -> float:
+def _between(limits: tuple[float, float], random: np.random.Generator) -> float:
     """Return a number whose logarithm is uniform."""
-    return math.exp(random.uniform(math.log(low), math.log(high)))
+    return math.exp(random.uniform(*np.log(limits)))
 
 
 def _steps(table: Mapping[str, Any], duration: float, random: np.random.Generator) -> Test:
     starts, levels, level, t = [0.0], [0.0], 0.0, 0.2
     while t < duration:
-        jump = _between(*table['step'], random) * float(random.choice([-1.0, 1.0]))
+        jump = _between(table['step'], random) * float(random.choice([-1.0, 1.0]))
         level += jump if abs(level + jump) <= table['reach'] else -jump
         starts.append(round(t, 3))
         levels.append(level)
@@ -119,7 +119,7 @@ def _triangle(table: Mapping[str, Any], duration: float, random: np.random.Gener
     amplitude = table['reach'] * float(random.uniform(0.2, 0.9))
     # twice to and fro at least
     slowest = max(table['rate'][0], 8.0 * amplitude / duration)
-    rate = _between(slowest, max(slowest, table['rate'][1]), random)
+    rate = _between((slowest, max(slowest, table['rate'][1])), random)
     return {'amplitude': amplitude, 'period_s': 4.0 * amplitude / rate}
 
 
@@ -129,7 +129,7 @@ def _sine(table: Mapping[str, Any], duration: float, random: np.random.Generator
                   math.sqrt(table['greatest_acceleration'] / amplitude))
     slowest = 2.0 * math.pi * 3.0 / duration
     return {'amplitude': amplitude,
-            'period_s': 2.0 * math.pi / _between(min(slowest, fastest), fastest, random)}
+            'period_s': 2.0 * math.pi / _between((min(slowest, fastest), fastest), random)}
 
 
 def _limits(table: Mapping[str, Any], random: np.random.Generator) -> Test:
@@ -139,13 +139,13 @@ def _limits(table: Mapping[str, Any], random: np.random.Generator) -> Test:
 
 
 def _chirp(table: Mapping[str, Any], duration: float, random: np.random.Generator) -> Test:
-    return {**_limits(table, random), 'from_Hz': _between(SWEEP_HZ[0], 0.4, random),
-            'to_Hz': _between(3.0, SWEEP_HZ[1], random)}
+    return {**_limits(table, random), 'from_Hz': _between((SWEEP_HZ[0], 0.4), random),
+            'to_Hz': _between((3.0, SWEEP_HZ[1]), random)}
 
 
 def _multisine(table: Mapping[str, Any], duration: float, random: np.random.Generator) -> Test:
     return {**_limits(table, random), 'frequencies_Hz': [
-        round(_between(2.0 * SWEEP_HZ[0], SWEEP_HZ[1], random), 3) for _ in range(TONES)],
+        round(_between((2.0 * SWEEP_HZ[0], SWEEP_HZ[1]), random), 3) for _ in range(TONES)],
         'phases_rad': [float(p) for p in random.uniform(0.0, 2.0 * math.pi, TONES)]}
 
 

@@ -81,8 +81,7 @@ def run(reference: Array, ticks: int, push: Array, cascade: Cascade, rubbing: Fr
 def simulate(n: Numbers, test: OneTest) -> dict[str, Array]:
     """Return the readings, had the axis these numbers."""
     time, reference = test.time, test['reference_m']
-    period = float(np.median(np.diff(time)))
-    ticks = max(round(period / TICK), 1)
+    ticks = max(round(float(np.median(np.diff(time))) / TICK), 1)
     out = np.zeros(((time.size - 1) * ticks + 1, 2))
     run(reference, ticks, test.push['carriage'],
         Cascade(30.0, 0.4, 100.0, 0.0, 12.0 * (1.0 + n.limit_change)),

@@ -16,7 +16,7 @@
 import math
 
 from antenna_drive.machines.own import (
-    effect, form, free, Log, machine as own_machine, Numbers, OneTest, push, reading, ripple,
+    effect, form, free, machine as own_machine, Numbers, OneTest, push, reading, ripple,
     shape, size, within, without_gaps,
 )
 from antenna_drive.parts import compiled, coupling, friction, inner, loop, shaping, wave
@@ -84,8 +84,7 @@ def run(reference: Array, ticks: int, push: Array, cascade: Cascade, rubbing: Fr
 def simulate(n: Numbers, test: OneTest) -> dict[str, Array]:
     """Return the readings, had the joint these numbers."""
     time, reference = test.time, test['reference_rad']
-    period = float(np.median(np.diff(time)))
-    ticks = max(round(period / TICK), 1)
+    ticks = max(round(float(np.median(np.diff(time))) / TICK), 1)
     out = np.zeros(((time.size - 1) * ticks + 1, 2))
     third = n.hung_share * n.load * (1.0 + n.load_change)
     turn = 2.0 * math.pi * n.hung_hz
@@ -95,18 +94,13 @@ def simulate(n: Numbers, test: OneTest) -> dict[str, Array]:
                  stribeck=n.stribeck, stribeck_rate=n.stribeck_rate, stribeck_shape=1.0),
         (n.motor, n.load * (1.0 + n.load_change) - third, third),
         (n.stiffness / (1.0 + n.softness), n.damping, n.half_gap),
-        (third * turn ** 2, third * turn * 0.06), n.constant * (1.0 + n.constant_change),
-        n.current_lag, n.delay, (n.ripple_order, n.ripple_cosine, n.ripple_sine),
-        (n.weight_cosine, n.weight_sine), (n.cyclic_order, n.cyclic_cosine, n.cyclic_sine),
-        n.integral, reference[0] + n.start, out)
+        (third * turn ** 2, 2.0 * n.hung_damping * third * turn),
+        n.constant * (1.0 + n.constant_change), n.current_lag, n.delay,
+        (n.ripple_order, n.ripple_cosine, n.ripple_sine), (n.weight_cosine, n.weight_sine),
+        (n.cyclic_order, n.cyclic_cosine, n.cyclic_sine), n.integral, reference[0] + n.start, out)
     at = np.arange(time.size) * float(ticks)
     return {'angle': np.interp(at - n.angle_late * ticks, np.arange(len(out)), out[:, 0]),
             'current': np.interp(at - n.current_late * ticks, np.arange(len(out)), out[:, 1])}
-
-
-def tidy(log: Log) -> Log:
-    """Return a log with even rows."""
-    return without_gaps(log, ('reference_rad',), settles_s=0.5)
 
 
 machine = own_machine(
@@ -143,11 +137,12 @@ machine = own_machine(
                weight_cosine=size(-0.15, 0.15, 'N m'), weight_sine=size(-0.15, 0.15, 'N m')),
         effect('link.resonance', *(
             form(f'{hz:g} Hz', hung_share=size(0.0, 0.8),
-                 hung_hz=shape(0.6 * hz, 1.6 * hz, hz, 'Hz', step=0.02 * hz))
+                 hung_hz=shape(0.6 * hz, 1.6 * hz, hz, 'Hz', step=0.02 * hz),
+                 hung_damping=shape(0.002, 0.2, 0.03))
             for hz in (4.0, 8.0, 16.0)), cause='a part of the link swings on its own'),
         ripple('encoder.cyclic_error', 'cyclic', size(-0.2, 0.2, 'rad'), 'motor_rad',
                orders=(1.0, 2.0), cause='the encoder sits off its axis'),
     ],
     push={'load': push('load', 'torque on the load', 'N m', 0.02)},
     settles_s=0.3, judged_hz=100.0, blocks=('controller', 'motor', 'gearbox', 'load', 'link'),
-    parallel=True, log=tidy)
+    parallel=True, log=lambda log: without_gaps(log, ['reference_rad'], settles_s=0.5))
