@@ -226,6 +226,18 @@ def _remove_drafts(folder: Path) -> None:
         shutil.rmtree(draft, ignore_errors=True)
 
 
+def machine_of(folder: Path, name: str, manifest: Mapping[str, Any]) -> str | None:
+    """Return the machine of a case if it is no antenna: a diagnosis is told that much."""
+    if 'machines' not in manifest['settings']:
+        return None
+    return str(sealing.open_truth(folder, name, dict(manifest))['machine'])
+
+
+def model_options(machine: str | None) -> list[str]:
+    """Return the options of a diagnosis that name the model of a machine; None: the antenna."""
+    return [] if machine is None else ['--model', kind_of(machine).model]
+
+
 def diagnose_case(case: Path, options: Sequence[str], limit: float,
                   kept: Path | None = None) -> bool:
     """
@@ -355,10 +367,8 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
     done(complete, len(names))
     late = [(here, here / name, options, limit, path) for name, path in kept.items()
             if path is not None and _unpredicted(folder / name)]
-    others_of = {name: sealing.open_truth(folder, name, manifest)['machine'] for name in wanted
-                 } if 'machines' in manifest['settings'] else {}
-    tasks = [*late, *((here, here / name, options, limit, kept[name], others_of.get(name))
-                      for name in wanted)]
+    tasks = [*late, *((here, here / name, options, limit, kept[name],
+                       machine_of(folder, name, manifest)) for name in wanted)]
     with workers(jobs, scheduler, threads=True) as pool:
         for number, result in pool.each(_complete, tasks):
             success = result()
@@ -373,10 +383,8 @@ def _complete(folder: Path, case: Path, options: Sequence[str], limit: float,
               kept: Path | None, machine: str | None = None) -> bool:
     """Do what a case still lacks: its diagnosis, the predictions of what was kept back."""
     _check_seen(folder)
-    if machine is not None:
-        options = ['--model', kind_of(machine).model, *options]
     if not (case / VERDICT).exists():
-        return diagnose_case(case, options, limit, kept)
+        return diagnose_case(case, [*model_options(machine), *options], limit, kept)
     if kept is not None and _unpredicted(case):
         predict_kept(case, options, kept)
     return True
