@@ -35,8 +35,7 @@ LEAD = 5e-3     # of the screw [m/rev]
 @inner
 def late(past: Array, k: int, ticks: float) -> float:
     """Return what was asked for some ticks ago."""
-    whole = int(math.floor(ticks))
-    share = ticks - whole
+    whole, share = int(ticks), ticks % 1.0
     return (1.0 - share) * past[max(k - whole, 0)] + share * past[max(k - whole - 1, 0)]
 
 
@@ -114,7 +113,7 @@ machine = own_machine(
           'position_late': free(0.0, 1.0, 'sample'), 'current_late': free(0.0, 1.0, 'sample')},
     per_test={'start': free(-2.5e-4, 2.5e-4, 'm')},
     readings={'position': reading('m', noise=2e-6, model_error=5e-6, column='position_m'),
-              'current': reading('A', noise=0.03, model_error=0.01, zero=0.02, gain=0.01,
+              'current': reading('A', noise=0.03, model_error=0.015, zero=0.02, gain=0.01,
                                  column='current_A')},
     effects=[
         effect('guide.friction_asymmetry', cause='friction depends on the direction',
@@ -133,7 +132,7 @@ machine = own_machine(
         effect('drive.force_constant', cause='the magnet is weaker',
                constant_change=size(-0.7, 0.5)),
         effect('drive.delay', cause='the bus takes time',
-               delay=size(0.0, 0.015, 's', step=2e-4)),
+               delay=size(0.0, 0.01, 's', step=2e-4)),
         effect('drive.current_limit', cause='the drive gives less current',
                limit_change=size(-0.85, 0.5)),
         effect('carriage.mass', cause='a payload', mass_change=size(-0.5, 2.0)),

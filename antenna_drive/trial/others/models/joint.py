@@ -35,8 +35,7 @@ GEAR = 30.0
 @inner
 def late(past: Array, k: int, ticks: float) -> float:
     """Return what was asked for some ticks ago."""
-    whole = int(math.floor(ticks))
-    share = ticks - whole
+    whole, share = int(ticks), ticks % 1.0
     return (1.0 - share) * past[max(k - whole, 0)] + share * past[max(k - whole - 1, 0)]
 
 
@@ -105,9 +104,11 @@ def simulate(n: Numbers, test: OneTest) -> dict[str, Array]:
 
 machine = own_machine(
     simulate,
-    base={'motor': within(2e-4, 0.03, 'kg m^2'), 'load': within(3e-4, 0.1, 'kg m^2'),
+    base={'motor': within(2e-4, 0.03, 'kg m^2', step=2e-6),
+          'load': within(3e-4, 0.1, 'kg m^2', step=4e-6),
           'stiffness': within(8.0, 0.15, 'N m/rad'), 'damping': within(2e-3, 0.5, 'N m s/rad'),
-          'constant': within(0.1, 0.03, 'N m/A'), 'coulomb': within(0.03, 0.3, 'N m'),
+          'constant': within(0.1, 0.03, 'N m/A', step=1e-3),
+          'coulomb': within(0.03, 0.3, 'N m', step=2e-4),
           'viscous': within(8e-4, 0.4, 'N m s/rad'), 'current_lag': within(5e-4, 0.5, 's'),
           # the recorder asks one channel after the other
           'angle_late': free(0.0, 1.0, 'sample'), 'current_late': free(0.0, 1.0, 'sample')},
@@ -129,7 +130,7 @@ machine = own_machine(
         effect('motor.torque_constant', cause='the magnet is weaker',
                constant_change=size(-0.7, 0.5)),
         effect('controller.delay', cause='the bus takes time',
-               delay=size(0.0, 0.02, 's', step=2e-4)),
+               delay=size(0.0, 0.006, 's', step=1e-4)),
         effect('controller.current_limit', cause='the drive gives less current',
                limit_change=size(-0.85, 0.5)),
         effect('load.inertia', cause='a payload', load_change=size(-0.5, 2.5)),
