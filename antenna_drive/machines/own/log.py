@@ -28,7 +28,7 @@ from antenna_drive.parameters.schema import Entry, mapping_of, nearest, Paramete
 from antenna_drive.recording.csv_format import Cell, parse_number
 from antenna_drive.recording.import_map import import_file, ImportMap, load_map
 from antenna_drive.recording.recording import NANOSECONDS, RecordingError
-from antenna_drive.recording.sheet import plain_value
+from antenna_drive.recording.sheet import parse_labels, plain_value
 from antenna_drive.recording.tables import open_table, Text
 import numpy as np
 
@@ -254,12 +254,12 @@ def _sheet(path: Path) -> tuple[dict[str, float], dict[str, str]]:
     try:
         top = mapping_of('', read_yaml(path), ('constants', 'labels'))
         constants = mapping_of('constants', top.get('constants', {}))
-        labels = mapping_of('labels', top.get('labels', {}))
+        labels = dict(parse_labels('labels', top.get('labels', {})))
         numbers = {name: float(_CONSTANT.check(f'constants.{name}', plain_value(  # type: ignore
             value))) for name, value in constants.items()}
     except ParameterError as error:
         raise LogError(f'{path}: {error}') from None
-    return numbers, {name: str(value) for name, value in labels.items()}
+    return numbers, labels
 
 
 def _held(values: FloatArray) -> FloatArray:
