@@ -35,7 +35,9 @@ from antenna_drive.diagnosis.evidence import Evidence
 from antenna_drive.diagnosis.held_out import held_out, refuted
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.intervals import inflation, values_with_intervals
-from antenna_drive.diagnosis.interventions import interventions, lines as lines_of_labels
+from antenna_drive.diagnosis.interventions import (
+    interventions, lines as lines_of_labels, simplified,
+)
 from antenna_drive.diagnosis.lack_of_fit import lack_of_fit, remains, residual_tests
 from antenna_drive.diagnosis.least_squares import LeastSquares
 from antenna_drive.diagnosis.machine import Machine
@@ -192,6 +194,7 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         search, *backward_elimination(search, search.run(), settings), settings)
     # the noise is that of the motion that was found
     problem = search.whole
+    hypotheses, best = simplified(problem, hypotheses, best)
     none, best = hypotheses[0], best.with_jacobian(problem)
     progress(0.9, 'withheld data')
     reach = held_out(problem, none, best, threads)

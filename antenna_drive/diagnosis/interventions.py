@@ -58,6 +58,41 @@ def interventions(problem: LeastSquares, none: Hypothesis, best: Hypothesis,
     return [_of_label(problem, machine, none, best, key, threads) for key in machine.groups]
 
 
+def simplified(problem: LeastSquares, hypotheses: Sequence[Hypothesis],
+               best: Hypothesis) -> tuple[list[Hypothesis], Hypothesis]:
+    """
+    Return hypotheses whose best has sizes by label only for effects that differ between them.
+
+    The search takes an effect's form where others are still missing, and a missing effect that
+    differs makes it look as if this one did.
+
+    Parameters
+    ----------
+    problem
+        the whole tests
+    hypotheses, best
+        from the search
+
+    """
+    machine = problem.machine
+    if not isinstance(machine, ByLabel):
+        return list(hypotheses), best
+    whole = best.with_jacobian(problem)
+    forms = []
+    for form in best.forms:
+        base, own = machine.base_of(form), [p.label for p in form.sizes if p.label]
+        values = [value for _, value in dict.fromkeys(own)]
+        differs = any(_compared(
+            problem, whole.state, size, [_of_value(form, own[0][0], value)[j] for value in values],
+            values)['differs'] for j, size in enumerate(base.sizes)) if own else True
+        forms.append(form if differs else base)
+    if tuple(forms) == best.forms:
+        return list(hypotheses), best
+    point = {**machine.mean(best.state.point()), **best.state.point()}
+    simpler = Hypothesis(best.effects, tuple(forms), _fitted(problem, best, forms, point))
+    return [simpler if set(h.effects) == set(best.effects) else h for h in hypotheses], simpler
+
+
 def _of_label(problem: LeastSquares, machine: ByLabel, none: Hypothesis, best: Hypothesis,
               key: str, threads: int) -> dict[str, Any]:
     groups = machine.groups[key]
@@ -141,24 +176,31 @@ def _compared(problem: LeastSquares, state: FitState, base: Parameter,
     places = [names.index(p.name) for p in parameters]
     contrasts = np.eye(len(names))[places]
 
-    def told(contrast: FloatArray) -> dict[str, Any]:
-        value = float(contrast @ state.x)
-        half = TWO_SIDED_95 * math.hypot(
+    # a difference is worth the price of a parameter; that is stricter than its interval
+    worth = math.sqrt(2.0 * problem.settings.penalty.parameter)
+
+    def told(contrast: FloatArray) -> tuple[float, float]:
+        return float(contrast @ state.x), math.hypot(
             contrast_deviation(problem, state, contrast),
             problem.settings.interval.model_error * float(np.abs(contrast) @ np.abs(state.x)))
-        return {'value': value, 'ci95': [value - half, value + half]}
 
-    by_value = {value: told(contrast) for value, contrast in zip(values, contrasts, strict=True)}
-    for item in by_value.values():
-        item['ci95'] = [max(item['ci95'][0], base.low), min(item['ci95'][1], base.high)]
+    by_value = {}
+    for name, contrast in zip(values, contrasts, strict=True):
+        value, deviation = told(contrast)
+        low, high = _interval(value, deviation)
+        by_value[name] = {'value': value, 'ci95': [max(low, base.low), min(high, base.high)]}
     differences = []
-    for value, contrast in zip(values[1:], contrasts[1:], strict=True):
-        item = told(contrast - contrasts[0])
-        low, high = item['ci95']
-        differs = not low <= 0.0 <= high and abs(item['value']) > base.tolerance
-        differences.append({'from': values[0], 'to': value, **item, 'differs': differs})
+    for name, contrast in zip(values[1:], contrasts[1:], strict=True):
+        value, deviation = told(contrast - contrasts[0])
+        differences.append({
+            'from': values[0], 'to': name, 'value': value, 'ci95': _interval(value, deviation),
+            'differs': abs(value) > max(worth * deviation, base.tolerance)})
     return {'values': by_value, 'differences': differences,
             'differs': any(item['differs'] for item in differences)}
+
+
+def _interval(value: float, deviation: float) -> list[float]:
+    return [value - TWO_SIDED_95 * deviation, value + TWO_SIDED_95 * deviation]
 
 
 def lines(labels: Sequence[Mapping[str, Any]]) -> list[str]:
