@@ -145,7 +145,7 @@ def values_with_intervals(hypothesis: Hypothesis, inflated: Callable[[str], floa
         place = names.index(parameter.name)
         variance = _covariance(state, known / inflated(parameter.name))[place, place]
         half_width = TWO_SIDED_95 * math.hypot(
-            float(variance) ** 0.5, _same_number(parameter, value),
+            float(variance) ** 0.5, same_number(parameter, value),
             settings.model_error * value)
         found[parameter.name] = {
             'value': value, 'ci95': [max(value - half_width, parameter.low),
@@ -154,7 +154,7 @@ def values_with_intervals(hypothesis: Hypothesis, inflated: Callable[[str], floa
     return found
 
 
-def _same_number(parameter: Parameter, value: float) -> float:
+def same_number(parameter: Parameter, value: float) -> float:
     """
     Return the standard deviation that the tolerance of the same number adds to a change.
 

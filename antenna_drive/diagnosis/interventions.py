@@ -29,7 +29,7 @@ from typing import Any
 from antenna_drive.diagnosis.by_label import ByLabel
 from antenna_drive.diagnosis.held_out import held_out
 from antenna_drive.diagnosis.hypothesis import Hypothesis
-from antenna_drive.diagnosis.intervals import contrast_deviation, TWO_SIDED_95
+from antenna_drive.diagnosis.intervals import contrast_deviation, same_number, TWO_SIDED_95
 from antenna_drive.diagnosis.least_squares import FitState, LeastSquares
 from antenna_drive.diagnosis.machine import FloatArray, Form, Parameter
 import numpy as np
@@ -187,7 +187,8 @@ def _compared(problem: LeastSquares, state: FitState, base: Parameter,
     by_value = {}
     for name, contrast in zip(values, contrasts, strict=True):
         value, deviation = told(contrast)
-        low, high = _interval(value, deviation)
+        # the tolerance of the same number cancels in a difference, and not here
+        low, high = _interval(value, math.hypot(deviation, same_number(base, value)))
         by_value[name] = {'value': value, 'ci95': [max(low, base.low), min(high, base.high)]}
     differences = []
     for name, contrast in zip(values[1:], contrasts[1:], strict=True):
