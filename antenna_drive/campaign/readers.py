@@ -55,6 +55,8 @@ skip_lines: 1
 signals:
   rate_command_rad_s: {column: r, unit: deg/s, sign: -1}
   plant/encoder: {column: e, unit: counts, counts_per_revolution: 4096, clock_offset_s: 0.1}
+  arm/x: {expression: "2 * r - max(e, 0.5) / column(0) ** 0", unit: mm}
+  arm/y: {column: 2, unit: "1", sign_magnitude_bits: 11}
 """
 VERDICT = {
     'verdict': 'explained', 'where': [], 'seconds': 3.0,

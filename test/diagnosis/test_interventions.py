@@ -111,6 +111,9 @@ def test_an_effect_under_one_label_alone_or_of_two_signs_is_found(
     heater = number_of(result, 'heater.step')
     assert heater['differs']
     assert heater['differences'][0]['value'] == pytest.approx(under_b - under_a, abs=0.01)
+    reason = result['how_far']['explained_fraction']['reason']
+    assert (reason is None) == (tests == 4)
+    assert reason is None or 'heater.step: no other test has the label load: A' in reason
 
 
 def test_an_equal_effect_is_named_with_one_size_and_carries_from_label_to_label() -> None:

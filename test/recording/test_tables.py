@@ -120,6 +120,21 @@ def test_import_makes_a_bag_of_a_file_of_any_kind(
     assert read_recording(tmp_path / 'bag')['a/y'].values.tolist() == VECTOR[:, 1].tolist()
 
 
+def test_diagnose_reads_recordings_of_the_drive_through_a_map(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given: dict[str, Recording] = {}
+
+    def stand_in(recordings: dict[str, Recording], *arguments: object) -> None:
+        given.update(recordings)
+        raise UserError('read, and no more')
+
+    monkeypatch.setattr('antenna_drive.machines.antenna.diagnose.diagnose_recordings', stand_in)
+    write(tmp_path / 'a.npz')
+    (tmp_path / 'm.yaml').write_text(json.dumps(MAP))
+    assert main(['diagnose', f'{tmp_path}/a.npz', '--map', f'{tmp_path}/m.yaml']) == 2
+    assert given['a']['motor_1/ammeter'].values[0] == -1e-4
+
+
 NUMBERS = st.floats(-1e6, 1e6) | st.none()
 
 
