@@ -90,6 +90,7 @@ setup(
         'ros': [f'{wheel} ; {WHEELS_EXIST}' for wheel in KILTED],
         'plot': ['matplotlib >= 3.6'],
         'calibrate': ['cma >= 3.2'],
+        'parquet': ['pyarrow >= 10'],
         # trials, studies, calibrations and fleets on a cluster
         'cluster': ['dask[distributed] >= 2024.1'],
         'completion': ['shtab >= 1.6'],
