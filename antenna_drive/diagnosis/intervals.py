@@ -38,6 +38,8 @@ from antenna_drive.diagnosis.settings import IntervalSettings
 import numpy as np
 
 TWO_SIDED_95 = 1.96
+# Share of a variance that data of single precision can account for.
+_BY_DATA = 1e-6
 
 
 def inflation(problem: LeastSquares, state: FitState) -> FloatArray:
