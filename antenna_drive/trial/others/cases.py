@@ -21,16 +21,12 @@ antenna: an effect, two, none, or one that the model lacks, with imperfections t
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-import math
 from typing import Any
 
 from antenna_drive.trial.cases import (
     case_name, even_sizes, kinds_of, MIX, SMALLEST_IN_PAIR, Truth, turns,
 )
-from antenna_drive.trial.imperfections import (
-    CLOCK_DRIFT_PPM_PER_MIN, CLOCK_PPM, coloured, COLOURED_SHARE, CORNER_HZ, DELAY_SAMPLES,
-    kept_rows, MISSING_SHARE, NOISE_LEVEL, SPIKE_SHARE, spikes,
-)
+from antenna_drive.trial.imperfections import draw_recorder, kept_rows, recorder_noise
 from antenna_drive.trial.others.machines import Cause, Kind, kind_of
 from antenna_drive.trial.others.mechanism import FloatArray, simulate, TICK_S
 from antenna_drive.trial.others.programme import draw_tests, RATES_HZ, reference, ticks_of
@@ -106,21 +102,11 @@ def draw_imperfections(kind: Kind, random: np.random.Generator) -> dict[str, Any
     def within(limit: float) -> float:
         return float(random.uniform(-limit, limit))
 
-    def between(low: float, high: float) -> float:
-        return float(math.exp(random.uniform(math.log(low), math.log(high))))
-
     table = kind.table
     return {
         'gain': {name: within(share) for name, share in table['gain'].items()},
         'zero': {name: within(size) for name, size in table['zero'].items()},
-        'delay_samples': {name: float(random.uniform(0.0, DELAY_SAMPLES)) for name in READINGS},
-        'clock_ppm': within(CLOCK_PPM),
-        'clock_drift_ppm_per_min': within(CLOCK_DRIFT_PPM_PER_MIN),
-        'noise': {name: {'level': between(1.0 / NOISE_LEVEL, NOISE_LEVEL),
-                         'coloured_share': float(random.uniform(0.0, COLOURED_SHARE)),
-                         'corner_hz': between(*CORNER_HZ)} for name in READINGS},
-        'missing_share': between(*MISSING_SHARE),
-        'spike_share': between(*SPIKE_SHARE)}
+        **draw_recorder(READINGS, READINGS, random)}
 
 
 def moved(truth: Truth, recording: int, start: float,
@@ -178,15 +164,13 @@ def make_recording(truth: Truth, recording: int) -> dict[str, FloatArray]:
     times, asked, history = moved(truth, recording, float(random.uniform(-size, size)))
     instants = TICK_S * np.arange(history['position'].size)
     columns = {'time_s': _stamps(times, flaws, random), kind.columns['reference']: asked}
+    noise = recorder_noise(flaws, rate, random)
     for name in READINGS:
         late = flaws['delay_samples'][name] / rate
         exact = np.interp(times - late, instants, history[name])
-        noise = flaws['noise'][name]
         columns[kind.columns[name]] = (
             exact * (1.0 + flaws['gain'].get(name, 0.0)) + flaws['zero'].get(name, 0.0)
-            + kind.table['noise'][name] * (noise['level'] * coloured(
-                times.size, rate, noise['coloured_share'], noise['corner_hz'], random)
-                + spikes(times.size, flaws['spike_share'], random)))
+            + kind.table['noise'][name] * noise(name, times.size))
     rows = kept_rows(times.size, flaws['missing_share'], random)
     return {name: column[rows] for name, column in columns.items()}
 
