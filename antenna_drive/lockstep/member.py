@@ -31,8 +31,11 @@ from antenna_drive.lockstep.inbox import DEPTH, Frame, Inbox, Refusal
 import numpy as np
 
 
-# How far an observer may fall behind: half of what each node remembers.
-SLACK = 500
+# How many of its frames each node remembers.
+MEMORY = 1000
+
+# How far an observer may fall behind: half of that.
+SLACK = MEMORY // 2
 
 # Progress of an observer that has not begun the run: it is waited for before the first step, as
 # it could not keep what it gets of a run that it has yet to begin.
@@ -193,6 +196,11 @@ class Member:
             return None
         return None if self.inbox.missing() else self._advance()
 
+    def lost(self, peer: str) -> int:
+        """Return how many frames came too far ahead of one of the peer's that is missing."""
+        count = self.inbox.refused.get((peer, Refusal.TOO_FAR_AHEAD), 0)
+        return count if count and peer in self.missing() else 0
+
     def steady(self) -> bool:
         """Return whether nothing is due but the next steps of the run in progress."""
         return (self.run != NO_RUN and not self.fault and self._announced is None
@@ -263,19 +271,31 @@ class Guest(Member):
     A member that nobody waits for, and that may join a run in the middle.
 
     It begins at the earliest step that every peer still remembers; `Unit.start` is called all
-    the same. From there on it follows as any member does.
+    the same. From there on it follows as any member does. While it reads what was sent before
+    it came, its peers go on and forget: where such a frame is lost it joins again behind it.
+
+    Attributes
+    ----------
+    joined : how many times it has joined a run
+
     """
 
     def __init__(self, unit: Unit, outputs: Mapping[str, Sequence[Signal]] = OUTPUTS,
                  conductor: str = TEST_SIGNAL) -> None:
         """Prepare to follow; see Member."""
         super().__init__(unit, 0.0, outputs, conductor)
+        self.joined = 0
         self._first: dict[str, Frame] = {}
 
     def receive(self, peer: str, frame: Frame) -> None:
         """Take in a frame or refuse it."""
         if self.run != NO_RUN:
             super().receive(peer, frame)
+            if (self.lost(peer) and self.run == self._joining()
+                    and self.step < self._earliest() + MEMORY):
+                self.inbox.refused.clear()
+                self.inbox.begin(NO_RUN)
+                self._first.clear()
         elif (self.inbox.well_formed(peer, frame) and frame[0] != NO_RUN
               and peer in self.missing()):
             self._first[peer] = frame
@@ -306,6 +326,7 @@ class Guest(Member):
         """Join the run in progress or make the next step; see Member."""
         if self.run != NO_RUN or self.missing():
             return super().go_on(stands_still)
+        self.joined += 1
         outputs = self._begin(self._joining(), self._first[self.conductor][2],
                               int(self._earliest()))
         for peer, frame in self._first.items():

@@ -102,7 +102,7 @@ class Observer:
         on_begin
             called as on_begin(run, macro-step [s]) when a run begins, also in the middle
             of another: what came before belongs to a run that is over; a guest's first step
-            need not be step 0
+            need not be step 0, and it may join the same run twice: what came before is void
         on_change
             called as on_change(unit, record) with what a node says on `<unit>/changes`,
             see `changes`; from another thread
@@ -124,7 +124,7 @@ class Observer:
         birth = float(time.time_ns() // 1000)
         reader = _Reader(name, self.names, on_step)
         self._member = Guest(reader, outputs) if guest else Member(reader, birth, outputs)
-        self._run = 0.0
+        self._begun = (0.0, 0)
         self._told = -1
         self._link = FrameLink(self._node, self._member.layouts)
         # frames of the conductor that were taken before there was room for them
@@ -153,8 +153,9 @@ class Observer:
     @property
     def lost(self) -> str:
         """Say which frame was lost, '' if none: a guest that was too slow cannot go on."""
-        for (peer, reason), count in self._member.inbox.refused.items():
-            if reason.value == 'too far ahead' and peer in self._member.missing():
+        for peer in self._member.peers:
+            count = self._member.lost(peer)
+            if count:
                 return f'{count} frames of {peer} after step {self._member.step}'
         return ''
 
@@ -186,8 +187,9 @@ class Observer:
                     time.sleep(_NAP_S)
                 continue
             waiting_since, stands_still = None, False
-            if member.run != self._run:
-                self._run = member.run
+            begun = (member.run, member.joined if isinstance(member, Guest) else 0)
+            if begun != self._begun:
+                self._begun = begun
                 self._told = -1
                 if self._on_begin is not None:
                     self._on_begin(int(member.run), member.step_s)

@@ -26,6 +26,7 @@ from typing import Any
 
 from antenna_drive.limits import FRAME
 from antenna_drive.lockstep.frame import FrameLayout, read_foreign
+from antenna_drive.lockstep.member import MEMORY
 from rclpy.callback_groups import CallbackGroup
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
@@ -35,7 +36,7 @@ from std_msgs.msg import Float64MultiArray
 # One second of frames at 1 kHz. Transient local: a late subscriber still gets frame 0.
 FRAME_QOS = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
-    depth=1000,
+    depth=MEMORY,
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )

@@ -628,6 +628,34 @@ def test_a_guest_joins_in_the_middle_and_misses_nothing_from_there(
     assert not guest.inbox.refused
 
 
+@settings(deadline=None, max_examples=60)
+@given(st.dictionaries(st.sampled_from(UNITS), st.tuples(st.integers(0, 30), st.integers(1, 30)),
+                       min_size=1),
+       st.lists(st.sampled_from(UNITS), max_size=300))
+def test_a_guest_joins_again_behind_a_hole_in_what_it_is_told_of_the_past(
+        holes: dict[str, tuple[int, int]], choices: list[str]) -> None:
+    last = 100
+    history = expected(last, 1e-3)
+    queues = {}
+    for name in UNITS:
+        begin, length = holes.get(name, (0, 0))
+        queues[name] = deque((9.0, float(k), 1e-3, *history[name][k].ravel().tolist())
+                             for k in range(last + 1) if not begin <= k < begin + length)
+    listener = Listener('guest')
+    guest = Guest(listener, OUTPUTS)
+    for name in (*choices, *(last * 4 * UNITS)):
+        if queues[name] and name in guest.wanted():
+            guest.receive(name, queues[name].popleft())
+        guest.go_on()
+    steps = list(listener.read)
+    behind = max(sum(hole) for hole in holes.values())
+    assert steps == list(range(steps[0], last + 1))
+    assert steps[0] <= behind + 8, 'no more is given up than what the search for the hole took'
+    assert not any(guest.lost(name) for name in UNITS)
+    for k, read in listener.read.items():
+        assert read.tobytes() == np.array([history[name][k][0] for name in UNITS]).tobytes()
+
+
 def test_the_conductor_waits_for_an_observer_that_falls_behind() -> None:
     unit = Chaotic('test_signal')
     conductor = Conductor(unit, 1.0, 1e-3, SLACK + 20, OUTPUTS, observers=('recorder',))
