@@ -261,10 +261,7 @@ class _Judge:
         testing = Part(machine, [k])
         state = self._fitted(testing, self._none.state.parameters, {}, self._none.state.point(),
                              self._without)
-        # the derivatives at the optimum of all tests may be far off where the effect is not
         bare = LeastSquares(testing, settings=self._settings)
-        state = bare.fit(bare.refreshed(state, central=False),
-                         self._settings.held_out.iterations)
         fold = self._fold(k, _gap(testing, state.point()), bare.residuals_of(state, 0))
         if not self._best.effects:
             return fold
@@ -359,8 +356,10 @@ class _Judge:
         """Fit the nuisances to a withheld test, with some values held."""
         own = testing.parameters(nuisances)
         problem = Fixed(testing, held, self._settings)
-        return problem.fit(problem.start(own, dict(begin), slopes.for_part(testing, own)),
-                           self._settings.held_out.iterations)
+        state = problem.fit(problem.start(own, dict(begin), slopes.for_part(testing, own)),
+                            self._settings.held_out.iterations)
+        # the derivatives at the optimum of all tests may be far off at that of one
+        return settled(problem, state, self._settings)
 
 
 def _gap(part: Part, point: Mapping[str, float]) -> FloatArray:

@@ -31,7 +31,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.least_squares import (
@@ -44,6 +44,8 @@ from antenna_drive.diagnosis.screening import (
 )
 import numpy as np
 
+Item = TypeVar('Item')
+
 
 @dataclass(frozen=True)
 class _SharedJacobian:
@@ -51,6 +53,16 @@ class _SharedJacobian:
 
     nuisances: Jacobian
     courses: Mapping[str, Jacobian]
+
+
+def _others(hypothesis: Hypothesis, form: Form) -> list[int]:
+    """Return which of a hypothesis' parameters are not a form's."""
+    return [j for j, p in enumerate(hypothesis.state.parameters) if p not in form.parameters]
+
+
+def _put(items: tuple[Item, ...], place: int, item: Item) -> tuple[Item, ...]:
+    """Return a tuple with another item in a place."""
+    return (*items[:place], item, *items[place + 1:])
 
 
 class Search:
@@ -86,12 +98,14 @@ class Search:
         self.progress(0.15, 'sensitivity to each effect')
         self._take_sensitivities(none.state)
         self.progress(0.25, 'single effects')
-        singles = self._converging(self._at_lower_noise(self._singles(none)))
+        singles = self._at_lower_noise(self._singles(none))
+        if self.problem.scale > 1.0:
+            singles = self._at_lower_noise(self._exchanged(singles))
         self.progress(0.5, 'pairs of effects')
         pairs = self._pairs(singles)
         if pairs:
             scale = self.problem.scale
-            pairs = self._converging(self._at_lower_noise(pairs))
+            pairs = self._improved(self._at_lower_noise(pairs))
             # costs compare at one and the same noise only
             singles = [replace(h, state=self.problem.rescaled(h.state, scale)) for h in singles]
         self.progress(0.7, 'the best in full')
@@ -138,26 +152,6 @@ class Search:
             found = self._sorted(partial(
                 self._refitted, problem, shared, self.settings.iterations), finalists)
         return found
-
-    def _converging(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """
-        Go on with the best few fits, with fresh derivatives, as long as that gains much.
-
-        A fit that has stopped early hides what its effect can do, and what a partner adds.
-        """
-        count = self.settings.bases
-        return sorted([*self._pool.map(self._went_on, hypotheses[:count]), *hypotheses[count:]],
-                      key=self._priced)
-
-    def _went_on(self, hypothesis: Hypothesis) -> Hypothesis:
-        state, options = hypothesis.state, self.settings
-        for _ in range(options.converging_passes):
-            before = state.cost
-            state = self.problem.fit(self.problem.refreshed(state, central=False),
-                                     options.settling_iterations)
-            if before - state.cost < max(options.settled, options.final_gain * before):
-                break
-        return replace(hypothesis, state=state)
 
     # -- single effects ------------------------------------------------------------------------
 
@@ -222,26 +216,23 @@ class Search:
         return replace(hypothesis, state=self.problem.fit(
             state, self.settings.settling_iterations))
 
-    def _with_relatives(self, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
+    def _with_relatives(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """
-        Return single effects with those that do the same in other places, the best first.
+        Return hypotheses with those whose effects do the same in other places, the best first.
 
-        Each begins with the nuisances of one of the best and at a size that does as much. From
-        far away its fit may have ended elsewhere, and 'both motors' then lost to one.
+        Each begins with the nuisances of the best and at a size that does as much. From far away
+        its fit may have ended elsewhere, and 'both motors' then lost to one.
         """
-        found = {(h.effects, h.forms): h for h in singles}
-        relatives = [(base, *item) for base in singles[:self.settings.bases]
-                     for item in self._relatives(base)]
-        for new in self._pool.map(lambda item: self._moved(*item), relatives):
-            known = found.get((new.effects, new.forms))
-            if known is None or self._priced(new) < self._priced(known):
-                found[new.effects, new.forms] = new
-        return sorted(found.values(), key=self._priced)
+        best = hypotheses[0]
+        return self._with_better(hypotheses, self._pool.map(
+            lambda item: self._moved(best, *item),
+            [(place, *item) for place in range(len(best.effects))
+             for item in self._relatives(best.effects[place])]))
 
-    def _relatives(self, base: Hypothesis) -> Iterator[tuple[Effect, float]]:
+    def _relatives(self, ident: str) -> Iterator[tuple[Effect, float]]:
         """Yield an effect in other places, with the factor of its size that does as much."""
         effects = self.machine.effects
-        effect = effects[base.effects[0]]
+        effect = effects[ident]
         for part in effect.parts:
             yield effects[part], float(len(effect.parts))
         for whole in effects.values():
@@ -249,20 +240,51 @@ class Search:
                 yield whole, 1.0 / len(whole.parts)
                 yield from ((effects[part], 1.0) for part in whole.parts if part != effect.id)
 
-    def _moved(self, base: Hypothesis, effect: Effect, factor: float) -> Hypothesis:
-        """Fit an effect in the place of a hypothesis' only one, from that one times a factor."""
-        was = base.forms[0]
-        form = self.machine.counterpart(was, self.machine.effects[base.effects[0]], effect)
+    def _exchanged(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """
+        Return hypotheses with those that a scan finds in the place of an effect of the best one.
+
+        The nuisances alone were bent by the effect that is missing. With those of the best effect
+        another one may fit better: gravity in place of a steady wind.
+        """
+        best = hypotheses[0]
+        if best.has_course:
+            return list(hypotheses)
+        found: list[Hypothesis] = []
+        for place, effect in enumerate(best.effects):
+            bare, kept = self._dropped(best, effect), _others(best, best.forms[place])
+            bare = replace(bare, state=self.problem.start(
+                bare.state.parameters, bare.state.point(), best.state.jacobian[:, kept]))
+            found += self._pool.map(
+                partial(lambda base, entry: self._added_at(base, *entry), bare),
+                scan(self.problem, bare.state, self.sensitivities, bare.effects))
+        return self._with_better(hypotheses, found)
+
+    def _with_better(self, hypotheses: Sequence[Hypothesis],
+                     others: Iterable[Hypothesis]) -> list[Hypothesis]:
+        """Return hypotheses and others, of those with the same effects the better, sorted."""
+        found = {frozenset(zip(h.effects, h.forms, strict=True)): h for h in hypotheses}
+        for new in others:
+            key = frozenset(zip(new.effects, new.forms, strict=True))
+            if key not in found or self._priced(new) < self._priced(found[key]):
+                found[key] = new
+        return sorted(found.values(), key=self._priced)
+
+    def _moved(self, base: Hypothesis, place: int, effect: Effect, factor: float) -> Hypothesis:
+        """Fit an effect in the place of one of a hypothesis', from its size times a factor."""
+        was = base.forms[place]
+        form = self.machine.counterpart(was, self.machine.effects[base.effects[place]], effect)
         point = base.state.point()
         for old, new in zip(was.parameters, form.parameters, strict=True):
             point[new.name] = point.pop(old.name) * (1.0 if new.is_shape else factor)
-        return Hypothesis((effect.id,), (form,), self._in_place_of(base, (form,), point))
+        return Hypothesis(
+            _put(base.effects, place, effect.id), _put(base.forms, place, form),
+            self._in_place_of(base, was, (form,), point))
 
-    def _in_place_of(self, base: Hypothesis, forms: Sequence[Form],
+    def _in_place_of(self, base: Hypothesis, was: Form, forms: Sequence[Form],
                      point: dict[str, float]) -> FitState:
-        """Fit effects in the place of a hypothesis' only one, from a point."""
-        state = base.state
-        kept = [j for j, p in enumerate(state.parameters) if p not in base.forms[0].parameters]
+        """Fit effects in the place of one of a hypothesis', from a point."""
+        state, kept = base.state, _others(base, was)
         start = self.problem.start_from(
             [state.parameters[j] for j in kept], state.jacobian[:, kept],
             [p for form in forms for p in form.parameters], point)
@@ -299,6 +321,16 @@ class Search:
                     found[key] = pair.without_jacobian()
         return sorted(found.values(), key=self._priced)
 
+    def _improved(self, pairs: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Go on with the best pair, and try others in the place of each of its effects."""
+        best = pairs[0]
+        state = self.problem.start(best.state.parameters, best.state.point())
+        best = replace(best, state=self.problem.fit(state, self.settings.settling_iterations))
+        found = self._with_relatives([best, *pairs[1:]])
+        if self.problem.scale > 1.0:
+            found = self._at_lower_noise(self._exchanged(found))
+        return found
+
     def _partnered(self, best: Hypothesis, base: Hypothesis,
                    partner: tuple[Sensitivity, float | None]) -> Hypothesis:
         """Give a hypothesis a partner, from a value if one is given."""
@@ -323,7 +355,8 @@ class Search:
         for p, *own in zip(whole, *(form.parameters for form in forms), strict=True):
             value = point.pop(p.name)
             point.update({part.name: value for part in own})
-        return [Hypothesis(effect.parts, forms, self._in_place_of(base, forms, point))]
+        state = self._in_place_of(base, base.forms[0], forms, point)
+        return [Hypothesis(effect.parts, forms, state)]
 
     # -- the whole tests -------------------------------------------------------------------------
 

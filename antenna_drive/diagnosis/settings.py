@@ -121,9 +121,6 @@ class SearchSettings:
     first_iterations: int = _setting(5, '1', 'iterations of a first fit of an effect')
     iterations: int = _setting(8, '1', 'iterations of a further fit')
     pair_iterations: int = _setting(6, '1', "iterations of a pair's further fit")
-    converging_passes: int = _setting(
-        2, '1', 'passes of the best fits, with fresh derivatives, before they are given partners',
-        'trial 6')
     settling_iterations: int = _setting(10, '1', 'iterations of a fit with fresh derivatives')
     full_iterations: int = _setting(6, '1', 'iterations of a fit to the whole tests')
     most_effects: int = _setting(4, '1', 'greatest number of effects of a hypothesis')

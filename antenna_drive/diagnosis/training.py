@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
+from types import MappingProxyType
 
 from antenna_drive.diagnosis.least_squares import (
     FitState, Jacobian, LeastSquares, with_initial_conditions,
@@ -101,9 +102,10 @@ class Fixed(LeastSquares):
         return super().residuals({**self._values, **point}, alone)
 
     def jacobian(self, point: dict[str, float], parameters: Sequence[Parameter],
-                 residual: FloatArray, central: bool) -> Jacobian:
+                 residual: FloatArray, central: bool,
+                 steps: Mapping[str, float] = MappingProxyType({})) -> Jacobian:
         """Return the derivative of the prediction by difference quotients."""
-        return super().jacobian({**self._values, **point}, parameters, residual, central)
+        return super().jacobian({**self._values, **point}, parameters, residual, central, steps)
 
 
 @dataclass(frozen=True)
