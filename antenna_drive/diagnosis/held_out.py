@@ -31,11 +31,12 @@ from typing import Any
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.intervals import covariance, inflation
 from antenna_drive.diagnosis.least_squares import (
-    FitState, Jacobian, LeastSquares, prior_precision, weighted_product, with_initial_conditions,
+    FitState, Jacobian, LeastSquares, prior_precision, settled, weighted_product,
+    with_initial_conditions,
 )
 from antenna_drive.diagnosis.machine import FloatArray, Form, Parameter
 from antenna_drive.diagnosis.settings import Settings
-from antenna_drive.diagnosis.training import Fixed, Part, settled, Slopes, trained
+from antenna_drive.diagnosis.training import Fixed, Part, Slopes, trained
 import numpy as np
 
 _TURNS = ('each recording in turn, with the effect as the others have it; offsets within the '
@@ -204,7 +205,7 @@ class _Judge:
         search = self._settings.search
         if (unaided.cost < (1.0 + search.doubtful) * found.cost
                 or problem.noise_level(found.residual) > search.wanting):
-            unaided = settled(problem, unaided, self._settings)
+            unaided = self._settled(problem, unaided)
             found = min(found, self._added(problem, part, unaided), key=lambda s: s.cost)
         return problem, unaided, found
 
@@ -359,7 +360,12 @@ class _Judge:
         state = problem.fit(problem.start(own, dict(begin), slopes.for_part(testing, own)),
                             self._settings.held_out.iterations)
         # the derivatives at the optimum of all tests may be far off at that of one
-        return settled(problem, state, self._settings)
+        return self._settled(problem, state)
+
+    def _settled(self, problem: LeastSquares, state: FitState) -> FitState:
+        """Go on with a fit, with fresh derivatives, as long as that gains much."""
+        options = self._settings.held_out
+        return settled(problem, state, self._settings.search, options.passes, options.iterations)
 
 
 def _gap(part: Part, point: Mapping[str, float]) -> FloatArray:

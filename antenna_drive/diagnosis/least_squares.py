@@ -30,7 +30,7 @@ from types import MappingProxyType
 from antenna_drive.diagnosis.box_qp import box_constrained_step
 from antenna_drive.diagnosis.machine import FloatArray, Machine, Parameter
 from antenna_drive.diagnosis.noise import whitened
-from antenna_drive.diagnosis.settings import DEFAULT, FitSettings, Settings
+from antenna_drive.diagnosis.settings import DEFAULT, FitSettings, SearchSettings, Settings
 import numpy as np
 from numpy.typing import NDArray
 
@@ -267,14 +267,14 @@ class LeastSquares:
         fresh = self.jacobian(point, others, self.residuals(point), central=True)
         return self.start((*known, *others), point, np.column_stack([columns, fresh]))
 
-    def refreshed(self, state: FitState, central: bool = True) -> FitState:
+    def refreshed(self, state: FitState) -> FitState:
         """
         Return the state with a fresh Jacobian and fresh weights.
 
         Where sticking and slipping bend the prediction, a difference quotient over many standard
         deviations is no derivative. The data that have been fitted tell how small a step may be.
         """
-        jacobian = self.jacobian(state.point(), state.parameters, state.residual, central,
+        jacobian = self.jacobian(state.point(), state.parameters, state.residual, False,
                                  self.local_steps(state))
         return self._state(state.parameters, state.x, state.residual, jacobian,
                            self.weights(state.residual))
@@ -419,6 +419,31 @@ class _LocalModel:
                 _updated(self.jacobian, self.errors, self.directions), weight)
             self._hessian_weight = weight
         self._slope = transposed_product(self.jacobian, weighted_residual)
+
+
+def settled(problem: LeastSquares, state: FitState, options: SearchSettings, passes: int,
+            iterations: int) -> FitState:
+    """
+    Go on with a fit, with fresh derivatives, as long as that gains much.
+
+    Parameters
+    ----------
+    problem, state
+        the fit
+    options
+        what is much
+    passes
+        greatest number of fresh Jacobians
+    iterations
+        of the fit between two of them
+
+    """
+    for _ in range(passes):
+        before = state.cost
+        state = problem.fit(problem.refreshed(state), iterations)
+        if before - state.cost < max(options.settled, options.final_gain * before):
+            break
+    return state
 
 
 def least_cost(problem: LeastSquares, trials: Sequence[dict[str, float]], experiment: int,

@@ -35,7 +35,7 @@ from typing import Any, TypeVar
 
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.least_squares import (
-    FitState, Jacobian, LeastSquares, with_initial_conditions,
+    FitState, Jacobian, LeastSquares, settled, with_initial_conditions,
 )
 from antenna_drive.diagnosis.machine import Effect, Form, Parameter
 from antenna_drive.diagnosis.noise import same_noise, with_estimated_noise
@@ -100,7 +100,7 @@ class Search:
         self.progress(0.25, 'single effects')
         singles = self._at_lower_noise(self._singles(none))
         if self.problem.scale > 1.0:
-            singles = self._at_lower_noise(self._exchanged(singles))
+            singles = self._at_lower_noise(self._exchanged(self._first_settled(singles)))
         self.progress(0.5, 'pairs of effects')
         pairs = self._pairs(singles)
         if pairs:
@@ -216,6 +216,13 @@ class Search:
         return replace(hypothesis, state=self.problem.fit(
             state, self.settings.settling_iterations))
 
+    def _first_settled(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Go on with the best fit: one that has stopped early hides what its effect can do."""
+        options, best = self.settings, hypotheses[0]
+        state = settled(self.problem, best.state, options, options.settling_passes,
+                        options.settling_iterations)
+        return [replace(best, state=state), *hypotheses[1:]]
+
     def _with_relatives(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """
         Return hypotheses with those whose effects do the same in other places, the best first.
@@ -323,10 +330,7 @@ class Search:
 
     def _improved(self, pairs: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Go on with the best pair, and try others in the place of each of its effects."""
-        best = pairs[0]
-        state = self.problem.start(best.state.parameters, best.state.point())
-        best = replace(best, state=self.problem.fit(state, self.settings.settling_iterations))
-        found = self._with_relatives([best, *pairs[1:]])
+        found = self._with_relatives(self._first_settled(pairs))
         if self.problem.scale > 1.0:
             found = self._at_lower_noise(self._exchanged(found))
         return found
@@ -425,17 +429,11 @@ class Search:
         return True
 
     def converged(self, hypothesis: Hypothesis) -> Hypothesis:
-        """Go on with a fit, with central differences, as long as that gains much."""
-        state, options = hypothesis.state, self.settings
-        for number in range(options.final_passes):
-            if number and self.whole.noise_level(state.residual) < options.clean:
-                break
-            before = state.cost
-            state = self.whole.fit(self.whole.refreshed(state, central=True),
-                                   options.full_iterations)
-            if before - state.cost < max(options.settled, options.final_gain * before):
-                break
-        return replace(hypothesis, state=state)
+        """Go on with a fit, with fresh derivatives, as long as that gains much."""
+        options = self.settings
+        return replace(hypothesis, state=settled(
+            self.whole, hypothesis.state, options, options.final_passes,
+            options.full_iterations))
 
     def with_another(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         """Return a hypothesis whose fit has converged with each of a few more effects."""

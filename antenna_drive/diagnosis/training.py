@@ -21,7 +21,7 @@ import math
 from types import MappingProxyType
 
 from antenna_drive.diagnosis.least_squares import (
-    FitState, Jacobian, LeastSquares, with_initial_conditions,
+    FitState, Jacobian, LeastSquares, settled, with_initial_conditions,
 )
 from antenna_drive.diagnosis.machine import (
     Experiment, FloatArray, Machine, Parameter, Point, TimeScales,
@@ -179,15 +179,4 @@ def trained(part: Part, parameters: Sequence[Parameter], point: Mapping[str, flo
                             options.iterations)
         at = state.point()
         number += 1
-    return settled(problem, state, settings)
-
-
-def settled(problem: LeastSquares, state: FitState, settings: Settings) -> FitState:
-    """Go on with a fit, with fresh derivatives, as long as that gains much."""
-    options, search = settings.held_out, settings.search
-    for _ in range(options.passes):
-        before = state.cost
-        state = problem.fit(problem.refreshed(state, central=False), options.iterations)
-        if before - state.cost < max(search.settled, search.final_gain * before):
-            break
-    return state
+    return settled(problem, state, search, options.passes, options.iterations)
