@@ -29,7 +29,7 @@ from antenna_drive.diagnosis.least_squares import (
     FitState, Jacobian, least_cost, LeastSquares, prior_precision, transposed_product,
     weighted_product,
 )
-from antenna_drive.diagnosis.machine import Effect, FloatArray, Form
+from antenna_drive.diagnosis.machine import Effect, FloatArray, Form, Parameter
 import numpy as np
 from scipy.optimize import minimize_scalar
 
@@ -148,6 +148,12 @@ def _promised(hessian: FloatArray, gradient: FloatArray, low: FloatArray,
     return float(gradient @ step - 0.5 * step @ hessian @ step)
 
 
+def coarse_values(size: Parameter) -> list[float]:
+    """Return values between the bounds of a size, denser near zero."""
+    return [share * (size.high if share > 0.0 else -size.low)
+            for share in _COARSE if share > 0.0 or size.low < 0.0]
+
+
 def scan(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
          besides: Sequence[str] = ()) -> list[tuple[Sensitivity, float]]:
     """
@@ -182,8 +188,7 @@ def scan(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
         if len(sizes) != 1 or same_effect(problem.machine.effects, item.effect, besides) or any(
                 p.name in here for p in item.form.parameters):
             continue
-        values = [share * (sizes[0].high if share > 0.0 else -sizes[0].low)
-                  for share in _COARSE if share > 0.0 or sizes[0].low < 0.0]
+        values = coarse_values(sizes[0])
         costs = [cost(item, value) for value in values]
         least = int(np.argmin(costs))
         coarse.append((costs[least], least, values, item))

@@ -19,6 +19,8 @@ from antenna_drive.diagnosis import (
     Effect, Experiment, FloatArray, Form, Hypothesis, LeastSquares, Machine, Parameter, Point,
 )
 from antenna_drive.diagnosis.search import Search
+from antenna_drive.diagnosis.settings import DEFAULT
+from antenna_drive.diagnosis.training import begun, Part
 import numpy as np
 import pytest
 
@@ -131,3 +133,29 @@ def test_an_effect_that_nothing_shows_where_a_fit_began_is_found_by_a_scan() -> 
     singles = search._exchanged([Hypothesis(('push',), (form,), problem.fit(start, 10))])
     assert singles[0].effects == ('weight',)
     assert singles[0].values[0][1] == pytest.approx(2.0, abs=0.01)
+
+
+def test_training_begins_at_a_size_that_its_own_tests_ask_for() -> None:
+    """Where the weight sticks no derivative leads to it; the withheld test has no say."""
+    machine = Tilted(2.0)
+    part = Part(machine, [0, 1])
+    form = machine.effects['weight'].forms[0]
+    size = begun(part, [form], {}, DEFAULT)['weight.pull']
+    others = [5.0 * share for share in (-0.9, -0.4, 0.0, 0.1, 0.9)]
+    loss = LeastSquares(part).loss
+    misfit = LeastSquares(part).residuals
+    assert loss(misfit({'weight.pull': size})) < min(
+        loss(misfit({'weight.pull': other})) for other in others)
+    assert size == pytest.approx(2.0, abs=0.5)
+
+
+def test_a_part_with_held_values_predicts_as_the_machine_at_them() -> None:
+    """What is held need not be named again, in one experiment or in all."""
+    machine = Tilted(2.0)
+    held = Part(machine, [1, 2]).holding({'weight.pull': 1.5})
+    for k, one in enumerate((1, 2)):
+        whole = machine.predict({'weight.pull': 1.5, 'offset': 0.01}, one)
+        assert np.array_equal(held.predict({'offset': 0.01}, k), whole)
+        assert np.array_equal(held.simulate([{'offset': 0.01}])[0][k], whole)
+    assert np.array_equal(held.low_fidelity().predict({}, 0),
+                          machine.predict({'weight.pull': 1.5}, 1))
