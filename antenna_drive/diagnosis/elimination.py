@@ -92,6 +92,32 @@ def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings:
             best, converged = leading, fits.converged(leading)
 
 
+def settled_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
+                   settings: Settings) -> tuple[list[Hypothesis], Hypothesis]:
+    """
+    Take fits close behind the best to their ends, too: only there can they be told apart.
+
+    Parameters and what is returned are those of `forward_selection`.
+    """
+    options, price = settings.search, settings.penalty
+    found = {frozenset(h.effects): h for h in hypotheses}
+    first = found[frozenset(best.effects)]
+    behind = first.cost - best.cost
+    rivals = sorted((h for h in hypotheses if h is not first
+                     and len(h.effects) == len(best.effects) > 0
+                     and h.penalised(price) < first.penalised(price) + options.close),
+                    key=lambda h: h.penalised(price))
+    for rival in rivals[:options.rivals]:
+        end = fits.converged(rival)
+        if end.cost + behind < rival.cost:
+            found[frozenset(rival.effects)] = replace(
+                end, state=replace(end.state.without_jacobian(keep_hessian=True),
+                                   cost=end.cost + behind))
+        if end.penalised(price) < best.penalised(price):
+            best = end
+    return list(found.values()), best
+
+
 def forward_selection(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
                       settings: Settings) -> tuple[list[Hypothesis], Hypothesis]:
     """

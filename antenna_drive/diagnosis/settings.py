@@ -116,6 +116,10 @@ class SearchSettings:
     final_gain: float = _setting(
         1e-3, '1', 'gain by such a Jacobian, as a share of the cost, below which it has ended',
         TRIAL_6)
+    close: float = _setting(
+        30.0, 'half chi-square', 'excess over the best cost up to which another fit is taken to '
+        'its end, too', TRIAL_6)
+    rivals: int = _setting(2, '1', 'greatest number of them', TRIAL_6)
     scanned: int = _setting(
         5, '1', 'effects that are fitted from a value found by a scan', PRACTICE)
     first_iterations: int = _setting(5, '1', 'iterations of a first fit of an effect')
