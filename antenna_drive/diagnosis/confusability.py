@@ -152,7 +152,7 @@ def visibility(problem: LeastSquares, state: FitState,
 
 def could_hide(problem: LeastSquares, state: FitState) -> list[dict[str, Any]]:
     """Return how large each effect could be and still hide in these tests, for the JSON."""
-    found = visibility(problem, problem.refreshed(state, central=False))
+    found = visibility(problem, problem.refreshed(state))
     return [{'effect': effect, 'size': float(size) if np.isfinite(size) else None, 'unit': unit}
             for effect, size, unit in zip(found.effects, found.detectable, found.units,
                                           strict=True)]

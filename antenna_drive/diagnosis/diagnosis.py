@@ -30,7 +30,9 @@ from antenna_drive.diagnosis import localisation, unknown_input, verdict
 from antenna_drive.diagnosis.by_label import by_label
 from antenna_drive.diagnosis.check import check_machine
 from antenna_drive.diagnosis.confusability import could_hide
-from antenna_drive.diagnosis.elimination import backward_elimination, forward_selection
+from antenna_drive.diagnosis.elimination import (
+    backward_elimination, forward_selection, settled_rivals,
+)
 from antenna_drive.diagnosis.evidence import Evidence
 from antenna_drive.diagnosis.held_out import held_out, refuted
 from antenna_drive.diagnosis.hypothesis import Hypothesis
@@ -190,8 +192,9 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
     began = time.monotonic()
     search = Search(LeastSquares(machine, settings=settings),
                     lambda share, doing: progress(0.9 * share, doing), threads)
-    hypotheses, best = forward_selection(
-        search, *backward_elimination(search, search.run(), settings), settings)
+    hypotheses, best = backward_elimination(search, search.run(), settings)
+    hypotheses, best = settled_rivals(search, hypotheses, best, settings)
+    hypotheses, best = forward_selection(search, hypotheses, best, settings)
     # the noise is that of the motion that was found
     problem = search.whole
     hypotheses, best = simplified(problem, hypotheses, best)

@@ -41,6 +41,9 @@ class Fits(Protocol):
     def with_another(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         """Return a hypothesis whose fit has converged with each of a few more effects."""
 
+    def leaves_much(self, hypothesis: Hypothesis) -> bool:
+        """Return whether a hypothesis leaves more than noise."""
+
     def judged_by(self, best: Hypothesis,
                   hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Return hypotheses with their costs at the noise that one of them leaves."""
@@ -89,10 +92,38 @@ def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings:
             best, converged = leading, fits.converged(leading)
 
 
+def settled_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
+                   settings: Settings) -> tuple[list[Hypothesis], Hypothesis]:
+    """
+    Take fits close behind the best to their ends, too: only there can they be told apart.
+
+    Parameters and what is returned are those of `forward_selection`.
+    """
+    options, price = settings.search, settings.penalty
+    found = {frozenset(h.effects): h for h in hypotheses}
+    first = found[frozenset(best.effects)]
+    behind = first.cost - best.cost
+    rivals = sorted((h for h in hypotheses if h is not first
+                     and len(h.effects) == len(best.effects) > 0
+                     and h.penalised(price) < first.penalised(price) + options.close),
+                    key=lambda h: h.penalised(price))
+    for rival in rivals[:options.rivals]:
+        end = fits.converged(rival)
+        if end.cost + behind < rival.cost:
+            found[frozenset(rival.effects)] = replace(
+                end, state=replace(end.state.without_jacobian(keep_hessian=True),
+                                   cost=end.cost + behind))
+        if end.penalised(price) < best.penalised(price):
+            best = end
+    return list(found.values()), best
+
+
 def forward_selection(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
                       settings: Settings) -> tuple[list[Hypothesis], Hypothesis]:
     """
-    Add effects to a pair one after the other, until none is worth its price.
+    Add effects one after the other, until none is worth its price.
+
+    A single effect is left alone if it leaves only noise: the search has tried its partners.
 
     Parameters
     ----------
@@ -111,7 +142,8 @@ def forward_selection(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypoth
 
     """
     found = list(hypotheses)
-    while 2 <= len(best.effects) < settings.search.most_effects:
+    while (0 < len(best.effects) < settings.search.most_effects
+           and (len(best.effects) > 1 or fits.leaves_much(best))):
         # the best as it has converged, so that it does not lose to fits that went further
         found = [best if set(h.effects) == set(best.effects) else h for h in found]
         more = fits.with_another(best)

@@ -31,11 +31,12 @@ from typing import Any
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.intervals import covariance, inflation
 from antenna_drive.diagnosis.least_squares import (
-    FitState, Jacobian, LeastSquares, prior_precision, weighted_product, with_initial_conditions,
+    FitState, Jacobian, LeastSquares, prior_precision, settled, weighted_product,
+    with_initial_conditions,
 )
 from antenna_drive.diagnosis.machine import FloatArray, Form, Parameter
 from antenna_drive.diagnosis.settings import Settings
-from antenna_drive.diagnosis.training import Fixed, Part, settled, Slopes, trained
+from antenna_drive.diagnosis.training import begun, Part, Slopes, trained
 import numpy as np
 
 _TURNS = ('each recording in turn, with the effect as the others have it; offsets within the '
@@ -191,7 +192,8 @@ class _Judge:
         """Return a part's problem, and its fits without and with the effects."""
         problem = LeastSquares(part, settings=self._settings)
         own = part.parameters(self._best.state.parameters)
-        found = trained(part, own, self._start, [
+        start = begun(part, self._best.forms, self._start, self._settings)
+        found = trained(part, own, start, [
             slopes.for_part(part, own) for slopes in (self._neutral, self._with)], self._settings)
         if not self._best.effects:
             return problem, found, found
@@ -204,7 +206,7 @@ class _Judge:
         search = self._settings.search
         if (unaided.cost < (1.0 + search.doubtful) * found.cost
                 or problem.noise_level(found.residual) > search.wanting):
-            unaided = settled(problem, unaided, self._settings)
+            unaided = self._settled(problem, unaided)
             found = min(found, self._added(problem, part, unaided), key=lambda s: s.cost)
         return problem, unaided, found
 
@@ -259,18 +261,15 @@ class _Judge:
         """Judge on test k what the other tests have taught."""
         machine, groups = self._problem.machine, self._groups
         testing = Part(machine, [k])
-        state = self._fitted(testing, self._none.state.parameters, {}, self._none.state.point(),
-                             self._without)
-        # the derivatives at the optimum of all tests may be far off where the effect is not
-        bare = LeastSquares(testing, settings=self._settings)
-        state = bare.fit(bare.refreshed(state, central=False),
-                         self._settings.held_out.iterations)
-        fold = self._fold(k, _gap(testing, state.point()), bare.residuals_of(state, 0))
+        bare = self._fitted(testing, self._none.state.parameters, {}, self._none.state.point(),
+                            self._without)
+        problem = LeastSquares(testing, settings=self._settings)
+        fold = self._fold(k, _gap(testing, bare.point()), problem.residuals_of(bare, 0))
         if not self._best.effects:
             return fold
         part = Part(machine, [i for i, group in enumerate(groups) if group != groups[k]])
-        problem, unaided, found = self._trained(part)
-        reasons, spread = self._undetermined(problem, unaided, found)
+        training, unaided, found = self._trained(part)
+        reasons, spread = self._undetermined(training, unaided, found)
         reasons = {**reasons, **self._unseen_labels(testing, part)}
         fold = replace(fold, reasons=reasons)
         judged = self._judged(reasons)
@@ -280,17 +279,20 @@ class _Judge:
                 **{p.name: found.value(p.name) for p in judged}}
         # the nuisances begin where training has left them, too
         own = {p.name for p in testing.parameters(self._nuisances) if p.experiment is not None}
-        begin = with_initial_conditions(
-            LeastSquares(testing, settings=self._settings), {
-                **{name: value for name, value in found.point().items() if name not in own},
-                **held})
+        begin = with_initial_conditions(problem, {
+            **{name: value for name, value in found.point().items() if name not in own}, **held})
         state = self._fitted(testing, self._nuisances, held, begin, self._with)
+        if problem.noise_level(state.residual) > self._settings.search.wanting:
+            # or where the fit without effects has left them
+            begin = with_initial_conditions(problem, {**bare.point(), **held})
+            state = min(state, self._fitted(testing, self._nuisances, held, begin, self._with),
+                        key=lambda fit: fit.cost)
         # what a change of the effect leaves once the offsets have followed it
         slope = self._with.for_part(testing, judged)
         cross = weighted_product(state.jacobian, state.weight, slope)
         follow = np.linalg.lstsq(state.hessian + np.diag(prior_precision(state.parameters)),
                                  cross, rcond=None)[0]
-        after = LeastSquares(testing, settings=self._settings).residuals_of(state, 0)
+        after = problem.residuals_of(state, 0)
         fold = replace(fold, gap_after=_gap(testing, {**held, **state.point()}), after=after)
         return self._with_spread(fold, judged, found, spread,
                                  slope - state.jacobian @ follow.astype(np.float32))
@@ -358,9 +360,13 @@ class _Judge:
                 begin: Mapping[str, float], slopes: Slopes) -> FitState:
         """Fit the nuisances to a withheld test, with some values held."""
         own = testing.parameters(nuisances)
-        problem = Fixed(testing, held, self._settings)
-        return problem.fit(problem.start(own, dict(begin), slopes.for_part(testing, own)),
-                           self._settings.held_out.iterations)
+        return trained(testing.holding(held), own, begin, [slopes.for_part(testing, own)],
+                       self._settings)
+
+    def _settled(self, problem: LeastSquares, state: FitState) -> FitState:
+        """Go on with a fit, with fresh derivatives, as long as that gains much."""
+        options = self._settings.held_out
+        return settled(problem, state, self._settings.search, options.passes, options.iterations)
 
 
 def _gap(part: Part, point: Mapping[str, float]) -> FloatArray:

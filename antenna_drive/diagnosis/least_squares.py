@@ -22,14 +22,15 @@ Mathematics of Computation 19, 1965). A fresh Jacobian is taken where a fit has 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from types import MappingProxyType
 
 from antenna_drive.diagnosis.box_qp import box_constrained_step
 from antenna_drive.diagnosis.machine import FloatArray, Machine, Parameter
 from antenna_drive.diagnosis.noise import whitened
-from antenna_drive.diagnosis.settings import DEFAULT, FitSettings, Settings
+from antenna_drive.diagnosis.settings import DEFAULT, FitSettings, SearchSettings, Settings
 import numpy as np
 from numpy.typing import NDArray
 
@@ -194,7 +195,8 @@ class LeastSquares:
     # -- beginning a fit -----------------------------------------------------------------------
 
     def jacobian(self, point: dict[str, float], parameters: Sequence[Parameter],
-                 residual: FloatArray, central: bool) -> Jacobian:
+                 residual: FloatArray, central: bool,
+                 steps: Mapping[str, float] = MappingProxyType({})) -> Jacobian:
         """
         Return the derivative of the prediction by difference quotients.
 
@@ -208,20 +210,23 @@ class LeastSquares:
             at the point, for one-sided differences
         central
             take central differences where the bounds leave room for them
+        steps
+            of the difference quotients, by name, where they are not the usual ones
 
         """
         variants, only, plan = [], [], []
+        sizes = [steps.get(item.name, item.step) for item in parameters]
         for j, item in enumerate(parameters):
-            here = point.get(item.name, 0.0)
+            here, step = point.get(item.name, 0.0), sizes[j]
             # a value at a bound may be off it by a rounding error
-            room = item.step * (1.0 - 1e-9)
+            room = step * (1.0 - 1e-9)
             up = here + room <= item.high
             down = here - room >= item.low
             sides = [s for s, there in ((1.0, up), (-1.0, down)) if there]
             if not central and len(sides) == 2:
                 sides = sides[:1]
             for side in sides:
-                variants.append({**point, item.name: here + side * item.step})
+                variants.append({**point, item.name: here + side * step})
                 only.append(item.experiment)
                 plan.append((j, side, len(sides)))
         jacobian = np.zeros((residual.size, len(parameters)), np.float32)
@@ -239,10 +244,10 @@ class LeastSquares:
                         continue
                     rows = self.rows(k)
                     change = residual[rows] - self.standardised(k, values)
-                    jacobian[rows, j] += side * change / (parameters[j].step * count)
+                    jacobian[rows, j] += side * change / (sizes[j] * count)
         for j, item in enumerate(parameters):
             greatest = float(np.abs(jacobian[:, j]).max(initial=0.0))
-            if greatest * item.step < self.settings.fit.dead_column:
+            if greatest * sizes[j] < self.settings.fit.dead_column:
                 jacobian[:, j] = 0.0
         return jacobian
 
@@ -262,11 +267,28 @@ class LeastSquares:
         fresh = self.jacobian(point, others, self.residuals(point), central=True)
         return self.start((*known, *others), point, np.column_stack([columns, fresh]))
 
-    def refreshed(self, state: FitState, central: bool = True) -> FitState:
-        """Return the state with a fresh Jacobian and fresh weights."""
-        jacobian = self.jacobian(state.point(), state.parameters, state.residual, central)
+    def refreshed(self, state: FitState) -> FitState:
+        """
+        Return the state with a fresh Jacobian and fresh weights.
+
+        Where sticking and slipping bend the prediction, a difference quotient over many standard
+        deviations is no derivative. The data that have been fitted tell how small a step may be.
+        """
+        jacobian = self.jacobian(state.point(), state.parameters, state.residual, False,
+                                 self.local_steps(state))
         return self._state(state.parameters, state.x, state.residual, jacobian,
                            self.weights(state.residual))
+
+    def local_steps(self, state: FitState) -> dict[str, float]:
+        """Return steps of difference quotients that change the prediction by little, by name."""
+        if state.kept_hessian is None and not state.jacobian.size:
+            return {}
+        options = self.settings.fit
+        visible = np.sqrt(np.maximum(np.diag(state.hessian), 1e-30))
+        return {p.name: p.step * min(max(options.local_step / (visible_ * p.step),
+                                         options.least_step), 1.0)
+                for p, visible_ in zip(state.parameters, visible.tolist(), strict=True)
+                if not p.is_shape}
 
     def extended(self, state: FitState, parameters: Sequence[Parameter],
                  values: Sequence[float], columns: Jacobian) -> FitState:
@@ -397,6 +419,31 @@ class _LocalModel:
                 _updated(self.jacobian, self.errors, self.directions), weight)
             self._hessian_weight = weight
         self._slope = transposed_product(self.jacobian, weighted_residual)
+
+
+def settled(problem: LeastSquares, state: FitState, options: SearchSettings, passes: int,
+            iterations: int) -> FitState:
+    """
+    Go on with a fit, with fresh derivatives, as long as that gains much.
+
+    Parameters
+    ----------
+    problem, state
+        the fit
+    options
+        what is much
+    passes
+        greatest number of fresh Jacobians
+    iterations
+        of the fit between two of them
+
+    """
+    for _ in range(passes):
+        before = state.cost
+        state = problem.fit(problem.refreshed(state), iterations)
+        if before - state.cost < max(options.settled, options.final_gain * before):
+            break
+    return state
 
 
 def least_cost(problem: LeastSquares, trials: Sequence[dict[str, float]], experiment: int,

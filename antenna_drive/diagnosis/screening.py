@@ -29,12 +29,13 @@ from antenna_drive.diagnosis.least_squares import (
     FitState, Jacobian, least_cost, LeastSquares, prior_precision, transposed_product,
     weighted_product,
 )
-from antenna_drive.diagnosis.machine import Effect, Form
+from antenna_drive.diagnosis.machine import Effect, FloatArray, Form, Parameter
 import numpy as np
+from scipy.optimize import minimize_scalar
 
-# The values that a scan tries, as shares of the bounds, and then as multiples of the best one.
+# The values that a scan tries first, as shares of the bounds, and how often it looks between them.
 _COARSE = (-0.9, -0.6, -0.4, -0.25, -0.15, -0.08, 0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 0.9)
-_FINE = (0.7, 0.8, 0.87, 0.94, 1.06, 1.13, 1.2, 1.3)
+_REFINEMENTS = 10
 
 
 @dataclass(frozen=True)
@@ -95,6 +96,8 @@ def screened(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity
     """
     Return the gain that each form promises beside the effects that are there, the greatest first.
 
+    What the fit would gain without it, because it has not converged, is no part of the promise.
+
     Parameters
     ----------
     problem, state
@@ -111,6 +114,7 @@ def screened(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity
     prior = prior_precision(state.parameters)
     hessian = state.hessian + np.diag(prior)
     gradient = transposed_product(state.jacobian, state.weight * state.residual) - prior * state.x
+    own_gain = _promised(hessian, gradient, low, high)
     found: dict[str, list[tuple[float, Sensitivity]]] = {}
     for item in known:
         form = item.form
@@ -124,10 +128,8 @@ def screened(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity
         cross = weighted_product(state.jacobian, state.weight, own)
         full = np.block([[hessian, cross], [cross.T, weighted_product(own, state.weight)]])
         slope = np.r_[gradient, transposed_product(own, state.weight * state.residual)]
-        step = box_constrained_step(full + 1e-9 * np.diag(np.diag(full) + 1e-9), slope,
-                                    np.r_[low, [p.low for p in form.sizes]],
-                                    np.r_[high, [p.high for p in form.sizes]])
-        gain = float(slope @ step - 0.5 * step @ full @ step)
+        gain = _promised(full, slope, np.r_[low, [p.low for p in form.sizes]],
+                         np.r_[high, [p.high for p in form.sizes]]) - own_gain
         found.setdefault(item.effect, []).append((gain, item))
     best: list[tuple[float, Sensitivity]] = []
     close = problem.settings.search.second_form
@@ -138,13 +140,27 @@ def screened(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity
     return sorted(best, key=lambda pair: -pair[0])
 
 
+def _promised(hessian: FloatArray, gradient: FloatArray, low: FloatArray,
+              high: FloatArray) -> float:
+    """Return what the best step within bounds would gain, were the problem linear."""
+    step = box_constrained_step(hessian + 1e-9 * np.diag(np.diag(hessian) + 1e-9), gradient,
+                                low, high)
+    return float(gradient @ step - 0.5 * step @ hessian @ step)
+
+
+def coarse_values(size: Parameter) -> list[float]:
+    """Return values between the bounds of a size, denser near zero."""
+    return [share * (size.high if share > 0.0 else -size.low)
+            for share in _COARSE if share > 0.0 or size.low < 0.0]
+
+
 def scan(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
          besides: Sequence[str] = ()) -> list[tuple[Sensitivity, float]]:
     """
     Return the forms of one size whose best value, tried out far from zero, fits best.
 
     A strong effect may bend the misfit so much that its derivative at zero tells nothing: a mode
-    at another frequency, a limit that was not reached. Only the worst test is looked at.
+    at another frequency, a limit that was not reached. The value is sought in the worst test.
 
     Parameters
     ----------
@@ -162,24 +178,34 @@ def scan(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
     worst = int(np.argmax([problem.loss(state.residual[problem.rows(k)])
                            for k in range(len(problem.experiments))]))
 
-    def tried(form: Form, name: str, values: Sequence[float]) -> tuple[float, float]:
-        cost, best = least_cost(problem, [{**here, **form.start, name: value}
-                                          for value in values], worst, until)
-        return cost, best[name]
+    def cost(item: Sensitivity, value: float) -> float:
+        point = {**here, **item.form.start, item.form.sizes[0].name: value}
+        return least_cost(problem, [point], worst, until)[0]
 
-    coarse: list[tuple[float, float, Sensitivity]] = []
+    coarse: list[tuple[float, int, list[float], Sensitivity]] = []
     for item in known:
         sizes = item.form.sizes
         if len(sizes) != 1 or same_effect(problem.machine.effects, item.effect, besides) or any(
                 p.name in here for p in item.form.parameters):
             continue
-        values = [share * (sizes[0].high if share > 0.0 else -sizes[0].low)
-                  for share in _COARSE if share > 0.0 or sizes[0].low < 0.0]
-        coarse.append((*tried(item.form, sizes[0].name, values), item))
+        values = coarse_values(sizes[0])
+        costs = [cost(item, value) for value in values]
+        least = int(np.argmin(costs))
+        coarse.append((costs[least], least, values, item))
     coarse.sort(key=lambda entry: entry[0])
-    fine = []
-    for cost, value, item in coarse[:2 * count]:
-        nearby = tried(item.form, item.form.sizes[0].name, [value * share for share in _FINE])
-        fine.append((*min((cost, value), nearby), item))
-    fine.sort(key=lambda entry: entry[0])
-    return [(item, value) for _, value, item in fine[:count]]
+
+    def refined(entry: tuple[float, int, list[float], Sensitivity],
+                ) -> tuple[float, Sensitivity, float]:
+        """Return the best value between the neighbours of the best coarse one; all tests judge."""
+        _, least, values, item = entry
+        size = item.form.sizes[0]
+        grid = [size.low, *values, size.high]
+        found = minimize_scalar(lambda value: cost(item, value), method='bounded',
+                                bounds=(grid[least], grid[least + 2]),
+                                options={'maxiter': _REFINEMENTS})
+        value = float(found.x)
+        total = problem.loss(problem.residuals({**here, **item.form.start, size.name: value}))
+        return total, item, value
+
+    fine = sorted(map(refined, coarse[:2 * count]), key=lambda entry: entry[0])
+    return [(item, value) for _, item, value in fine[:count]]

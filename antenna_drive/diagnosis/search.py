@@ -27,15 +27,15 @@ The search for effects: from the nuisances alone over single effects to pairs.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.least_squares import (
-    FitState, Jacobian, LeastSquares, with_initial_conditions,
+    FitState, Jacobian, LeastSquares, settled, with_initial_conditions,
 )
 from antenna_drive.diagnosis.machine import Effect, Form, Parameter
 from antenna_drive.diagnosis.noise import same_noise, with_estimated_noise
@@ -44,6 +44,8 @@ from antenna_drive.diagnosis.screening import (
 )
 import numpy as np
 
+Item = TypeVar('Item')
+
 
 @dataclass(frozen=True)
 class _SharedJacobian:
@@ -51,6 +53,16 @@ class _SharedJacobian:
 
     nuisances: Jacobian
     courses: Mapping[str, Jacobian]
+
+
+def _others(hypothesis: Hypothesis, form: Form) -> list[int]:
+    """Return which of a hypothesis' parameters are not a form's."""
+    return [j for j, p in enumerate(hypothesis.state.parameters) if p not in form.parameters]
+
+
+def _put(items: tuple[Item, ...], place: int, item: Item) -> tuple[Item, ...]:
+    """Return a tuple with another item in a place."""
+    return (*items[:place], item, *items[place + 1:])
 
 
 class Search:
@@ -87,11 +99,13 @@ class Search:
         self._take_sensitivities(none.state)
         self.progress(0.25, 'single effects')
         singles = self._at_lower_noise(self._singles(none))
+        if self.problem.scale > 1.0:
+            singles = self._at_lower_noise(self._exchanged(self._first_settled(singles)))
         self.progress(0.5, 'pairs of effects')
         pairs = self._pairs(singles)
         if pairs:
             scale = self.problem.scale
-            pairs = self._at_lower_noise(pairs)
+            pairs = self._improved(self._at_lower_noise(pairs))
             # costs compare at one and the same noise only
             singles = [replace(h, state=self.problem.rescaled(h.state, scale)) for h in singles]
         self.progress(0.7, 'the best in full')
@@ -134,7 +148,7 @@ class Search:
             self.sensitivities = rescaled(self.sensitivities, self.problem.scale / problem.scale)
             self.problem = problem
             finalists = found[:self.settings.finalists]
-            shared = self._shared_jacobian(problem, best.point(), finalists)
+            shared = self._shared_jacobian(problem, best, finalists)
             found = self._sorted(partial(
                 self._refitted, problem, shared, self.settings.iterations), finalists)
         return found
@@ -202,42 +216,82 @@ class Search:
         return replace(hypothesis, state=self.problem.fit(
             state, self.settings.settling_iterations))
 
-    def _with_relatives(self, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """
-        Return single effects with those that do the same in other places, the best first.
+    def _first_settled(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Go on with the best fit: one that has stopped early hides what its effect can do."""
+        options, best = self.settings, hypotheses[0]
+        state = settled(self.problem, best.state, options, options.settling_passes,
+                        options.settling_iterations)
+        return [replace(best, state=state), *hypotheses[1:]]
 
-        Each begins with the nuisances of the best single effect and at a size that does as much.
-        From far away its fit may have ended elsewhere, and 'both motors' then lost to one.
+    def _with_relatives(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """
-        best, effects = singles[0], self.machine.effects
-        effect = effects[best.effects[0]]
-        wholes = [e for e in effects.values() if effect.id in e.parts]
-        relatives = [
-            *((effects[part], float(len(effect.parts))) for part in effect.parts),
-            *((whole, 1.0 / len(whole.parts)) for whole in wholes),
-            *((effects[part], 1.0) for whole in wholes for part in whole.parts
-              if part != effect.id)]
-        found = {(h.effects, h.forms): h for h in singles}
-        for new in self._pool.map(lambda item: self._moved(best, *item), relatives):
-            known = found.get((new.effects, new.forms))
-            if known is None or self._priced(new) < self._priced(known):
-                found[new.effects, new.forms] = new
+        Return hypotheses with those whose effects do the same in other places, the best first.
+
+        Each begins with the nuisances of the best and at a size that does as much. From far away
+        its fit may have ended elsewhere, and 'both motors' then lost to one.
+        """
+        best = hypotheses[0]
+        return self._with_better(hypotheses, self._pool.map(
+            lambda item: self._moved(best, *item),
+            [(place, *item) for place in range(len(best.effects))
+             for item in self._relatives(best.effects[place])]))
+
+    def _relatives(self, ident: str) -> Iterator[tuple[Effect, float]]:
+        """Yield an effect in other places, with the factor of its size that does as much."""
+        effects = self.machine.effects
+        effect = effects[ident]
+        for part in effect.parts:
+            yield effects[part], float(len(effect.parts))
+        for whole in effects.values():
+            if effect.id in whole.parts:
+                yield whole, 1.0 / len(whole.parts)
+                yield from ((effects[part], 1.0) for part in whole.parts if part != effect.id)
+
+    def _exchanged(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """
+        Return hypotheses with those that a scan finds in the place of an effect of the best one.
+
+        The nuisances alone were bent by the effect that is missing. With those of the best effect
+        another one may fit better: gravity in place of a steady wind.
+        """
+        best = hypotheses[0]
+        if best.has_course:
+            return list(hypotheses)
+        found: list[Hypothesis] = []
+        for place, effect in enumerate(best.effects):
+            bare, kept = self._dropped(best, effect), _others(best, best.forms[place])
+            bare = replace(bare, state=self.problem.start(
+                bare.state.parameters, bare.state.point(), best.state.jacobian[:, kept]))
+            found += self._pool.map(
+                partial(lambda base, entry: self._added_at(base, *entry), bare),
+                scan(self.problem, bare.state, self.sensitivities, bare.effects))
+        return self._with_better(hypotheses, found)
+
+    def _with_better(self, hypotheses: Sequence[Hypothesis],
+                     others: Iterable[Hypothesis]) -> list[Hypothesis]:
+        """Return hypotheses and others, of those with the same effects the better, sorted."""
+        found = {frozenset(zip(h.effects, h.forms, strict=True)): h for h in hypotheses}
+        for new in others:
+            key = frozenset(zip(new.effects, new.forms, strict=True))
+            if key not in found or self._priced(new) < self._priced(found[key]):
+                found[key] = new
         return sorted(found.values(), key=self._priced)
 
-    def _moved(self, base: Hypothesis, effect: Effect, factor: float) -> Hypothesis:
-        """Fit an effect in the place of a hypothesis' only one, from that one times a factor."""
-        was = base.forms[0]
-        form = self.machine.counterpart(was, self.machine.effects[base.effects[0]], effect)
+    def _moved(self, base: Hypothesis, place: int, effect: Effect, factor: float) -> Hypothesis:
+        """Fit an effect in the place of one of a hypothesis', from its size times a factor."""
+        was = base.forms[place]
+        form = self.machine.counterpart(was, self.machine.effects[base.effects[place]], effect)
         point = base.state.point()
         for old, new in zip(was.parameters, form.parameters, strict=True):
             point[new.name] = point.pop(old.name) * (1.0 if new.is_shape else factor)
-        return Hypothesis((effect.id,), (form,), self._in_place_of(base, (form,), point))
+        return Hypothesis(
+            _put(base.effects, place, effect.id), _put(base.forms, place, form),
+            self._in_place_of(base, was, (form,), point))
 
-    def _in_place_of(self, base: Hypothesis, forms: Sequence[Form],
+    def _in_place_of(self, base: Hypothesis, was: Form, forms: Sequence[Form],
                      point: dict[str, float]) -> FitState:
-        """Fit effects in the place of a hypothesis' only one, from a point."""
-        state = base.state
-        kept = [j for j, p in enumerate(state.parameters) if p not in base.forms[0].parameters]
+        """Fit effects in the place of one of a hypothesis', from a point."""
+        state, kept = base.state, _others(base, was)
         start = self.problem.start_from(
             [state.parameters[j] for j in kept], state.jacobian[:, kept],
             [p for form in forms for p in form.parameters], point)
@@ -274,6 +328,13 @@ class Search:
                     found[key] = pair.without_jacobian()
         return sorted(found.values(), key=self._priced)
 
+    def _improved(self, pairs: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Go on with the best pair, and try others in the place of each of its effects."""
+        found = self._with_relatives(self._first_settled(pairs))
+        if self.problem.scale > 1.0:
+            found = self._at_lower_noise(self._exchanged(found))
+        return found
+
     def _partnered(self, best: Hypothesis, base: Hypothesis,
                    partner: tuple[Sensitivity, float | None]) -> Hypothesis:
         """Give a hypothesis a partner, from a value if one is given."""
@@ -298,7 +359,8 @@ class Search:
         for p, *own in zip(whole, *(form.parameters for form in forms), strict=True):
             value = point.pop(p.name)
             point.update({part.name: value for part in own})
-        return [Hypothesis(effect.parts, forms, self._in_place_of(base, forms, point))]
+        state = self._in_place_of(base, base.forms[0], forms, point)
+        return [Hypothesis(effect.parts, forms, state)]
 
     # -- the whole tests -------------------------------------------------------------------------
 
@@ -327,7 +389,7 @@ class Search:
         before = np.inf
         for number in range(options.passes):
             self.progress(0.7 + 0.3 * number / options.passes, 'the best in full')
-            shared = self._shared_jacobian(whole, anchor.state.point(), chosen)
+            shared = self._shared_jacobian(whole, anchor.state, chosen)
             # the first pass is never the last, and only the last one's Hessian is asked for
             refitted = partial(self._refitted_in_full, shared, number > 0)
             chosen = self._sorted(refitted, chosen)
@@ -367,17 +429,11 @@ class Search:
         return True
 
     def converged(self, hypothesis: Hypothesis) -> Hypothesis:
-        """Go on with a fit, with central differences, as long as that gains much."""
-        state, options = hypothesis.state, self.settings
-        for number in range(options.final_passes):
-            if number and self.whole.noise_level(state.residual) < options.clean:
-                break
-            before = state.cost
-            state = self.whole.fit(self.whole.refreshed(state, central=True),
-                                   options.full_iterations)
-            if before - state.cost < max(options.settled, options.final_gain * before):
-                break
-        return replace(hypothesis, state=state)
+        """Go on with a fit, with fresh derivatives, as long as that gains much."""
+        options = self.settings
+        return replace(hypothesis, state=settled(
+            self.whole, hypothesis.state, options, options.final_passes,
+            options.full_iterations))
 
     def with_another(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         """Return a hypothesis whose fit has converged with each of a few more effects."""
@@ -395,6 +451,10 @@ class Search:
                 self.whole.fit(more, self.settings.full_iterations)).without_jacobian(True)
 
         return list(self._pool.map(added, promising))
+
+    def leaves_much(self, hypothesis: Hypothesis) -> bool:
+        """Return whether a hypothesis leaves more than noise in the whole tests."""
+        return self.whole.noise_level(hypothesis.state.residual) > self.settings.wanting
 
     def judged_by(self, best: Hypothesis,
                   hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -421,25 +481,30 @@ class Search:
         names = {p.name for p in hypothesis.forms[gone].parameters}
         state, values = hypothesis.state, hypothesis.state.point()
         free = {p.name: p for p in self.machine.nuisances}
-        own: list[Parameter] = [
-            free.get(p.name, p) for p in state.parameters if p.name not in names]
+        kept = [j for j, p in enumerate(state.parameters) if p.name not in names]
+        own: list[Parameter] = [free.get(p.name, p) for p in (state.parameters[j] for j in kept)]
         point = self.machine.absorb({p.name: values[p.name] for p in own},
                                     {name: values[name] for name in names})
-        bare = replace(state, parameters=tuple(own), x=np.array([point[p.name] for p in own]))
+        bare = replace(
+            state.without_jacobian(), parameters=tuple(own),
+            x=np.array([point[p.name] for p in own]),
+            kept_hessian=None if state.kept_hessian is None
+            else state.kept_hessian[np.ix_(kept, kept)])
         return Hypothesis(
             tuple(e for i, e in enumerate(hypothesis.effects) if i != gone),
             tuple(f for i, f in enumerate(hypothesis.forms) if i != gone), bare)
 
-    def _shared_jacobian(self, problem: LeastSquares, point: dict[str, float],
+    def _shared_jacobian(self, problem: LeastSquares, state: FitState,
                          hypotheses: Sequence[Hypothesis]) -> _SharedJacobian:
-        """Take the derivatives at a point that several hypotheses share."""
+        """Take the derivatives where a fit has ended, which several hypotheses share."""
+        point, steps = state.point(), problem.local_steps(state)
         residual = problem.residuals(point)
         # a course has so many parameters that its derivatives are worth sharing, and the
         # prediction is nearly linear in them
         courses = {form for h in hypotheses for form in h.forms if form.is_course}
         return _SharedJacobian(
-            problem.jacobian(point, self.machine.nuisances, residual, central=False),
-            {form.name: problem.jacobian(point, form.parameters, residual, central=False)
+            problem.jacobian(point, self.machine.nuisances, residual, False, steps),
+            {form.name: problem.jacobian(point, form.parameters, residual, False, steps)
              for form in courses})
 
     def _refitted_in_full(self, shared: _SharedJacobian, keep_hessian: bool,

@@ -30,6 +30,7 @@ DESIGN = 'design'
 PRACTICE = 'practice cases'
 TRIAL_0 = 'trial 0'
 TRIAL_2 = 'trial 2'
+TRIAL_6 = 'trial 6'
 WILD = 'wild practice cases'
 
 
@@ -43,13 +44,18 @@ class FitSettings:
 
     outlier: float = _setting(
         3.0, 'noise sigma', 'residual beyond which the loss grows with its logarithm', PRACTICE)
-    initial_damping: float = _setting(1e-3, '1', 'damping with which a fit begins')
-    least_damping: float = _setting(1e-6, '1', 'lower bound of the damping')
+    initial_damping: float = _setting(1e-4, '1', 'damping with which a fit begins', TRIAL_6)
+    least_damping: float = _setting(1e-8, '1', 'lower bound of the damping')
     greatest_damping: float = _setting(1e4, '1', 'upper bound of the damping')
     damping_after_failure: float = _setting(
-        1e-2, '1', 'least damping after a step that failed, before it grows')
+        1e-3, '1', 'least damping after a step that failed, before it grows', TRIAL_6)
     damping_growth: float = _setting(8.0, '1', 'growth of the damping after a step that failed')
     damping_decay: float = _setting(5.0, '1', 'decay of the damping after a good step')
+    local_step: float = _setting(
+        1.0, 'noise sigma', 'change of the prediction by the step of a fresh difference quotient',
+        TRIAL_6)
+    least_step: float = _setting(
+        1e-3, '1', 'the least such step, as a share of the usual one')
     good_step: float = _setting(
         0.5, '1', 'share of the expected gain from which a step counts as good')
     least_gain: float = _setting(
@@ -105,17 +111,23 @@ class SearchSettings:
     settled: float = _setting(
         4.0, 'half chi-square', 'gain of a pass below which the fits have ended')
     settled_share: float = _setting(1e-3, '1', 'the same as a share of the cost')
-    clean: float = _setting(
-        0.97, 'noise sigma', 'residual level below which a fit needs no more iterations')
     final_passes: int = _setting(
-        5, '1', 'passes, with central differences, of the fit that is judged')
+        5, '1', 'greatest number of fresh Jacobians of the fit that is judged')
     final_gain: float = _setting(
-        0.01, '1', 'gain of such a pass, as a share of the cost, below which it has ended')
+        1e-3, '1', 'gain by such a Jacobian, as a share of the cost, below which it has ended',
+        TRIAL_6)
+    close: float = _setting(
+        30.0, 'half chi-square', 'excess over the best cost up to which another fit is taken to '
+        'its end, too', TRIAL_6)
+    rivals: int = _setting(2, '1', 'greatest number of them', TRIAL_6)
     scanned: int = _setting(
         5, '1', 'effects that are fitted from a value found by a scan', PRACTICE)
     first_iterations: int = _setting(5, '1', 'iterations of a first fit of an effect')
     iterations: int = _setting(8, '1', 'iterations of a further fit')
     pair_iterations: int = _setting(6, '1', "iterations of a pair's further fit")
+    settling_passes: int = _setting(
+        2, '1', 'greatest number of fresh Jacobians of the best fit before it is given partners',
+        TRIAL_6)
     settling_iterations: int = _setting(10, '1', 'iterations of a fit with fresh derivatives')
     full_iterations: int = _setting(6, '1', 'iterations of a fit to the whole tests')
     most_effects: int = _setting(4, '1', 'greatest number of effects of a hypothesis')

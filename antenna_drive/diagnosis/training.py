@@ -18,13 +18,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
+from types import MappingProxyType
 
 from antenna_drive.diagnosis.least_squares import (
-    FitState, Jacobian, LeastSquares, with_initial_conditions,
+    FitState, Jacobian, LeastSquares, settled, with_initial_conditions,
 )
 from antenna_drive.diagnosis.machine import (
-    Experiment, FloatArray, Machine, Parameter, Point, TimeScales,
+    Experiment, FloatArray, Form, Machine, Parameter, Point, TimeScales,
 )
+from antenna_drive.diagnosis.screening import coarse_values
 from antenna_drive.diagnosis.settings import Settings
 import numpy as np
 
@@ -41,15 +43,23 @@ class Part(Machine):
         indices of those that count
     experiments
         what was measured in them; None for all that the machine has
+    held
+        values of parameters that are held, by name
 
     """
 
     def __init__(self, machine: Machine, chosen: Sequence[int],
-                 experiments: Sequence[Experiment] | None = None) -> None:
+                 experiments: Sequence[Experiment] | None = None,
+                 held: Point = MappingProxyType({})) -> None:
         """Take a part of the experiments."""
         super().__init__(experiments or [machine.experiments[k] for k in chosen])
         self.chosen = tuple(chosen)
         self._machine = machine
+        self._held = held
+
+    def holding(self, held: Point) -> Part:
+        """Return the same part with the values of some parameters held."""
+        return Part(self._machine, self.chosen, self.experiments, held)
 
     @property
     def time_scales(self) -> TimeScales:
@@ -58,14 +68,14 @@ class Part(Machine):
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
         """Return the readings of one experiment."""
-        return self._machine.predict(point, self.chosen[experiment])
+        return self._machine.predict({**self._held, **point}, self.chosen[experiment])
 
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
                  until: float = math.inf) -> list[list[FloatArray | None]]:
         """Return the readings of several variants; see `Machine.simulate`."""
         wanted = [(i, k) for i, one in enumerate(only or [None] * len(points))
                   for k in (range(len(self.chosen)) if one is None else (one,))]
-        found = self._machine.simulate([points[i] for i, _ in wanted],
+        found = self._machine.simulate([{**self._held, **points[i]} for i, _ in wanted],
                                        [self.chosen[k] for _, k in wanted], until)
         rows: list[list[FloatArray | None]] = [[None] * len(self.chosen) for _ in points]
         for (i, k), row in zip(wanted, found, strict=True):
@@ -75,7 +85,8 @@ class Part(Machine):
     def low_fidelity(self) -> Machine:
         """Return the part of the faster machine."""
         faster = self._machine.low_fidelity()
-        return self if faster is self._machine else Part(faster, self.chosen, self.experiments)
+        return self if faster is self._machine else Part(
+            faster, self.chosen, self.experiments, self._held)
 
     def initial_conditions(self, experiment: int) -> Sequence[Point]:
         """Return initial conditions of one experiment that are tried out before a fit."""
@@ -86,24 +97,6 @@ class Part(Machine):
         return tuple(p if p.experiment is None else
                      replace(p, experiment=self.chosen.index(p.experiment))
                      for p in of if p.experiment is None or p.experiment in self.chosen)
-
-
-class Fixed(LeastSquares):
-    """The residuals of a machine with some parameters held at a value."""
-
-    def __init__(self, machine: Machine, values: Mapping[str, float], settings: Settings) -> None:
-        """Hold these values, by name."""
-        super().__init__(machine, settings=settings)
-        self._values = dict(values)
-
-    def residuals(self, point: dict[str, float], alone: int | None = None) -> FloatArray:
-        """Return the residuals at a point of the free parameters, shape (n,)."""
-        return super().residuals({**self._values, **point}, alone)
-
-    def jacobian(self, point: dict[str, float], parameters: Sequence[Parameter],
-                 residual: FloatArray, central: bool) -> Jacobian:
-        """Return the derivative of the prediction by difference quotients."""
-        return super().jacobian({**self._values, **point}, parameters, residual, central)
 
 
 @dataclass(frozen=True)
@@ -134,6 +127,25 @@ class Slopes:
         column = {p.name: j for j, p in enumerate(self.parameters)}
         return np.concatenate([self.jacobian[self.rows[k]] for k in part.chosen])[
             :, [column[p.name] for p in parameters]]
+
+
+def begun(part: Part, forms: Sequence[Form], point: Mapping[str, float],
+          settings: Settings) -> dict[str, float]:
+    """
+    Return a point with the sizes of effects at which a fit to a part of the tests may begin.
+
+    A strong effect may bend the misfit so much that its derivative at zero leads nowhere. Where an
+    effect has one size, values within its bounds are tried out, and the best is taken.
+    """
+    at = dict(point)
+    problem = LeastSquares(part, settings=settings)
+    problem = problem.at_scale(max(problem.noise_level(problem.residuals(at)), 1.0))
+    for form in forms:
+        if len(form.sizes) == 1 and not form.is_course:
+            [size] = form.sizes
+            at = min((at, *({**at, size.name: value} for value in coarse_values(size))),
+                     key=lambda trial: problem.loss(problem.residuals(trial)))
+    return at
 
 
 def trained(part: Part, parameters: Sequence[Parameter], point: Mapping[str, float],
@@ -177,15 +189,4 @@ def trained(part: Part, parameters: Sequence[Parameter], point: Mapping[str, flo
                             options.iterations)
         at = state.point()
         number += 1
-    return settled(problem, state, settings)
-
-
-def settled(problem: LeastSquares, state: FitState, settings: Settings) -> FitState:
-    """Go on with a fit, with fresh derivatives, as long as that gains much."""
-    options, search = settings.held_out, settings.search
-    for _ in range(options.passes):
-        before = state.cost
-        state = problem.fit(problem.refreshed(state, central=False), options.iterations)
-        if before - state.cost < max(search.settled, search.final_gain * before):
-            break
-    return state
+    return settled(problem, state, search, options.passes, options.iterations)

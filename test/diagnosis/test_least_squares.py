@@ -78,6 +78,19 @@ def test_central_differences_are_the_derivative() -> None:
     assert columns[:, 1] == pytest.approx(-100.0 * time * np.exp(-0.5 * time), abs=1e-2)
 
 
+def test_fresh_derivatives_are_local_where_the_usual_step_is_long() -> None:
+    """Over 0.3 of a rate the decay bends; a few standard deviations of the noise are straight."""
+    long_step = Parameter('rate', '1', 0.0, 3.0, 0.3)
+    problem = LeastSquares(Decay(0.7, 1e-4))
+    state = problem.start((OFFSET, long_step), {'rate': 0.5})
+    time = problem.experiments[0].time
+    exact = -time * np.exp(-0.5 * time) / 1e-4
+    assert np.abs(state.jacobian[:, 1] - exact).max() > 0.1 * np.abs(exact).max()
+    fresh = problem.refreshed(state)
+    np.testing.assert_allclose(fresh.jacobian[:, 1], exact, atol=0.01 * np.abs(exact).max())
+    assert np.array_equal(fresh.x, state.x)
+
+
 def test_a_rounding_error_at_a_bound_leaves_the_derivative() -> None:
     """A difference quotient that reaches from one bound to the other needs all the room."""
     switch = replace(RATE, high=1.0, step=1.0)

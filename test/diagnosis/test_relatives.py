@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""An effect in its other places, on a machine of two springs that pull at one body."""
+"""Other effects in the place of the best one: in its other places, and of other kinds."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ from antenna_drive.diagnosis import (
     Effect, Experiment, FloatArray, Form, Hypothesis, LeastSquares, Machine, Parameter, Point,
 )
 from antenna_drive.diagnosis.search import Search
+from antenna_drive.diagnosis.settings import DEFAULT
+from antenna_drive.diagnosis.training import begun, Part
 import numpy as np
 import pytest
 
@@ -43,13 +45,14 @@ class Springs(Machine):
                         np.full_like(made, NOISE))],
             [Parameter('offset', 'm', -0.02, 0.02, 1e-3, 0.01)],
             [effect('left.pull'), effect('right.pull'),
-             effect('both.pull', ('left.pull', 'right.pull'))])
+             effect('both.pull', ('left.pull', 'right.pull')), effect('drift')])
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
         """Return what is seen."""
         both = point.get('both.pull.pull', 0.0)
         return moved(point.get('left.pull.pull', 0.0) + both,
-                     point.get('right.pull.pull', 0.0) + both) + point.get('offset', 0.0)
+                     point.get('right.pull.pull', 0.0) + both) + point.get(
+                         'offset', 0.0) + point.get('drift.pull', 0.0) * TIME[:, np.newaxis]
 
 
 def moved(left: float, right: float) -> FloatArray:
@@ -68,8 +71,92 @@ def test_the_same_effect_in_other_places_is_tried(left: float, right: float, lea
     form = machine.effects[leading].forms[0]
     start = problem.start([*machine.nuisances, *form.parameters], {f'{leading}.pull': size})
     singles = search._with_relatives([Hypothesis((leading,), (form,), problem.fit(start, 5))])
-    assert {h.effects[0] for h in singles} == set(machine.effects)
+    assert {h.effects[0] for h in singles} == {'left.pull', 'right.pull', 'both.pull'}
     truth = {(0.5, 0.5): ('both.pull', 0.5), (1.0, 0.0): ('left.pull', 1.0),
              (0.0, 1.0): ('right.pull', 1.0)}[left, right]
     assert singles[0].effects == (truth[0],)
     assert singles[0].values[0][1] == pytest.approx(truth[1], abs=0.01)
+
+
+def test_a_member_of_a_pair_is_tried_in_its_other_places() -> None:
+    """The other member stays."""
+    machine = Springs(0.0, 1.0)
+    problem = LeastSquares(machine)
+    search = Search(problem, lambda share, doing: None)
+    forms = tuple(machine.effects[key].forms[0] for key in ('left.pull', 'drift'))
+    start = problem.start([*machine.nuisances, *(p for form in forms for p in form.parameters)],
+                          {'left.pull.pull': 1.0, 'drift.pull': 0.1})
+    pairs = search._with_relatives([Hypothesis(('left.pull', 'drift'), forms,
+                                               problem.fit(start, 5))])
+    assert {h.effects for h in pairs} == {
+        (key, 'drift') for key in ('left.pull', 'right.pull', 'both.pull')}
+    assert pairs[0].effects == ('right.pull', 'drift')
+
+
+class Tilted(Machine):
+    """A weight that is pushed at three tilts, where only one of two pushes depends on the tilt."""
+
+    tilts = np.array([0.2, 0.8, 1.3])
+
+    def __init__(self, weight: float) -> None:
+        random = np.random.default_rng(5)
+        super().__init__(
+            [Experiment(f'tilt {tilt}', TIME, ('place',), ('m',),
+                        self.place(weight * np.cos(tilt))
+                        + NOISE * random.normal(size=(TIME.size, 1)),
+                        np.full((TIME.size, 1), NOISE)) for tilt in self.tilts],
+            [Parameter('offset', 'm', -0.02, 0.02, 1e-3, 0.01)],
+            [effect('weight'), effect('push')])
+
+    @staticmethod
+    def place(force: float) -> FloatArray:
+        """Return where the weight is: it sticks below a force."""
+        moving = np.sign(force) * max(abs(force) - 0.3, 0.0)
+        return moving * (1.0 - np.exp(-TIME))[:, np.newaxis]
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return what is seen."""
+        force = (point.get('push.pull', 0.0)
+                 + point.get('weight.pull', 0.0) * np.cos(self.tilts[experiment]))
+        return self.place(force) + point.get('offset', 0.0)
+
+
+def test_an_effect_that_nothing_shows_where_a_fit_began_is_found_by_a_scan() -> None:
+    """Where the weight sticks the derivatives by both pushes are nought."""
+    machine = Tilted(2.0)
+    problem = LeastSquares(machine)
+    search = Search(problem, lambda share, doing: None)
+    none = problem.start(machine.nuisances, {})
+    search._take_sensitivities(none)
+    form = machine.effects['push'].forms[0]
+    start = problem.start([*machine.nuisances, *form.parameters], {'push.pull': 1.0})
+    singles = search._exchanged([Hypothesis(('push',), (form,), problem.fit(start, 10))])
+    assert singles[0].effects == ('weight',)
+    assert singles[0].values[0][1] == pytest.approx(2.0, abs=0.01)
+
+
+def test_training_begins_at_a_size_that_its_own_tests_ask_for() -> None:
+    """Where the weight sticks no derivative leads to it; the withheld test has no say."""
+    machine = Tilted(2.0)
+    part = Part(machine, [0, 1])
+    form = machine.effects['weight'].forms[0]
+    size = begun(part, [form], {}, DEFAULT)['weight.pull']
+    others = [5.0 * share for share in (-0.9, -0.4, 0.0, 0.1, 0.9)]
+    loss = LeastSquares(part).loss
+    misfit = LeastSquares(part).residuals
+    assert loss(misfit({'weight.pull': size})) < min(
+        loss(misfit({'weight.pull': other})) for other in others)
+    assert size == pytest.approx(2.0, abs=0.5)
+
+
+def test_a_part_with_held_values_predicts_as_the_machine_at_them() -> None:
+    """What is held need not be named again, in one experiment or in all."""
+    machine = Tilted(2.0)
+    held = Part(machine, [1, 2]).holding({'weight.pull': 1.5})
+    for k, one in enumerate((1, 2)):
+        whole = machine.predict({'weight.pull': 1.5, 'offset': 0.01}, one)
+        assert np.array_equal(held.predict({'offset': 0.01}, k), whole)
+        simulated = held.simulate([{'offset': 0.01}])[0][k]
+        assert simulated is not None and np.array_equal(simulated, whole)
+    assert np.array_equal(held.low_fidelity().predict({}, 0),
+                          machine.predict({'weight.pull': 1.5}, 1))

@@ -18,7 +18,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from antenna_drive.diagnosis.elimination import backward_elimination, forward_selection
+from antenna_drive.diagnosis.elimination import (
+    backward_elimination, forward_selection, settled_rivals,
+)
 from antenna_drive.diagnosis.hypothesis import Hypothesis, penalty
 from antenna_drive.diagnosis.least_squares import FitState
 from antenna_drive.diagnosis.machine import FloatArray, Form, Parameter
@@ -189,6 +191,9 @@ class Ends:
                   hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         return list(hypotheses)
 
+    def leaves_much(self, hypothesis: Hypothesis) -> bool:
+        return False
+
 
 def test_a_fit_of_the_offsets_that_got_stuck_raises_no_alarm() -> None:
     fits = Ends({(): 15990.0, ('a',): 16000.0})
@@ -205,6 +210,17 @@ def test_a_partner_that_only_helped_a_fit_along_is_let_go() -> None:
         fitted((), 106000.0), fitted(('a', 'b'), 16140.0), fitted(('a',), 19100.0)], DEFAULT)
     assert end.effects == ('a',)
     assert [c.effects for c in hypotheses] == [(), ('a', 'b'), ('a',)]
+
+
+def test_a_close_rival_is_taken_to_its_end_before_one_is_named() -> None:
+    fits = Ends({('a',): 15995.0, ('b',): 15970.0, ('c',): 15000.0})
+    found = [fitted((), 90000.0), fitted(('a',), 16000.0), fitted(('b',), 16010.0),
+             fitted(('c',), 16500.0)]
+    hypotheses, end = settled_rivals(fits, found, fitted(('a',), 15995.0), DEFAULT)
+    assert (end.effects, end.cost) == (('b',), 15970.0)
+    # costs stay comparable: all but the rival are as far from their ends as the first was, five
+    assert [h.cost for h in hypotheses] == [90000.0, 16000.0, 15975.0, 16500.0]
+    assert best(hypotheses, DEFAULT).effects == ('b',)
 
 
 def test_a_weak_effect_that_is_there_stays() -> None:

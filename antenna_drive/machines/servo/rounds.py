@@ -273,7 +273,7 @@ def settled(tests: Sequence[ServoLog], names: Sequence[str], start: Mapping[str,
     model = ServoMachine(tests, {name: start[name] for name in names}, names, noise=scale)
     problem = LeastSquares(model)
     state = problem.fit(problem.start(model.nuisances, {}), ITERATIONS)
-    state = problem.fit(problem.refreshed(state, central=False), ITERATIONS)
+    state = problem.fit(problem.refreshed(state), ITERATIONS)
     values = model.numbers(state.point())
     return Fit(values, servo_refit.error(tests, values))
 
