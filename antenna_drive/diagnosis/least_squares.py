@@ -223,7 +223,8 @@ class LeastSquares:
             up = here + room <= item.high
             down = here - room >= item.low
             sides = [s for s, there in ((1.0, up), (-1.0, down)) if there]
-            if not central and len(sides) == 2:
+            # a tread of a staircase is seen from both sides
+            if not central and len(sides) == 2 and not item.least_step:
                 sides = sides[:1]
             for side in sides:
                 variants.append({**point, item.name: here + side * step})
@@ -285,9 +286,9 @@ class LeastSquares:
             return {}
         options = self.settings.fit
         visible = np.sqrt(np.maximum(np.diag(state.hessian), 1e-30))
-        return {p.name: p.step * min(max(options.local_step / (visible_ * p.step),
-                                         options.least_step), 1.0)
-                for p, visible_ in zip(state.parameters, visible.tolist(), strict=True)
+        return {p.name: min(max(options.local_step / seen, options.least_step * p.step,
+                                p.least_step), p.step)
+                for p, seen in zip(state.parameters, visible.tolist(), strict=True)
                 if not p.is_shape}
 
     def extended(self, state: FitState, parameters: Sequence[Parameter],

@@ -55,6 +55,8 @@ class Parameter:
     is_shape : True for a shape parameter, which has no meaning while its effect is absent
     tolerance : size up to which the model's number may be off without being wrong
     label : key and value of the label of the tests that it acts on; None for all
+    least_step : least step of a difference quotient, for a prediction that is a staircase in the
+        value, such as a delay in samples; 0 for none
 
     """
 
@@ -70,6 +72,7 @@ class Parameter:
     is_shape: bool = False
     tolerance: float = 0.0
     label: tuple[str, str] | None = field(default=None, kw_only=True)
+    least_step: float = field(default=0.0, kw_only=True)
 
 
 @dataclass(frozen=True)

@@ -62,10 +62,14 @@ def test_both_programs_play_a_sheet_alike(waveform: dict[str, Any]) -> None:
     theirs = CaseSheet('new', 'new', {'type': 'circuit'}, waveform).record()[0]
     knots = corners(theirs, END)
     assert ours.knots(END) == pytest.approx(knots, abs=1e-9)
-    # within each stretch between two knots, up to a millionth of it from its ends
+    # within each stretch between two knots, up to a millionth of it from its ends, and no nearer
+    # than what is one moment to a program: a billionth of a period
     edges = np.r_[0.0, knots, END]
-    places = np.array([1e-6, 0.3, 0.5, 1.0 - 1e-6])
-    times = (edges[:-1, np.newaxis] + places * np.diff(edges)[:, np.newaxis]).ravel()
+    margin = np.maximum(1e-6 * np.diff(edges), 1e-7)
+    room = np.diff(edges) - 2.0 * margin
+    within = room > 0.0
+    times = np.ravel((edges[:-1] + margin)[within, np.newaxis]
+                     + room[within, np.newaxis] * np.array([0.0, 0.3, 0.5, 1.0]))
     expected = [command(theirs, t, t) for t in times]
     # a chirp's phase is the sum of numbers up to a thousand
     assert ours(times) == pytest.approx(expected, abs=1e-11)

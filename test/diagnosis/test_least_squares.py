@@ -91,6 +91,23 @@ def test_fresh_derivatives_are_local_where_the_usual_step_is_long() -> None:
     assert np.array_equal(fresh.x, state.x)
 
 
+def test_derivatives_of_a_staircase_step_over_its_treads() -> None:
+    """A delay in samples changes nothing over less than a sample."""
+    class Delayed(Decay):
+        def predict(self, point: Point, experiment: int) -> FloatArray:
+            """Return a ramp that comes a whole number of samples late."""
+            time = self.experiments[experiment].time
+            late = round(point.get('delay', 0.0) / (time[1] - time[0]))
+            return np.asarray(np.maximum(np.arange(time.size) - late, 0.0))[:, np.newaxis]
+
+    problem = LeastSquares(Delayed(0.7, 1e-4))
+    sample = problem.experiments[0].time[1]
+    for least, seen in ((0.0, False), (2.0 * sample, True)):
+        delay = Parameter('delay', 's', 0.0, 1.0, 2.0 * sample, least_step=least)
+        fresh = problem.refreshed(problem.start((delay,), {'delay': 10.0 * sample}))
+        assert np.any(fresh.jacobian) == seen
+
+
 def test_a_rounding_error_at_a_bound_leaves_the_derivative() -> None:
     """A difference quotient that reaches from one bound to the other needs all the room."""
     switch = replace(RATE, high=1.0, step=1.0)

@@ -51,7 +51,7 @@ class Number:
     value : as configured
     low, high : bounds; equal to the value for a known number
     unit : of the value
-    step : of the difference quotient
+    step : of the difference quotient, which then never steps over less; 0 for one that is chosen
     sigma : standard deviation about the value; 0 if nothing is known but the bounds
     is_shape : True for a number of an effect that means nothing while the effect is absent
     tolerance : size up to which an effect's number is usual and not worth a name

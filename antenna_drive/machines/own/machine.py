@@ -273,7 +273,7 @@ def _stride(log: Log, judged_hz: float | None) -> int:
 
 def _offset(name: str, item: Number, experiment: int | None, full: str = '') -> Parameter:
     return Parameter(full or name, item.unit, item.low - item.value, item.high - item.value,
-                     item.quotient_step, item.sigma, experiment)
+                     item.quotient_step, item.sigma, experiment, least_step=item.step)
 
 
 def _error_of_reading(name: str, unit: str, by: float, experiment: int | None) -> Parameter:
@@ -302,7 +302,7 @@ def _effect(item: OwnEffect) -> Effect:
 
 def _parameter(name: str, item: Number) -> Parameter:
     return Parameter(name, item.unit, item.low, item.high, item.quotient_step, start=item.value,
-                     is_shape=item.is_shape, tolerance=item.tolerance)
+                     is_shape=item.is_shape, tolerance=item.tolerance, least_step=item.step)
 
 
 def _ripple_form(item: OwnEffect, order: float) -> Form:
