@@ -98,9 +98,9 @@ class Search:
         self.progress(0.15, 'sensitivity to each effect')
         self._take_sensitivities(none.state)
         self.progress(0.25, 'single effects')
-        singles = self._at_lower_noise(self._singles(none))
+        singles = self._leading_settled(self._at_lower_noise(self._singles(none)))
         if self.problem.scale > 1.0:
-            singles = self._at_lower_noise(self._exchanged(self._first_settled(singles)))
+            singles = self._at_lower_noise(self._exchanged(singles))
         self.progress(0.5, 'pairs of effects')
         pairs = self._pairs(singles)
         if pairs:
@@ -216,12 +216,17 @@ class Search:
         return replace(hypothesis, state=self.problem.fit(
             state, self.settings.settling_iterations))
 
-    def _first_settled(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Go on with the best fit: one that has stopped early hides what its effect can do."""
-        options, best = self.settings, hypotheses[0]
-        state = settled(self.problem, best.state, options, options.settling_passes,
-                        options.settling_iterations)
-        return [replace(best, state=state), *hypotheses[1:]]
+    def _leading_settled(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Go on with the best fits: one that has stopped early hides what its effect can do."""
+        options = self.settings
+
+        def went_on(hypothesis: Hypothesis) -> Hypothesis:
+            return replace(hypothesis, state=settled(
+                self.problem, hypothesis.state, options, options.settling_passes,
+                options.settling_iterations))
+
+        leading = self._pool.map(went_on, hypotheses[:options.bases])
+        return sorted([*leading, *hypotheses[options.bases:]], key=self._priced)
 
     def _with_relatives(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """
@@ -330,7 +335,7 @@ class Search:
 
     def _improved(self, pairs: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Go on with the best pair, and try others in the place of each of its effects."""
-        found = self._with_relatives(self._first_settled(pairs))
+        found = self._with_relatives(self._leading_settled(pairs))
         if self.problem.scale > 1.0:
             found = self._at_lower_noise(self._exchanged(found))
         return found

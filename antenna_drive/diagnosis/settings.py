@@ -126,7 +126,7 @@ class SearchSettings:
     iterations: int = _setting(8, '1', 'iterations of a further fit')
     pair_iterations: int = _setting(6, '1', "iterations of a pair's further fit")
     settling_passes: int = _setting(
-        2, '1', 'greatest number of fresh Jacobians of the best fit before it is given partners',
+        2, '1', 'greatest number of fresh Jacobians of the best fits before they have partners',
         TRIAL_6)
     settling_iterations: int = _setting(10, '1', 'iterations of a fit with fresh derivatives')
     full_iterations: int = _setting(6, '1', 'iterations of a fit to the whole tests')
