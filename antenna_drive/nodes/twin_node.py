@@ -226,18 +226,17 @@ class _TwinNode:
         growing = self._growing
         if growing is None:
             return
-        present = self._twin.intake.recording(self._twin.sheet, self._since)
-        while not self._tests.empty():
+        intake, sheet = self._twin.intake, self._twin.sheet
+        if not self._tests.empty():
             self._tests.get()
-            growing.complete(present)
-            self._since = self._twin.intake.newest().get(COMMAND)
-            return
+            growing.complete(intake.recording(sheet, self._since))
+            self._since = intake.newest().get(COMMAND)
         if growing.take():
             said = growing.message()
             self._verdict.publish(String(data=json.dumps(said)))
             self._log.info(said['fault'] or said['say'])
-        if COMMAND in present and growing.due(float(_span(present[COMMAND].time_ns))):
-            growing.begin(present)
+        if growing.due(intake.span_s(self._since)):
+            growing.begin(intake.recording(sheet, self._since))
 
     def _report(self) -> None:
         twin, state = self._twin, self._twin.state
@@ -247,11 +246,6 @@ class _TwinNode:
             log = self._log.info if _LEVELS[state] == DiagnosticStatus.OK else self._log.warning
             log(message)
             self._state = state
-
-
-def _span(stamps: Any) -> float:
-    """Return the time that stamps cover [s]."""
-    return (int(stamps[-1]) - int(stamps[0])) / NANOSECONDS if len(stamps) else 0.0
 
 
 def _read_quiet(path: Path | None) -> tuple[Baseline | None, str]:

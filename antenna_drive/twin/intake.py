@@ -148,6 +148,14 @@ class Intake:
         """Return the last stamp of each signal [ns]."""
         return {name: stamps[-1] for name, stamps in self._stamps.items() if stamps}
 
+    def span_s(self, since_ns: int | None = None) -> float:
+        """Return how much of the command is kept, from a stamp on [s]."""
+        stamps = self._stamps.get(COMMAND)
+        if not stamps:
+            return 0.0
+        begin = stamps[0] if since_ns is None else max(stamps[0], since_ns)
+        return (stamps[-1] - begin) / NANOSECONDS
+
     def recording(self, sheet: TestSheet, since_ns: int | None = None) -> Recording:
         """
         Return what is kept as a recording, whose time counts from its first sample.

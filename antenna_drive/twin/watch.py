@@ -71,7 +71,8 @@ class Settings:
     ----------
     alarms_per_day : false alarms of a healthy drive, of all charts together
     quiet_s : length of the quiet record from which it learns what is healthy [s]
-    run_in_s : after which an unknown start is forgotten; the diagnosis takes as much [s]
+    run_in_s : after which a start at rest is forgotten; the diagnosis takes as much [s]
+    again_s : the same after a jump of the time, in the middle of a motion [s]
     stale_s : without new samples for so long, the real drive has stopped [s]
     reference : k of the charts, half the shift that they find fastest, in deviations
     clip : greatest increment of a chart, in deviations
@@ -82,6 +83,7 @@ class Settings:
     alarms_per_day: float = 1.0
     quiet_s: float = 120.0
     run_in_s: float = 15.0
+    again_s: float = 30.0
     stale_s: float = 2.0
     reference: float = 1.0
     clip: float = 2.5
@@ -212,7 +214,7 @@ class Twin:
         self.intake = Intake(self.settings.keep_s)
         self._step_s, self._tune = step_s, tune
         self.tuned, self.configuration = '', ''
-        self._stretch = 0
+        self._stretch, self._run_in = 0, self.settings.run_in_s
         self._last_put: tuple[int, float] = (0, -math.inf)
         self._stale = False
         self._rubbish: deque[tuple[dict[str, int], dict[str, int]]] = deque(
@@ -278,6 +280,7 @@ class Twin:
         self._watch_for_standstill(now_s)
         if self.intake.stretch != self._stretch:
             self._stretch = self.intake.stretch
+            self._run_in = self.settings.again_s
             self._begin()
         grid, samples = self._shadow.advance(*self.intake.new(COMMAND))
         if grid.size:
@@ -336,7 +339,7 @@ class Twin:
             self._rubbish.append((self._rubbish_counts(), dict(self.intake.accepted)))
             if self.baseline is not None:
                 self._block(begin)
-            elif begin + BLOCK_S >= self.settings.run_in_s + self.settings.quiet_s:
+            elif begin + BLOCK_S >= self._run_in + self.settings.quiet_s:
                 self._learn(begin + BLOCK_S)
                 if self._course is not course:
                     return  # the twin was tuned, and begins anew
@@ -354,7 +357,7 @@ class Twin:
         samples = {name: (times[times <= end], values[times <= end])
                    for name, (times, values) in self._pending.items() if times.size}
         self._use(learn(Track(course.time[quiet], course.raw[quiet], course.washed[quiet],
-                              course.command[quiet], samples), self.settings.run_in_s))
+                              course.command[quiet], samples), self._run_in))
         assert self.baseline is not None
         for name, item in self.baseline.signals.items():
             self._residual(name, item, end, course.time, course.raw)
@@ -410,7 +413,7 @@ class Twin:
                                        interpolated(times, time, table))
             sizes[name] = float(np.sqrt(np.mean(left**2)))
             z.append(standard_scores(item, found))
-        if begin < self.settings.run_in_s:
+        if begin < self._run_in:
             return
         number = self._next_block - 1
         self.blocks += 1
@@ -441,7 +444,7 @@ class Twin:
             return BAD_INPUT
         if self._gap:
             return GAP
-        if self._next_block * BLOCK_S < self.settings.run_in_s:
+        if self._next_block * BLOCK_S < self._run_in:
             return SETTLING
         return LEARNING if self.baseline is None else OK
 
