@@ -243,8 +243,11 @@ class _TwinNode:
         message, values = _told(twin)
         self._diagnostics.publish(diagnostics(self._node, _LEVELS[state], message, values))
         if state != self._state:
-            log = self._log.info if _LEVELS[state] == DiagnosticStatus.OK else self._log.warning
-            log(message)
+            # rclpy keeps one severity for each line of a program
+            if _LEVELS[state] == DiagnosticStatus.OK:
+                self._log.info(message)
+            else:
+                self._log.warning(message)
             self._state = state
 
 
@@ -276,6 +279,7 @@ def _told(twin: Twin) -> tuple[str, list[tuple[str, str]]]:
     """Return the state in a line, and in named values."""
     state, settings = twin.state, twin.settings
     values = [('state', state), ('tuning', twin.tuned or 'not yet'),
+              ('watched', ', '.join(twin.baseline.signals) if twin.baseline else 'nothing yet'),
               ('false alarms per day', f'{settings.alarms_per_day:g}'),
               ('blocks judged', str(twin.blocks - twin.unjudged)),
               ('blocks not judged', f'{twin.unjudged} (motion beyond that of the quiet record)'),

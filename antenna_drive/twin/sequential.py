@@ -86,7 +86,7 @@ class Look:
         """Return the probability of the first answer, with what it cannot be told from."""
         first = self.first
         return min(1.0, sum(p for answer, p in self.probabilities.items()
-                            if self._same(answer, first)))
+                            if self.same(answer, first)))
 
     @property
     def evidence(self) -> float:
@@ -94,7 +94,7 @@ class Look:
         none = self.probabilities.get(NONE, 0.0)
         return (1.0 - none) / max(none, 1e-300)
 
-    def _same(self, answer: Answer, first: Answer) -> bool:
+    def same(self, answer: Answer, first: Answer) -> bool:
         """Return whether two answers name the same but for confusable effects."""
         if len(answer) != len(first) or NONE in (answer, first) or UNKNOWN in (answer, first):
             return answer == first
@@ -111,7 +111,7 @@ class Look:
 def decided(looks: Sequence[Look], rule: Rule) -> bool:
     """Return whether one may stop after these looks, in the order of time."""
     last = looks[-rule.looks:]
-    if len(last) < rule.looks or any(not last[-1]._same(look.first, last[-1].first)
+    if len(last) < rule.looks or any(not last[-1].same(look.first, last[-1].first)
                                      for look in last):
         return False
     now = last[-1]

@@ -215,6 +215,7 @@ class Twin:
         self._step_s, self._tune = step_s, tune
         self.tuned, self.configuration = '', ''
         self._stretch, self._run_in = 0, self.settings.run_in_s
+        self._given: dict[str, int] = {}
         self._last_put: tuple[int, float] = (0, -math.inf)
         self._stale = False
         self._rubbish: deque[tuple[dict[str, int], dict[str, int]]] = deque(
@@ -281,7 +282,23 @@ class Twin:
         if self.intake.stretch != self._stretch:
             self._stretch = self.intake.stretch
             self._run_in = self.settings.again_s
+            self._given = {}
             self._begin()
+        found = self._go_on()
+        if self._shadow.start_ns is None:
+            found += self._go_on()  # the twin was tuned, and goes through the record once more
+        return [item for item in map(self._fresh, found) if item is not None]
+
+    def _fresh(self, item: Compared) -> Compared | None:
+        """Return what has not been given before, of one signal."""
+        new = item.stamps > self._given.get(item.name, -1)
+        if not new.any():
+            return None
+        self._given[item.name] = int(item.stamps[-1])
+        return Compared(item.name, item.stamps[new], item.twin[new], item.residual[new])
+
+    def _go_on(self) -> list[Compared]:
+        """Go on as far as the samples lead, or until the twin was tuned."""
         grid, samples = self._shadow.advance(*self.intake.new(COMMAND))
         if grid.size:
             start = self._shadow.start_ns or 0
@@ -460,11 +477,6 @@ class Twin:
                     kinds = [kind for key, kind in self.intake.rubbish if key == name]
                     found[name] = f'{new} samples {" or ".join(kinds)}'
         return found
-
-    @property
-    def stale_for(self) -> float:
-        """Return the steady time of the last sample [s]."""
-        return self._last_put[1]
 
     def gaps(self) -> list[Gap]:
         """Return which signals are apart from the twin, the greatest first."""

@@ -42,7 +42,7 @@ from std_msgs.msg import Float64, Float64MultiArray  # noqa: E402
 import yaml  # noqa: E402
 
 pytestmark = pytest.mark.slow
-PATIENCE_S = 200.0
+PATIENCE_S = 250.0
 ONSET_S = 75.0
 PACE = '4.0'
 NAMES = ('rate_command_rad_s', 'current_1_A', 'current_2_A', 'tach_rate_1_rad_s',
@@ -121,7 +121,7 @@ class Listener:
         """Listen until something is so; fail if it never comes."""
         end = time.monotonic() + PATIENCE_S
         while not reached():
-            assert program.process.poll() is None, program.lines
+            assert program.process.poll() is None, ''.join(program.lines)
             assert time.monotonic() < end, (self.said[-3:], program.lines[-5:])
             self._executor.spin_once(0.1)
 
