@@ -24,7 +24,7 @@ from antenna_drive.diagnosis.diagnosis import diagnose, Diagnosis, Progress
 from antenna_drive.diagnosis.diagram import Diagram, DiagramBlock
 from antenna_drive.diagnosis.evidence import Evidence
 from antenna_drive.diagnosis.hypothesis import Hypothesis
-from antenna_drive.diagnosis.least_squares import LeastSquares
+from antenna_drive.diagnosis.least_squares import LeastSquares, with_initial_conditions
 from antenna_drive.diagnosis.machine import (
     Colour, Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Parameter,
     Point, Regimes, TimeScales,
@@ -39,5 +39,5 @@ __all__ = [
     'DEFAULT', 'diagnose', 'Diagnosis', 'Diagram', 'DiagramBlock', 'DisturbanceInput', 'Effect',
     'Evidence', 'Experiment', 'FloatArray', 'Form', 'Hypothesis', 'idle_effects', 'LeastSquares',
     'Machine', 'MachineError', 'Motion', 'Parameter', 'Point', 'Progress', 'rank_hypotheses',
-    'Ranking', 'Regimes', 'Settings', 'TimeScales', 'without_labels',
+    'Ranking', 'Regimes', 'Settings', 'TimeScales', 'with_initial_conditions', 'without_labels',
 ]

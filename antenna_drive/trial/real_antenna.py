@@ -105,7 +105,7 @@ def start_state(machine: Records, sheet: CaseSheet, place: tuple[float, float]) 
     return y
 
 
-def _sizes(machine: Records) -> FloatArray:
+def state_sizes(machine: Records) -> FloatArray:
     """Return the typical size of each state, which scales its error."""
     size = np.ones(equations.STATES)
     per_axis = 1.0 / float(machine.structure[0]['gear_ratio'])
@@ -149,9 +149,9 @@ def simulate(machine: Records, sheet: CaseSheet, times: FloatArray,
     mode[equations.LOAD_SIGN] = 1
     states = np.full((len(times), equations.STATES), math.nan)
     statistics = np.zeros(3, np.int64)
-    edges = _edges(machine, test[0], end)
+    edges = input_edges(machine, test[0], end)
     reason = integrator.integrate(machine, test[0], y, mode, edges, times, tolerance,
-                                  _sizes(machine), states, statistics)
+                                  state_sizes(machine), states, statistics)
     if reason != integrator.DONE:
         filled = int(np.count_nonzero(np.isfinite(states[:, 0])))
         what = {integrator.STEP_TOO_SMALL: 'the step became too small',
@@ -159,10 +159,10 @@ def simulate(machine: Records, sheet: CaseSheet, times: FloatArray,
                 integrator.CHATTER: 'a switch chatters',
                 integrator.TOO_MANY_STEPS: 'too many steps'}[reason]
         raise SimulationError(f'{what} after sample {filled} of {len(times)}')
-    return _history(machine, test, times, states, edges, statistics)
+    return history_of(machine, test, times, states, edges, statistics)
 
 
-def _edges(machine: Records, test: np.void, end: float) -> FloatArray:
+def input_edges(machine: Records, test: np.void, end: float) -> FloatArray:
     """Return the times at which an input or its slope jumps [s]."""
     edges = list(waveform.corners(test, end))
     structure = machine.structure[0]
@@ -175,8 +175,8 @@ def _edges(machine: Records, test: np.void, end: float) -> FloatArray:
     return np.array(sorted({float(t) for t in edges if 0.0 < t < end}), dtype=np.float64)
 
 
-def _history(machine: Records, test: NDArray[np.void], times: FloatArray, states: FloatArray,
-             edges: FloatArray, statistics: NDArray[np.int64]) -> History:
+def history_of(machine: Records, test: NDArray[np.void], times: FloatArray, states: FloatArray,
+               edges: FloatArray, statistics: NDArray[np.int64]) -> History:
     bounds = np.concatenate(([0.0], edges, times[-1:]))
     stretch = np.minimum(np.searchsorted(bounds, times, side='right') - 1, len(edges))
     middles = 0.5 * (bounds[stretch] + bounds[stretch + 1])

@@ -104,7 +104,7 @@ def test_node_says_what_is_missing(prefix: Path, node: str, tmp_path: Path) -> N
     """A node says in one line what is missing and how to get it."""
     recording = tmp_path / 'field.csv'
     recording.write_text('time_s,rate_command_rad_s\n0.0,0.0\n0.01,0.0\n')
-    done = run(prefix, node, *([str(recording)] if node == 'command_player' else []))
+    done = run(prefix, node, *([str(recording)] if node.endswith('_player') else []))
     assert (done.returncode, done.stdout) == (NOT_INSTALLED, '')
     assert done.stderr.count('\n') == 1
     assert 'rclpy' in done.stderr and 'ROS 2' in done.stderr

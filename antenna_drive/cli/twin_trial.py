@@ -1,0 +1,220 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Make a trial of the twin: sealed antennas of an independent program, played to it.
+
+  --kind onset     an effect of middle or large size is switched on in the middle of each test
+  --kind healthy   nothing happens in an hour (--duration); each alarm is a false one
+  --kind verdict   the three recordings of an ordinary sealed case, diagnosed as they grow
+
+The antennas have the tolerances and the imperfections of wild cases (docs/trial.md). The twin is
+played in simulated time, as fast as the computer goes. Truths are sealed in DIR before anything
+is simulated, as by `antenna-drive trial`; DIR/case_0001.json is what the twin said. The same
+command resumes an interrupted trial.
+
+For example:
+  antenna-drive twin-trial --kind onset --cases 20 --seed 7 --out onsets
+  antenna-drive twin-trial --kind healthy --cases 4 --seed 8 --out hours
+  antenna-drive twin-trial --kind verdict --cases 30 --seed 9 --out growing --jobs 2
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping, Sequence
+import json
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from antenna_drive.cli.output import check_options, Progress
+from antenna_drive.cli.sharing import add_worker_options
+from antenna_drive.errors import UserError
+from antenna_drive.parameters.schema import Entry
+from antenna_drive.trial import cases, onset, sealing
+from antenna_drive.workers import workers
+
+TOLERANCE = 0.02
+WITHIN_S = 10.0
+# An effect that changes the readings by less within that time does not show in the test: half a
+# chi-square, the price of an effect in a diagnosis.
+HIDDEN = 30.0
+# Seconds of testing at which a growing verdict is looked at; recordings of 30 s each.
+LOOKS_S = (15.0, 30.0, 45.0, 60.0, 75.0, 90.0)
+RECORDED_S = 30.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of `antenna-drive twin-trial`."""
+    parser.add_argument('--kind', choices=('onset', 'healthy', 'verdict'), required=True,
+                        help='what happens in the tests')
+    parser.add_argument('--cases', type=int, required=True, metavar='N', help='number of cases')
+    parser.add_argument('--seed', type=int, required=True, metavar='S',
+                        help='seed of the cases; for a published figure use one that nothing '
+                             'was tuned on')
+    parser.add_argument('--out', type=Path, required=True, metavar='DIR',
+                        help='folder of the trial')
+    parser.add_argument('--duration', type=float, default=3600.0, metavar='S',
+                        help='length of a healthy test [s] (default: %(default)g)')
+    parser.add_argument('--alarms-per-day', type=float, default=1.0, metavar='N',
+                        help='false alarms that the twin may give a day (default: %(default)g)')
+    add_worker_options(parser, 1)
+    parser.add_argument('--quiet', action='store_true', help='show no progress')
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Make the cases that are not there yet, and print what the twin said of all."""
+    check_options(arguments, cases=Entry('', 1, whole=True), seed=Entry('', 0, whole=True),
+                  jobs=Entry('', 1, whole=True), duration=Entry('s', 180.0, 1e5),
+                  alarms_per_day=Entry('1', 1e-6, 1e4))
+    manifest = _prepared(arguments)
+    folder, names = arguments.out, list(manifest['seals'])
+    print(f'{folder}: {len(names)} truths sealed, manifest {sealing.manifest_seal(manifest)}',
+          flush=True)
+    wanted = [name for name in names if not (folder / f'{name}.json').exists()]
+    tasks = [(sealing.open_truth(folder, name, manifest), manifest['settings'])
+             for name in wanted]
+    with Progress('cases', len(names), quiet=arguments.quiet) as progress, workers(
+            arguments.jobs, arguments.scheduler) as hands:
+        done = len(names) - len(wanted)
+        progress.update(done)
+        for number, result in hands.each(outcome, tasks):
+            sealing.write_whole(folder / f'{wanted[number]}.json',
+                                json.dumps(result(), indent=1) + '\n')
+            done += 1
+            progress.update(done)
+    results = [json.loads((folder / f'{name}.json').read_text(encoding='utf-8'))
+               for name in names]
+    print('\n'.join({'onset': of_onsets, 'healthy': of_healthy, 'verdict': of_verdicts}[
+        arguments.kind](results)))
+    return 0
+
+
+def _prepared(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Return the manifest of the trial, sealed now if there is none."""
+    settings = {'kind': arguments.kind, 'cases': arguments.cases, 'seed': arguments.seed,
+                'duration_s': arguments.duration, 'tolerance': TOLERANCE,
+                'alarms_per_day': arguments.alarms_per_day}
+    folder = arguments.out
+    if (folder / sealing.MANIFEST).exists():
+        manifest = sealing.read_manifest(folder)
+        if manifest['settings'] != settings:
+            raise UserError(f'{folder}: a trial with other settings; choose another folder')
+        return manifest
+    if arguments.kind == 'verdict':
+        truths = cases.draw_truths(arguments.cases, arguments.seed, TOLERANCE)
+    else:
+        truths = onset.draw_truths(
+            arguments.cases, arguments.seed, TOLERANCE,
+            arguments.duration if arguments.kind == 'healthy' else 0.0)
+    return sealing.seal(folder, settings, truths)
+
+
+def outcome(truth: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the twin says of one case; a task of the workers."""
+    kept = {'effects': truth['effects'], 'kind': truth['kind']}
+    if settings['kind'] == 'verdict':
+        return {**kept, **_grown(truth)}
+    from antenna_drive.twin.proving import watched
+    from antenna_drive.twin.watch import Settings
+    columns = onset.make_recording(truth)
+    if truth['effects']:
+        kept['shows_by'] = onset.shows_by(truth, columns, WITHIN_S)
+    return {**kept, 'waveform': truth['sheets'][0]['waveform']['type'],
+            'onset_s': truth['onset_s'], **watched(
+                columns, truth['sheets'][0], truth['onset_s'],
+                Settings(alarms_per_day=settings['alarms_per_day']))}
+
+
+def _grown(truth: dict[str, Any]) -> dict[str, Any]:
+    """Return the looks at a case as its recordings grow, and where the rule stops."""
+    from antenna_drive.parameters.loading import load
+    from antenna_drive.recording.recording import Recording
+    from antenna_drive.twin.growing import diagnosed, look_of
+    from antenna_drive.twin.proving import recording_of
+    from antenna_drive.twin.sequential import decided, Look, Rule
+    whole = [recording_of(cases.make_recording(truth, k), truth['sheets'][k]) for k in range(3)]
+    looks: list[Look] = []
+    stopped = None
+    for seconds in LOOKS_S:
+        # once stopped, the answer after all tests is all that is still asked for
+        if stopped is not None and seconds < LOOKS_S[-1]:
+            continue
+        there: dict[str, Recording] = {}
+        for k, recording in enumerate(whole):
+            length = min(seconds - k * RECORDED_S, RECORDED_S)
+            if length > 0.0:
+                there[f'rec_{"abc"[k]}'] = recording.between(0.0, length + 1e-6)
+        looks.append(look_of(diagnosed(there, load()), seconds))
+        if stopped is None and decided(looks, Rule()):
+            stopped = seconds
+    end = next((look for look in looks if look.seconds == stopped), looks[-1])
+    true = tuple(sorted(entry['id'] for entry in truth['effects'])) or ('none',)
+    if truth['kind'] == 'outside':
+        true = ('unknown',)
+
+    def right(look: Look) -> bool:
+        return Look(0.0, {look.first: 0.6, true: 0.4}, look.confusable).confidence > 0.9
+
+    return {'stopped_s': stopped, 'first': list(end.first), 'confidence': end.confidence,
+            'right': right(end), 'whole_first': list(looks[-1].first),
+            'whole_confidence': looks[-1].confidence, 'whole_right': right(looks[-1]),
+            'looks': [{'seconds': look.seconds, 'first': list(look.first),
+                       'confidence': look.confidence} for look in looks]}
+
+
+def of_onsets(results: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what a trial of onsets shows, in lines."""
+    lines = []
+    for item in results:
+        effect, after = item['effects'][0], item['told_after_s']
+        said = 'not told' if after is None else f'{after:4.1f} s, {item["gaps"][0]}'
+        lines.append(f'{effect["id"]:32s} size {effect["size"]:.2f} {item["waveform"]:10s} '
+                     f'shows by {item["shows_by"]:.0f}: {said}')
+    times = [item['told_after_s'] for item in results if item['told_after_s'] is not None]
+    soon = sum(time <= WITHIN_S for time in times)
+    alarms = sum(len(item['alarms']) for item in results)
+    hidden = sum(item['shows_by'] < HIDDEN for item in results)
+    return [*lines, f'told within {WITHIN_S:g} s: {soon} of {len(results)}; later: '
+            f'{len(times) - soon}; never: {len(results) - len(times)}; median '
+            + (f'{median(times):.1f} s' if times else 'none')
+            + f'; alarms before the onset: {alarms}',
+            f'effects that do not show in their test (by less than {HIDDEN:g}): {hidden}']
+
+
+def of_healthy(results: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what a trial of healthy drives shows, in lines."""
+    lines = [f'{item["waveform"]:10s} {item["judged"]} s judged, {item["unjudged"]} s not, '
+             f'{item["tuning"]}: '
+             + ('; '.join(f'alarm at {alarm["time_s"]:.0f} s, {alarm["gaps"][0]}'
+                          for alarm in item['alarms']) or 'no alarm') for item in results]
+    hours = sum(item['judged'] for item in results) / 3600.0
+    return [*lines, f'{sum(len(item["alarms"]) for item in results)} alarms in {hours:.2f} h']
+
+
+def of_verdicts(results: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what a trial of growing verdicts shows, in lines."""
+    def named(effects: Sequence[str]) -> str:
+        return ' + '.join(effects)
+
+    lines = [f'{named([e["id"] for e in item["effects"]]) or "none":40s} '
+             + ('stopped at {stopped_s:g} s: '.format(**item) if item['stopped_s']
+                else 'not stopped: ')
+             + f'{named(item["first"])} {item["confidence"]:.2f}, '
+             f'after 90 s: {named(item["whole_first"])} {item["whole_confidence"]:.2f}'
+             for item in results]
+    seconds = [item['stopped_s'] or LOOKS_S[-1] for item in results]
+    return [*lines, f'right {sum(item["right"] for item in results)} of {len(results)}, '
+            f'after 90 s {sum(item["whole_right"] for item in results)}; median '
+            f'{median(seconds):g} s of testing']

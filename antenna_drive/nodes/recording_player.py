@@ -1,0 +1,49 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Plays a recording as topics, as a real drive would send them: to try the twin without a drive.
+
+  ros2 run antenna_drive recording_player RECORDING [--ros-args -p real:=/elevation -p pace:=1.0]
+
+RECORDING is a bag (folder or .mcap) or a .csv. Each signal goes to <real>/<signal> (Float64), and
+each row to <real>/row (Float64MultiArray): the time in seconds, then the signals in the order that
+the log names. It begins when somebody listens, and ends with the recording.
+
+real   namespace of the topics, 'real' if not given
+pace   as a multiple of real time, 1.0 if not given. A twin needs the row's time at any other pace
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import sys
+
+from antenna_drive.errors import UserError
+from antenna_drive.programs import run_program
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node; return its exit code."""
+    return run_program('recording_player', __doc__, args, _run)
+
+
+def _run(arguments: list[str]) -> int:
+    if not arguments or arguments[0].startswith('-'):
+        raise UserError('which recording? recording_player RECORDING [--ros-args ...]')
+    from antenna_drive.nodes.recording_player_node import run
+    return run(arguments[0], arguments[1:])
+
+
+if __name__ == '__main__':
+    sys.exit(main())

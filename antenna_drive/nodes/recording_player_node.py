@@ -1,0 +1,110 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The player of recordings on ROS 2: signals and rows out, at a pace."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import os
+import signal
+from threading import Event
+import time
+from types import FrameType
+
+from antenna_drive.lockstep.entry import choose_transport, init_ros
+from antenna_drive.lockstep.ros_parameters import Overrides
+from antenna_drive.parameters.schema import Entry
+from antenna_drive.recording.files import read_recording
+from antenna_drive.recording.recording import NANOSECONDS, Recording
+from antenna_drive.twin.intake import COMMAND, known
+import numpy as np
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Float64, Float64MultiArray
+
+NAME = 'recording_player'
+_QOS = QoSProfile(depth=1000)
+_LOOK_S = 0.05
+_PACE = Entry('1', 1e-3, 1e3, 'pace as a multiple of real time')
+
+
+def run(path: str, arguments: Sequence[str]) -> int:
+    """
+    Play a recording once, or until SIGINT or SIGTERM.
+
+    Parameters
+    ----------
+    path
+        of the recording
+    arguments
+        ROS 2 arguments
+
+    Returns
+    -------
+    0
+
+    Raises
+    ------
+    UserError : the recording cannot be read, or an argument is wrong
+
+    """
+    recording = read_recording(path)
+    choose_transport(os.environ)
+    init_ros(NAME, arguments, 'pace:=1.0')
+    stop = Event()
+
+    def end(number: int, frame: FrameType | None) -> None:
+        stop.set()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, end)
+    node = Node(NAME, automatically_declare_parameters_from_overrides=True,
+                allow_undeclared_parameters=True)
+    try:
+        overrides = Overrides(node)
+        pace = overrides.number('pace', _PACE, 1.0)
+        real = ''.join(overrides.names('real', ('real',)))
+        overrides.check_all_known(('pace', 'real'))
+        _play(node, recording, real, pace, stop)
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+def _play(node: Node, recording: Recording, real: str, pace: float, stop: Event) -> None:
+    names = [name for name in recording.channels if known(name)]
+    names.sort(key=lambda name: name != COMMAND)
+    single = [node.create_publisher(Float64, f'{real}/{name}', _QOS) for name in names]
+    rows = node.create_publisher(Float64MultiArray, f'{real}/row', _QOS)
+    node.get_logger().info(f'{real}/row: time, ' + ', '.join(names))
+    while not any(item.get_subscription_count() for item in (rows, *single)):
+        if stop.wait(_LOOK_S):
+            return
+    stamps = recording[names[0]].time_ns
+    spans = [recording[name].time_ns for name in names]
+    stamps = stamps[(stamps >= max(span[0] for span in spans))
+                    & (stamps <= min(span[-1] for span in spans))]
+    table = np.column_stack([recording[name].at(stamps) for name in names])
+    began = time.monotonic()
+    for stamp, row in zip(((stamps - stamps[0]) / NANOSECONDS).tolist(), table.tolist(),
+                          strict=True):
+        ahead = began + stamp / pace - time.monotonic()
+        if stop.wait(max(ahead, 0.0)) if ahead > 1e-3 else stop.is_set():
+            return
+        rows.publish(Float64MultiArray(data=[stamp, *row]))
+        for publisher, value in zip(single, row, strict=True):
+            publisher.publish(Float64(data=value))
+    rows.wait_for_all_acked(rclpy.duration.Duration(seconds=2.0))

@@ -1,0 +1,305 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The twin on ROS 2: the real drive's topics in; twin, residuals, verdict and diagnostics out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from contextlib import ExitStack
+import json
+import os
+from pathlib import Path
+from queue import Empty as NothingThere, SimpleQueue
+import signal
+from threading import Event
+import time
+from types import FrameType
+from typing import Any
+
+from antenna_drive.drafts import drafted
+from antenna_drive.emulator.batch import CHANNELS
+from antenna_drive.errors import one_line, UserError
+from antenna_drive.lockstep.diagnostics import diagnostics
+from antenna_drive.lockstep.entry import choose_transport, init_ros
+from antenna_drive.lockstep.getting_ready import told_while_compiling
+from antenna_drive.lockstep.ros_parameters import Overrides
+from antenna_drive.lockstep.serving import Serving
+from antenna_drive.machines.antenna.tuned import loaded, tuned
+from antenna_drive.parameters.loading import load
+from antenna_drive.parameters.schema import Entry
+from antenna_drive.recording.recording import NANOSECONDS
+from antenna_drive.recording.sheet import load_sheet, TestSheet
+from antenna_drive.twin import watch
+from antenna_drive.twin.baseline import Baseline
+from antenna_drive.twin.growing import GrowingVerdict
+from antenna_drive.twin.intake import COMMAND
+from antenna_drive.twin.topics import load_topics, own_topics, Topic, TopicMap
+from antenna_drive.twin.watch import Settings, Twin
+from antenna_drive.workers import worker_processes
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Empty, Float64, Float64MultiArray, String
+
+NAME = 'twin'
+OK = 0
+# Best effort matches every publisher. There is room for some seconds of messages.
+_FROM_REAL = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
+_OUT = QoSProfile(depth=100)
+_PERIOD_S = 0.05
+_REPORT_S = 1.0
+_LEVELS = {watch.OK: DiagnosticStatus.OK, watch.WAITING: DiagnosticStatus.STALE,
+           watch.STALE: DiagnosticStatus.STALE, watch.GAP: DiagnosticStatus.ERROR,
+           watch.BAD_INPUT: DiagnosticStatus.WARN, watch.SETTLING: DiagnosticStatus.OK,
+           watch.LEARNING: DiagnosticStatus.OK}
+_ENTRIES = {
+    'alarms_per_day': Entry('1', 1e-6, 1e4, 'false alarms that are allowed a day'),
+    'quiet': Entry('s', 20.0, 3600.0, 'length of the quiet record'),
+}
+_TEXTS = ('real', 'map', 'sheet', 'quiet_file')
+_SWITCHES = {'tune': True, 'verdict': False}
+
+
+def run(arguments: Sequence[str]) -> int:
+    """
+    Watch until SIGINT or SIGTERM.
+
+    Parameters
+    ----------
+    arguments
+        command line without the program's name
+
+    Returns
+    -------
+    0
+
+    Raises
+    ------
+    UserError : wrong arguments, map, sheet, configuration or quiet record
+
+    """
+    choose_transport(os.environ)
+    init_ros(NAME, arguments, 'real:=/elevation')
+    node = Node(NAME, automatically_declare_parameters_from_overrides=True,
+                allow_undeclared_parameters=True)
+    try:
+        with ExitStack() as stack:
+            return _TwinNode(node, stack).spin()
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def _text(overrides: Overrides, name: str) -> str:
+    given = overrides.names(name, ())
+    if len(given) > 1:
+        raise UserError(f'{name}: {given!r} given, allowed is one text')
+    return given[0] if given else ''
+
+
+def _switch(given: dict[str, Any], name: str) -> bool:
+    value = given.get(name, _SWITCHES[name])
+    if not isinstance(value, bool):
+        raise UserError(f'{name}: {value!r} given, allowed is true or false')
+    return value
+
+
+class _TwinNode:
+    """Feeds a `Twin` with messages, and publishes what it says."""
+
+    def __init__(self, node: Node, stack: ExitStack) -> None:
+        self._node = node
+        self._log = node.get_logger()
+        overrides = Overrides(node)
+        numbers = {name: overrides.number(name, entry, default) for (name, entry), default in zip(
+            _ENTRIES.items(), (1.0, 120.0), strict=True)}
+        texts = {name: _text(overrides, name) for name in _TEXTS}
+        config = [name for name in overrides.names('config', ()) if name != 'reference']
+        switches = {name: _switch(overrides.rest(), name) for name in _SWITCHES}
+        overrides.check_all_known(('config', *_ENTRIES, *_TEXTS, *_SWITCHES))
+        self._map = load_topics(texts['map']) if texts['map'] else own_topics(texts['real'])
+        sheet = load_sheet(Path(texts['sheet'])) if texts['sheet'] else TestSheet()
+        drive = load(*config)
+        self._quiet_file = Path(texts['quiet_file']) if texts['quiet_file'] else None
+        kept, configuration = _read_quiet(self._quiet_file)
+        with told_while_compiling(node):
+            self._twin = Twin(
+                loaded(configuration) if configuration else drive, sheet,
+                Settings(alarms_per_day=numbers['alarms_per_day'], quiet_s=numbers['quiet']),
+                kept, tuned if switches['tune'] and kept is None else None)
+        self._written = kept is not None
+        self._arrived: SimpleQueue[tuple[Topic, tuple[float, ...], int, int]] = SimpleQueue()
+        self._tests: SimpleQueue[None] = SimpleQueue()
+        self._stop = Event()
+        self._state = ''
+        self._growing = _growing(stack, drive) if switches['verdict'] else None
+        self._since: int | None = None
+        self._connect(self._map)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._end)
+
+    def _connect(self, topics: TopicMap) -> None:
+        name = self._node.get_name()
+        for topic in topics.topics:
+            self._node.create_subscription(
+                Float64MultiArray if topic.vector else Float64, topic.name,
+                self._listener(topic), _FROM_REAL)
+        names = {signal for topic in topics.topics for signal in topic.signals} - {COMMAND}
+        self._publishers = {
+            signal: [self._node.create_publisher(Float64, f'{name}/{middle}{signal}', _OUT)
+                     for middle in ('', 'residual/')]
+            for signal in CHANNELS if signal in names}
+        self._diagnostics = self._node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._verdict = self._node.create_publisher(String, f'{name}/verdict', 1)
+        self._node.create_subscription(Empty, f'{name}/begin_test',
+                                       lambda message: self._tests.put(None), 1)
+
+    def _listener(self, topic: Topic) -> Any:
+        def listen(message: Any, info: Any) -> None:
+            numbers = tuple(message.data) if topic.vector else (message.data,)
+            self._arrived.put((topic, numbers, info['source_timestamp'], time.time_ns()))
+        return listen
+
+    def _end(self, number: int, frame: FrameType | None) -> None:
+        self._stop.set()
+
+    def spin(self) -> int:
+        """Watch until told to stop; return the exit code."""
+        serving = Serving(self._node)
+        report_at = 0.0
+        try:
+            while not self._stop.wait(_PERIOD_S):
+                self._take()
+                self._publish()
+                self._keep_quiet_record()
+                self._look()
+                now = time.monotonic()
+                if self._twin.state != self._state or now >= report_at:
+                    report_at = now + _REPORT_S
+                    self._report()
+        finally:
+            serving.close()
+        return OK
+
+    def _take(self) -> None:
+        while True:
+            try:
+                topic, numbers, source, arrival = self._arrived.get_nowait()
+            except NothingThere:
+                return
+            for name, stamp, value in self._map.read(topic, numbers, source, arrival):
+                self._twin.put(name, stamp, value)
+
+    def _publish(self) -> None:
+        for item in self._twin.advance(time.monotonic()):
+            twin, residual = self._publishers[item.name]
+            for value, off in zip(item.twin.tolist(), item.residual.tolist(), strict=True):
+                twin.publish(Float64(data=value))
+                residual.publish(Float64(data=off))
+
+    def _keep_quiet_record(self) -> None:
+        if self._written or self._twin.baseline is None or self._quiet_file is None:
+            return
+        self._written = True
+        try:
+            with drafted(self._quiet_file) as stream:
+                stream.write(json.dumps({'baseline': self._twin.baseline.plain(),
+                                         'configuration': self._twin.configuration}).encode())
+            self._log.info(f'the quiet record is kept in {self._quiet_file}')
+        except OSError as error:
+            self._log.error(f'{self._quiet_file}: {one_line(error)}')
+
+    def _look(self) -> None:
+        growing = self._growing
+        if growing is None:
+            return
+        intake, sheet = self._twin.intake, self._twin.sheet
+        if not self._tests.empty():
+            self._tests.get()
+            growing.complete(intake.recording(sheet, self._since))
+            self._since = intake.newest().get(COMMAND)
+        if growing.take():
+            said = growing.message()
+            self._verdict.publish(String(data=json.dumps(said)))
+            self._log.info(said['fault'] or said['say'])
+        if growing.due(intake.span_s(self._since)):
+            growing.begin(intake.recording(sheet, self._since))
+
+    def _report(self) -> None:
+        twin, state = self._twin, self._twin.state
+        message, values = _told(twin)
+        self._diagnostics.publish(diagnostics(self._node, _LEVELS[state], message, values))
+        if state != self._state:
+            # rclpy keeps one severity for each line of a program
+            if _LEVELS[state] == DiagnosticStatus.OK:
+                self._log.info(message)
+            else:
+                self._log.warning(message)
+            self._state = state
+
+
+def _read_quiet(path: Path | None) -> tuple[Baseline | None, str]:
+    """
+    Return what is kept of a quiet record, and the configuration that was tuned to it.
+
+    Raises
+    ------
+    UserError : the file cannot be read, or is none
+
+    """
+    if path is None or not path.exists():
+        return None, ''
+    try:
+        data = json.loads(path.read_text(encoding='utf-8'))
+        return Baseline.of_plain(data['baseline']), str(data['configuration'])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise UserError(f'{path}: no quiet record of a twin, {one_line(error)}; remove it, and '
+                        'the twin learns another') from None
+
+
+def _growing(stack: ExitStack, drive: Any) -> GrowingVerdict:
+    executor: Executor = stack.enter_context(worker_processes(1))
+    return GrowingVerdict(executor, drive)
+
+
+def _told(twin: Twin) -> tuple[str, list[tuple[str, str]]]:
+    """Return the state in a line, and in named values."""
+    state, settings = twin.state, twin.settings
+    values = [('state', state), ('tuning', twin.tuned or 'not yet'),
+              ('watched', ', '.join(twin.baseline.signals) if twin.baseline else 'nothing yet'),
+              ('false alarms per day', f'{settings.alarms_per_day:g}'),
+              ('blocks judged', str(twin.blocks - twin.unjudged)),
+              ('blocks not judged', f'{twin.unjudged} (motion beyond that of the quiet record)'),
+              ('jumps of time', '; '.join(twin.intake.jumps[-3:]) or 'none')]
+    values += [(f'rubbish {name}', f'{count} samples {what}')
+               for (name, what), count in sorted(twin.intake.rubbish.items())]
+    gaps = twin.gaps()
+    values += [(f'gap {gap.name}', f'{gap}, since stamp {gap.since_ns / NANOSECONDS:.3f} s')
+               for gap in gaps]
+    if state == watch.GAP:
+        newest = max(twin.intake.newest().values(), default=0)
+        since = (newest - min(gap.since_ns for gap in gaps)) / NANOSECONDS if gaps else 0.0
+        return (f'gap since {since:.0f} s: ' + '; '.join(map(str, gaps))
+                if gaps else 'gap, closing'), values
+    return {
+        watch.OK: 'ok: the drive and its twin agree',
+        watch.WAITING: f'waiting for {COMMAND}',
+        watch.SETTLING: 'settling: an unknown start is being forgotten',
+        watch.LEARNING: 'learning the quiet record: the drive has to be healthy',
+        watch.STALE: 'stale input: the drive sends nothing; going on when it does',
+        watch.BAD_INPUT: 'bad input: ' + '; '.join(
+            f'{name}: {what}' for name, what in sorted(twin.bad_signals().items())),
+    }[state], values

@@ -1,0 +1,159 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The verdict that grows: the diagnosis repeated, in a process of its own, on what there is so far.
+
+A look takes longer than a second of testing. The next one begins when it has ended and a fair
+share of new data is there, so looks come at even distances on a logarithmic scale of time. The
+process lives on between looks, which saves its start. The fits of one look do not start from
+those of the one before: the engine has no way in for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, Future
+from typing import Any
+
+from antenna_drive.errors import UserError
+from antenna_drive.parameters.sets import Drive
+from antenna_drive.recording.recording import Recording
+from antenna_drive.twin.intake import COMMAND
+from antenna_drive.twin.sequential import Answer, decided, Look, Rule
+
+# The first look [s of testing], and how much more there has to be for the next one.
+FIRST_S, GROWTH = 15.0, 1.3
+
+
+def diagnosed(recordings: Mapping[str, Recording], drive: Drive) -> dict[str, Any]:
+    """
+    Return the result of a diagnosis; what a look asks its process for.
+
+    Raises
+    ------
+    UserError : a recording cannot be used
+
+    """
+    from antenna_drive.machines.antenna.diagnose import diagnose_recordings
+    return diagnose_recordings(recordings, drive, threads=1).result
+
+
+def look_of(result: Mapping[str, Any], seconds: float) -> Look:
+    """Return what a diagnosis said, as a look at so many seconds of testing."""
+    probabilities: dict[Answer, float] = {}
+    for entry in result['which']:
+        answer = tuple(sorted(entry['effects']))
+        probabilities[answer] = probabilities.get(answer, 0.0) + entry['probability']
+    return Look(seconds, probabilities, tuple(map(frozenset, result['confusable'])))
+
+
+class GrowingVerdict:
+    """
+    Looks at the tests of one machine while they are made.
+
+    Parameters
+    ----------
+    executor
+        that looks, one at a time
+    drive
+        the configuration
+    rule
+        when to stop
+    diagnose
+        what it does, a function of a module
+
+    Attributes
+    ----------
+    looks : what they said, in the order of time
+    fault : why the last look has failed; '' if it has not
+
+    """
+
+    def __init__(self, executor: Executor, drive: Drive, rule: Rule | None = None,
+                 diagnose: Callable[[Mapping[str, Recording], Drive], dict[str, Any]] = diagnosed,
+                 ) -> None:
+        """Begin with no test."""
+        self._executor, self._drive, self._diagnose = executor, drive, diagnose
+        self.rule = rule or Rule()
+        self._tests: dict[str, Recording] = {}
+        self._running: tuple[Future[dict[str, Any]], float] | None = None
+        self.looks: list[Look] = []
+        self.fault = ''
+
+    @property
+    def decided(self) -> bool:
+        """Return whether the tests may stop."""
+        return decided(self.looks, self.rule)
+
+    def complete(self, test: Recording) -> None:
+        """Keep a test that has ended; the next one begins."""
+        if _length(test) > 0.0:
+            self._tests[f'test {len(self._tests) + 1}'] = test
+
+    def due(self, seconds: float) -> bool:
+        """Return whether a look could begin with so much of the present test [s]."""
+        if self._running is not None or self.decided:
+            return False
+        total = seconds + sum(map(_length, self._tests.values()))
+        return total >= (GROWTH * self.looks[-1].seconds if self.looks else FIRST_S)
+
+    def begin(self, test: Recording) -> None:
+        """Look at the present test and those before it."""
+        tests = {**self._tests, f'test {len(self._tests) + 1}': test}
+        total = sum(map(_length, tests.values()))
+        self._running = self._executor.submit(self._diagnose, tests, self._drive), total
+
+    def take(self) -> bool:
+        """Take the result of a look that has ended; return whether one has."""
+        if self._running is None or not self._running[0].done():
+            return False
+        future, seconds = self._running
+        self._running = None
+        try:
+            self.looks.append(look_of(future.result(), seconds))
+            self.fault = ''
+        except UserError as error:
+            self.fault = str(error)
+        return True
+
+    def message(self) -> dict[str, Any]:
+        """Return what there is to say, as plain data for JSON."""
+        now = self.looks[-1] if self.looks else None
+        return {
+            'decided': self.decided,
+            'say': self._sentence(),
+            'error': self.rule.error, 'false_alarm': self.rule.false_alarm,
+            'first': list(now.first) if now else [],
+            'confidence': now.confidence if now else None,
+            'fault': self.fault,
+            'looks': [{'seconds': look.seconds, 'probabilities': {
+                ' + '.join(answer): round(p, 4) for answer, p in sorted(
+                    look.probabilities.items(), key=lambda item: -item[1]) if p >= 0.005}}
+                for look in self.looks]}
+
+    def _sentence(self) -> str:
+        if not self.looks:
+            return 'no look yet'
+        now = self.looks[-1]
+        what = 'no gap' if now.first == ('none',) else ' and '.join(now.first)
+        said = f'{what}, {100.0 * now.confidence:.0f} % after {now.seconds:.0f} s'
+        return f'decided, you can stop: {said}' if self.decided else f'go on: {said}'
+
+
+def _length(test: Recording) -> float:
+    """Return the length of a test [s]."""
+    if COMMAND not in test or len(test[COMMAND]) < 2:
+        return 0.0
+    time = test[COMMAND].time_ns
+    return float(time[-1] - time[0]) / 1e9

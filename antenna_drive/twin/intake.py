@@ -1,0 +1,196 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+What comes from a real drive, as it comes: rubbish is counted by name, the rest is kept.
+
+A sample is a signal, a time stamp and a number. What is no finite number, or beyond anything that
+the drive can do, is left out. So is a stamp that is not later than the one before. Where the time
+jumps, the samples before and after it do not belong together: a new stretch begins.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections import Counter
+import math
+
+from antenna_drive.emulator.batch import CHANNELS
+from antenna_drive.emulator.unit import FloatArray
+from antenna_drive.emulator.wiring import TEST_SIGNAL
+from antenna_drive.recording.recording import (
+    Channel, make_channel, NANOSECONDS, Recording, unit_of,
+)
+from antenna_drive.recording.sheet import TestSheet
+import numpy as np
+from numpy.typing import NDArray
+
+COMMAND = f'{TEST_SIGNAL}/rate_command'
+# No drive of this kind shows more, by unit.
+RANGES = {'A': 1e3, 'rad/s': 1e4, 'rad': 1e2, 'V': 1e3}
+_COMMAND_RANGE = 0.1  # [rad/s]
+# A stamp that is earlier than the one before by less is a message that came late [s].
+LATE_S = 1.0
+# Without a command for longer than this, nobody knows what the drive did [s].
+HOLE_S = 0.5
+
+
+class Intake:
+    """
+    The samples of the last minutes.
+
+    Parameters
+    ----------
+    keep_s
+        how much of each signal is kept [s]
+
+    """
+
+    def __init__(self, keep_s: float = 300.0) -> None:
+        """Begin with nothing."""
+        self._keep_ns = int(keep_s * NANOSECONDS)
+        self._stamps: dict[str, array[int]] = {}
+        self._values: dict[str, array[float]] = {}
+        self._taken: dict[str, int] = {}
+        self.rubbish: Counter[tuple[str, str]] = Counter()
+        self.accepted: Counter[str] = Counter()
+        self.jumps: list[str] = []
+        self.stretch = 0
+
+    def put(self, name: str, stamp_ns: int, value: float) -> bool:
+        """
+        Take a sample; return whether it is a good one.
+
+        Parameters
+        ----------
+        name
+            'unit/signal': the rate command, or one of `CHANNELS`
+        stamp_ns
+            of any clock, the same for all signals [ns]
+        value
+            SI units, article amperes
+
+        """
+        what = _fault(name, value)
+        if what:
+            self.rubbish[name, what] += 1
+            return False
+        stamps = self._stamps.get(name)
+        if stamps:
+            since = (stamp_ns - stamps[-1]) / NANOSECONDS
+            if since < -LATE_S:
+                self._jump(f'the time jumped back by {-since:.3g} s')
+            elif since <= 0.0:
+                self.rubbish[name, 'late or repeated'] += 1
+                return False
+            elif name == COMMAND and since > HOLE_S:
+                self._jump(f'no {COMMAND} for {since:.3g} s')
+        self._stamps.setdefault(name, array('q')).append(stamp_ns)
+        self._values.setdefault(name, array('d')).append(value)
+        self.accepted[name] += 1
+        return True
+
+    def _jump(self, why: str) -> None:
+        self.jumps.append(why)
+        del self.jumps[:-20]
+        self.stretch += 1
+        self._stamps, self._values, self._taken = {}, {}, {}
+
+    def new(self, name: str, until_ns: int | None = None,
+            ) -> tuple[NDArray[np.int64], FloatArray]:
+        """
+        Return the samples that have not been taken yet.
+
+        Parameters
+        ----------
+        name
+            of the signal
+        until_ns
+            leave those from this stamp on for later; None: take all [ns]
+
+        """
+        stamps = self._stamps.get(name)
+        if stamps is None:
+            return np.zeros(0, np.int64), np.zeros(0)
+        first = self._taken.get(name, 0)
+        found = np.array(stamps[first:], np.int64)
+        count = found.size if until_ns is None else int(np.searchsorted(found, until_ns))
+        values = np.array(self._values[name][first:first + count], np.float64)
+        self._taken[name] = first + count
+        return found[:count], values
+
+    def again(self) -> None:
+        """Give all that is kept once more."""
+        self._taken = {}
+
+    def forget(self) -> None:
+        """Drop samples that were taken and are older than what is kept."""
+        for name, stamps in self._stamps.items():
+            if not stamps or stamps[0] > stamps[-1] - 2 * self._keep_ns:
+                continue
+            old = min(int(np.searchsorted(np.array(stamps, np.int64),
+                                          stamps[-1] - self._keep_ns)), self._taken.get(name, 0))
+            del stamps[:old]
+            del self._values[name][:old]
+            self._taken[name] = self._taken.get(name, 0) - old
+
+    def newest(self) -> dict[str, int]:
+        """Return the last stamp of each signal [ns]."""
+        return {name: stamps[-1] for name, stamps in self._stamps.items() if stamps}
+
+    def span_s(self, since_ns: int | None = None) -> float:
+        """Return how much of the command is kept, from a stamp on [s]."""
+        stamps = self._stamps.get(COMMAND)
+        if not stamps:
+            return 0.0
+        begin = stamps[0] if since_ns is None else max(stamps[0], since_ns)
+        return (stamps[-1] - begin) / NANOSECONDS
+
+    def recording(self, sheet: TestSheet, since_ns: int | None = None) -> Recording:
+        """
+        Return what is kept as a recording, whose time counts from its first sample.
+
+        Parameters
+        ----------
+        sheet
+            of the test
+        since_ns
+            leave out what is earlier [ns]
+
+        """
+        channels: dict[str, Channel] = {}
+        first = min((stamps[0] for stamps in self._stamps.values() if stamps), default=0)
+        begin = first if since_ns is None else max(first, since_ns)
+        for name, stamps in self._stamps.items():
+            time = np.array(stamps, np.int64)
+            place = int(np.searchsorted(time, begin))
+            if time.size > place:
+                channels[name] = make_channel(
+                    name, unit_of(name) or '1', time[place:] - begin,
+                    np.array(self._values[name][place:], np.float64))
+        return Recording(channels, sheet=sheet)
+
+
+def _fault(name: str, value: float) -> str:
+    """Return what is wrong with a number; '' if nothing is."""
+    if math.isnan(value):
+        return 'not a number'
+    if math.isinf(value):
+        return 'infinite'
+    allowed = _COMMAND_RANGE if name == COMMAND else RANGES.get(unit_of(name) or '', math.inf)
+    return '' if abs(value) <= allowed else 'out of range'
+
+
+def known(name: str) -> bool:
+    """Return whether a twin has a use for a signal."""
+    return name == COMMAND or name in CHANNELS

@@ -1,0 +1,127 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+What a twin says of a simulated test, played to it in simulated time.
+
+The core has no clock of its own, so an hour is played as fast as the computer goes. What it says
+is what it would have said in real time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from antenna_drive.emulator.unit import FloatArray
+from antenna_drive.machines.antenna.tuned import tuned
+from antenna_drive.parameters.loading import load
+from antenna_drive.recording.csv_format import FIELD_COLUMNS
+from antenna_drive.recording.recording import make_channel, NANOSECONDS, Recording, unit_of
+from antenna_drive.recording.sheet import parse_sheet
+from antenna_drive.twin.watch import GAP, Settings, Twin
+import numpy as np
+
+# So much arrives between two looks of the twin [s].
+PIECE_S = 0.1
+
+
+def recording_of(columns: Mapping[str, FloatArray], sheet: Mapping[str, Any]) -> Recording:
+    """
+    Return a field test that was simulated, as a recording.
+
+    Parameters
+    ----------
+    columns
+        by name, NaN where there is no sample
+    sheet
+        plain data of the test sheet
+
+    """
+    stamps = np.round(columns['time_s'] * NANOSECONDS).astype(np.int64)
+    channels = {}
+    for name, values in columns.items():
+        if name in FIELD_COLUMNS:
+            there = np.isfinite(values)
+            channels[FIELD_COLUMNS[name]] = make_channel(
+                name, unit_of(FIELD_COLUMNS[name]) or '1', stamps[there], values[there])
+    return Recording(channels, sheet=parse_sheet(sheet))
+
+
+def played(twin: Twin, columns: Mapping[str, FloatArray]) -> Iterator[float]:
+    """
+    Give a recording to a twin piece by piece; yield the time of the last sample after each [s].
+
+    Parameters
+    ----------
+    twin
+        to be advanced
+    columns
+        of a field test, by name; NaN where there is no sample
+
+    """
+    time = columns['time_s']
+    stamps = np.round(time * NANOSECONDS).astype(np.int64).tolist()
+    signals = [(FIELD_COLUMNS[name], values.tolist()) for name, values in columns.items()
+               if name in FIELD_COLUMNS]
+    edges = np.searchsorted(time, np.arange(0.0, time[-1] + PIECE_S, PIECE_S)[1:])
+    first = 0
+    for last in edges.tolist():
+        for k in range(first, last):
+            for name, values in signals:
+                twin.put(name, stamps[k], values[k])
+        twin.advance()
+        if last > first:
+            yield float(time[last - 1])
+        first = last
+
+
+def watched(columns: Mapping[str, FloatArray], sheet: Mapping[str, Any], onset_s: float,
+            settings: Settings | None = None) -> dict[str, Any]:
+    """
+    Return what a twin says of a test in which an effect is switched on.
+
+    Parameters
+    ----------
+    columns
+        of the recording
+    sheet
+        plain data of the test sheet
+    onset_s
+        when the effect is switched on; the end of the test if it never is [s]
+    settings
+        of the twin
+
+    Returns
+    -------
+    `alarms` before the onset: time [s] and signals of each; `told_after_s`: time from the onset
+    to the first sign of a gap, None if there is none; `since_s`: the beginning that the twin
+    states, after the onset [s]; `gaps`: what it says; `tuning`; blocks `judged` and `unjudged`
+
+    """
+    twin = Twin(load(), parse_sheet(sheet), settings, tune=tuned)
+    alarms: list[dict[str, Any]] = []
+    told: dict[str, Any] = {'told_after_s': None, 'since_s': None, 'gaps': []}
+    before = ''
+    for time in played(twin, columns):
+        if twin.state == GAP and before != GAP:
+            gaps = twin.gaps()
+            if time < onset_s:
+                alarms.append({'time_s': time, 'gaps': list(map(str, gaps))})
+            else:
+                told = {'told_after_s': time - onset_s, 'gaps': list(map(str, gaps)),
+                        'since_s': min(gap.since_ns for gap in gaps) / NANOSECONDS - onset_s}
+                break
+        before = twin.state
+    return {'alarms': alarms, **told, 'tuning': twin.tuned,
+            'judged': twin.blocks - twin.unjudged, 'unjudged': twin.unjudged}

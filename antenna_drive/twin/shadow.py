@@ -1,0 +1,155 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The emulator in step with a real drive: driven by the command that was measured.
+
+The command is laid onto macro-steps as in a replay (`recording.replay.command_table`): a straight
+line between samples, and at a jump as before up to the sample after it. Whether a slope is a jump
+is judged by the slopes around it. The shadow therefore stays a few samples behind the newest one.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from antenna_drive.emulator import units, wiring
+from antenna_drive.emulator.run import Changes, Emulator, MACRO_STEP
+from antenna_drive.emulator.unit import FloatArray, Signal, Unit
+from antenna_drive.parameters.sets import Drive
+from antenna_drive.recording.recording import Channel, NANOSECONDS, nanoseconds
+from antenna_drive.recording.replay import command_table
+import numpy as np
+from numpy.typing import NDArray
+
+IntArray = NDArray[np.int64]
+
+# So many samples of the command after a moment decide what it did there.
+AHEAD = 5
+# So many samples before it do, too.
+_BEHIND = 40
+
+
+class _Command(Unit):
+    """Puts out the command that was laid onto the next macro-steps."""
+
+    outputs: ClassVar[tuple[Signal, ...]] = wiring.OUTPUTS[wiring.TEST_SIGNAL]
+
+    def __init__(self) -> None:
+        super().__init__(wiring.TEST_SIGNAL)
+        self.begin(np.zeros(2), 0)
+
+    def begin(self, first: FloatArray, k: int) -> None:
+        self._table, self._first = np.zeros((1, len(self.outputs), 2)), k
+        self._table[0, 0] = first
+
+    def lay(self, table: FloatArray, first: int) -> None:
+        """Take the rows of the steps from `first` on, shape (n, 2)."""
+        self._table = np.zeros((len(table), len(self.outputs), 2))
+        self._table[:, 0] = table
+        self._first = first
+
+    def start(self, step_s: float) -> FloatArray:
+        return np.array(self._table[0])
+
+    def step(self, k: int, inputs: FloatArray) -> FloatArray:
+        return np.array(self._table[k + 1 - self._first])
+
+
+class Shadow:
+    """
+    The emulator of a drive, advanced as far as the measured command is known.
+
+    Parameters
+    ----------
+    drive
+        the configuration
+    changes
+        of the drive's parameters, by the macro-step at which each takes effect
+    step_s
+        macro-step [s]
+
+    """
+
+    def __init__(self, drive: Drive, changes: Changes | None = None,
+                 step_s: float = MACRO_STEP) -> None:
+        """Build the drive; it begins with the first command."""
+        self._command = _Command()
+        others = {name: units.build(name, drive) for name in wiring.UNITS
+                  if name != wiring.TEST_SIGNAL}
+        self._emulator = Emulator(drive, step_s, {**others, wiring.TEST_SIGNAL: self._command})
+        self._changes = dict(changes or {})
+        self._step_s = step_s
+        self._stamps = np.zeros(0, np.int64)
+        self._values = np.zeros(0)
+        self._start_ns: int | None = None
+        self.names = self._emulator.names
+
+    def restart(self) -> None:
+        """Forget the command; the drive begins at rest with the next one."""
+        self._start_ns = None
+        self._stamps, self._values = np.zeros(0, np.int64), np.zeros(0)
+
+    @property
+    def start_ns(self) -> int | None:
+        """Return the time stamp at which the drive began [ns]; None before the first command."""
+        return self._start_ns
+
+    @property
+    def reached_ns(self) -> int:
+        """Return the time stamp of the last macro-step [ns]."""
+        return (self._start_ns or 0) + int(nanoseconds(self._emulator.k * self._step_s))
+
+    def advance(self, stamps: IntArray, values: FloatArray) -> tuple[IntArray, FloatArray]:
+        """
+        Take samples of the command and go on as far as they lead.
+
+        Parameters
+        ----------
+        stamps
+            ascending, later than those before [ns]
+        values
+            axis rate command [rad/s]
+
+        Returns
+        -------
+        time stamps of the macro-steps that were made, shape (n,) [ns], and the value and
+        derivative of every signal at them, shape (n, len(names), 2)
+
+        """
+        self._stamps = np.append(self._stamps, stamps)
+        self._values = np.append(self._values, values)
+        nothing = np.zeros(0, np.int64), np.zeros((0, len(self.names), 2))
+        if self._stamps.size <= AHEAD:
+            return nothing
+        if self._start_ns is None:
+            self._start_ns = int(self._stamps[0])
+            self._command.begin(np.array([self._values[0], 0.0]), 0)
+            self._emulator.restart()
+        done = self._emulator.k
+        end = int((self._stamps[-AHEAD] - self._start_ns) / NANOSECONDS / self._step_s)
+        if end <= done:
+            return nothing
+        channel = Channel('rad/s', self._stamps, self._values)
+        grid = self._start_ns + nanoseconds(np.arange(done + 1, end + 1) * self._step_s)
+        self._command.lay(command_table(channel, grid), done + 1)
+        kept = [self._advance_to(stop) for stop in sorted(
+            {*(k for k in self._changes if done < k < end), end})]
+        before = max(0, int(np.searchsorted(self._stamps, grid[-1])) - _BEHIND)
+        self._stamps, self._values = self._stamps[before:], self._values[before:]
+        return grid, np.concatenate(kept)
+
+    def _advance_to(self, stop: int) -> FloatArray:
+        if self._emulator.k in self._changes:
+            self._emulator.tune(self._changes[self._emulator.k])
+        return self._emulator.advance(stop - self._emulator.k)[1]

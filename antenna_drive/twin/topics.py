@@ -1,0 +1,191 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Which topics of a real drive are which signals: the map of recordings, read for topics.
+
+The entries are those of docs/recording.md, Maps for other files; `column` is a topic. A topic has
+one number in each message (std_msgs/Float64) or, with `index`, several (Float64MultiArray). Only
+`time` differs, because a message has no time column:
+
+  time: {column: source}      when the sender gave the message to its middleware; the default
+  time: {column: arrival}     when it arrived here
+  time: {column: /acu/row, index: 0, unit: s}    a number in the same message
+
+With the last one, all signals come from that topic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+import math
+from pathlib import Path
+from typing import Any
+
+from antenna_drive.emulator.batch import CHANNELS
+from antenna_drive.parameters.plain_yaml import read_yaml
+from antenna_drive.parameters.schema import ParameterError
+from antenna_drive.recording.import_map import (
+    ImportMap, ISO_8601, parse_map, SignalMap, TIME_UNITS,
+)
+from antenna_drive.recording.recording import nanoseconds
+from antenna_drive.twin.intake import COMMAND, known
+
+SOURCE, ARRIVAL = 'source', 'arrival'
+
+
+@dataclass(frozen=True)
+class Topic:
+    """
+    A topic of the real drive.
+
+    Attributes
+    ----------
+    name : as the node subscribes to it
+    vector : whether its messages have several numbers
+    signals : what is read from it, by signal
+
+    """
+
+    name: str
+    vector: bool
+    signals: Mapping[str, SignalMap]
+
+
+@dataclass(frozen=True)
+class TopicMap:
+    """
+    The topics of a real drive, and how their messages are read.
+
+    Attributes
+    ----------
+    topics : to subscribe to
+    clock : SOURCE, ARRIVAL, or the topic that holds the time
+    time_index : which of its numbers
+    time_unit : nanoseconds in its unit
+    offset_ns : added to every stamp [ns]
+
+    """
+
+    topics: Sequence[Topic]
+    clock: str = SOURCE
+    time_index: int = 0
+    time_unit: int = 1
+    offset_ns: int = 0
+
+    def read(self, topic: Topic, numbers: Sequence[float], source_ns: int,
+             arrival_ns: int) -> list[tuple[str, int, float]]:
+        """
+        Return the samples in a message: signal, stamp [ns] and value in SI units.
+
+        A number that is not there, or has no value, is NaN.
+
+        Parameters
+        ----------
+        topic
+            of the message
+        numbers
+            in the message
+        source_ns, arrival_ns
+            when it was sent and when it arrived [ns]
+
+        """
+        stamp = source_ns if self.clock == SOURCE else arrival_ns
+        if self.clock not in (SOURCE, ARRIVAL):
+            time = numbers[self.time_index] if self.time_index < len(numbers) else math.nan
+            if not math.isfinite(time) or abs(time * self.time_unit) >= 2**63:
+                return []
+            stamp = int(nanoseconds(time * self.time_unit / 1e9))
+        return [(name, stamp + self.offset_ns + signal.clock_offset_ns, _value(signal, numbers))
+                for name, signal in topic.signals.items()]
+
+
+def _value(signal: SignalMap, numbers: Sequence[float]) -> float:
+    """Return the value of a signal in SI units; NaN if the message has none."""
+    try:
+        number = signal.number.value([numbers[reference.index or 0]
+                                      for reference in signal.number.references])
+        if signal.sign_bit:
+            number = signal.sign_bit - number if number >= signal.sign_bit else number
+        return float(signal.factor * (signal.gain * number + signal.offset))
+    except (ArithmeticError, ValueError, IndexError):
+        return math.nan
+
+
+def own_topics(real: str = '') -> TopicMap:
+    """Return the map of a drive whose topics and units are our own, in a namespace."""
+    prefix = real.rstrip('/') + '/' if real else ''
+    names = (COMMAND, *CHANNELS)
+    tree = {'time': {'column': SOURCE}, 'signals': {
+        name: {'column': prefix + name} for name in names}}
+    return _topics(parse_map(tree), SOURCE, 0)
+
+
+def load_topics(path: str | Path) -> TopicMap:
+    """
+    Read a map of topics.
+
+    Raises
+    ------
+    ParameterError : the file cannot be read, or an entry is not allowed; one line names the file,
+        the key and what is allowed
+
+    """
+    tree: Any = read_yaml(Path(path))
+    try:
+        if not isinstance(tree, dict):
+            raise ParameterError('signals: none is given')
+        time = tree.get('time', {'column': SOURCE})
+        index = 0
+        if isinstance(time, dict) and 'index' in time:
+            index = time['index']
+            if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < 10000:
+                raise ParameterError('time.index: allowed is a whole number from 0 on')
+            time = {key: value for key, value in time.items() if key != 'index'}
+        parsed = parse_map({**tree, 'time': time})
+        if parsed.time.unit == ISO_8601:
+            raise ParameterError('time.unit: a number in a message is no text; allowed is one of '
+                                 + ', '.join(TIME_UNITS))
+        return _topics(parsed, str(parsed.time.column), index)
+    except ParameterError as error:
+        raise ParameterError(f'{path}: {error}') from None
+
+
+def _topics(parsed: ImportMap, clock: str, index: int) -> TopicMap:
+    found: dict[str, dict[str, SignalMap]] = {}
+    vectors: dict[str, bool] = {}
+    for name, signal in parsed.signals.items():
+        if not known(name):
+            raise ParameterError(f'signals.{name}: a twin compares {", ".join(CHANNELS)}, and '
+                                 f'needs {COMMAND}')
+        topics = {str(reference.column) for reference in signal.number.references}
+        if len(topics) > 1:
+            raise ParameterError(f'signals.{name}: the numbers of an expression have to come in '
+                                 'one message, as column("topic")[0]')
+        topic = topics.pop()
+        vector = any(reference.index is not None for reference in signal.number.references)
+        if vectors.setdefault(topic, vector) != vector:
+            raise ParameterError(f'signals.{name}: {topic} has several numbers in a message; '
+                                 'index says which of them')
+        if clock not in (SOURCE, ARRIVAL) and topic != clock:
+            raise ParameterError(f'signals.{name}: the time is in the messages of {clock}, so '
+                                 'every signal has to come from there')
+        found.setdefault(topic, {})[name] = signal
+    if COMMAND not in parsed.signals:
+        raise ParameterError(f'signals: {COMMAND} is missing, which the twin is driven with')
+    if len(parsed.signals) < 2:
+        raise ParameterError('signals: nothing to compare; a twin compares '
+                             + ', '.join(CHANNELS))
+    return TopicMap([Topic(topic, vectors[topic], signals) for topic, signals in found.items()],
+                    clock, index, TIME_UNITS[parsed.time.unit], parsed.time.offset_ns)

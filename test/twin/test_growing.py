@@ -1,0 +1,129 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The verdict that grows: when it looks, at what, and when it stops."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, Future
+from typing import Any
+
+from antenna_drive.errors import UserError
+from antenna_drive.parameters.loading import load
+from antenna_drive.parameters.sets import Drive
+from antenna_drive.recording.recording import make_channel, Recording
+from antenna_drive.twin.growing import FIRST_S, GrowingVerdict, look_of
+from antenna_drive.twin.intake import COMMAND
+import numpy as np
+import pytest
+
+
+class Later(Executor):
+    """Does a task when it is told to."""
+
+    def __init__(self) -> None:
+        self.tasks: list[Callable[[], None]] = []
+
+    def submit(self, function: Any, /, *arguments: Any, **named: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+
+        def do() -> None:
+            try:
+                future.set_result(function(*arguments, **named))
+            except UserError as error:
+                future.set_exception(error)
+
+        self.tasks.append(do)
+        return future
+
+
+def test_of(seconds: float) -> Recording:
+    return Recording({COMMAND: make_channel(
+        COMMAND, 'rad/s', np.array([0, round(seconds * 1e9)]), np.zeros(2))})
+
+
+test_of.__test__ = False  # type: ignore[attr-defined]
+
+
+class Diagnoses:
+    """Stands in for the diagnosis; remembers what it was given."""
+
+    def __init__(self, *first: float) -> None:
+        self.given: list[list[str]] = []
+        self._first = iter(first)
+
+    def __call__(self, recordings: Mapping[str, Recording], drive: Drive) -> dict[str, Any]:
+        self.given.append(list(recordings))
+        p = next(self._first)
+        if p < 0.0:
+            raise UserError('too short')
+        return {'which': [{'effects': ['motor_1.gap'], 'probability': p},
+                          {'effects': ['none'], 'probability': 0.01},
+                          {'effects': ['unknown'], 'probability': 0.99 - p}],
+                'confusable': [['motor_1.gap', 'motor_2.gap']]}
+
+
+def grown(*first: float) -> tuple[GrowingVerdict, Later, Diagnoses]:
+    later, diagnoses = Later(), Diagnoses(*first)
+    return GrowingVerdict(later, load(), diagnose=diagnoses), later, diagnoses
+
+
+def look(growing: GrowingVerdict, later: Later, seconds: float) -> None:
+    assert growing.due(seconds)
+    growing.begin(test_of(seconds))
+    assert not growing.due(1e6), 'one look at a time'
+    assert not growing.take()
+    later.tasks.pop()()
+    assert growing.take()
+
+
+def test_looks_come_at_growing_distances_until_it_is_decided() -> None:
+    growing, later, _ = grown(0.6, 0.8, 0.94)
+    assert not growing.due(FIRST_S - 0.1)
+    look(growing, later, 16.0)
+    assert not growing.due(20.0)
+    look(growing, later, 21.0)
+    assert not growing.decided
+    assert growing.message()['say'].startswith('go on: motor_1.gap, 80 % after 21 s')
+    look(growing, later, 28.0)
+    assert growing.decided
+    assert growing.message()['say'].startswith('decided, you can stop')
+    assert [item['seconds'] for item in growing.message()['looks']] == [16.0, 21.0, 28.0]
+    assert not growing.due(1e6)
+
+
+def test_tests_before_are_looked_at_with_the_present_one() -> None:
+    growing, later, diagnoses = grown(0.5, 0.5)
+    look(growing, later, 30.0)
+    growing.complete(test_of(30.0))
+    assert not growing.due(8.0)
+    look(growing, later, 10.0)
+    assert diagnoses.given == [['test 1'], ['test 1', 'test 2']]
+    assert growing.looks[-1].seconds == pytest.approx(40.0)
+
+
+def test_look_that_fails_is_told_and_the_next_one_made() -> None:
+    growing, later, _ = grown(-1.0, 0.5)
+    look(growing, later, 16.0)
+    assert growing.message()['fault'] == 'too short'
+    look(growing, later, 16.0)
+    assert growing.message()['fault'] == ''
+
+
+def test_probabilities_of_a_look_are_those_of_the_diagnosis() -> None:
+    result = Diagnoses(0.7)({}, load())
+    found = look_of(result, 5.0)
+    assert found.first == ('motor_1.gap',)
+    assert sum(found.probabilities.values()) == pytest.approx(1.0)
+    assert found.evidence == pytest.approx(99.0)
