@@ -94,6 +94,8 @@ setup(
         # trials, studies, calibrations and fleets on a cluster
         'cluster': ['dask[distributed] >= 2024.1'],
         'completion': ['shtab >= 1.6'],
+        # the page of `live`: a web server with WebSockets in one wheel that needs no other
+        'live': ['tornado >= 6.1'],
         # models that people have: `diagnose --model FILE.yaml`
         'mujoco': ['mujoco >= 3.3'],
         'fmu': ['fmpy >= 0.3.22'],

@@ -30,6 +30,7 @@ REMEDIES = {
     'cma': 'pip install cma',
     'distributed': "pip install 'dask[distributed]'",
     'shtab': 'pip install shtab',
+    'tornado': 'pip install tornado',
     'mujoco': 'pip install mujoco',
     'fmpy': 'pip install fmpy',
 }
