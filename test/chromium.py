@@ -15,6 +15,7 @@
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Callable
 import json
 import os
@@ -115,6 +116,43 @@ class Page:
         """Return the value of a JavaScript expression."""
         return self._ask('Runtime.evaluate', expression=expression,
                          returnByValue=True)['result'].get('value')
+
+    def until(self, expression: str, patience_s: float = 90.0) -> Any:
+        """Wait until a JavaScript expression is true; return its value, or fail."""
+        answer = self._ask('Runtime.evaluate', awaitPromise=True, returnByValue=True, expression=(
+            'new Promise((done, fail) => { let told = ""; const look = () => { let value;'
+            f' try {{ value = ({expression}); }} catch (error) {{ told = String(error); }}'
+            ' value ? done(value) : setTimeout(look, 20); }; look();'
+            f' setTimeout(() => fail(new Error(told)), {1e3 * patience_s}); }})'))
+        assert 'exceptionDetails' not in answer, f'in vain: {expression}: {answer}'
+        return answer['result'].get('value')
+
+    def look(self, width: int, height: int, dark: bool = False) -> None:
+        """Give the window a size, and the page the colours of day or night."""
+        self._ask('Emulation.setDeviceMetricsOverride', width=width, height=height,
+                  deviceScaleFactor=1, mobile=width < 500)
+        self._ask('Emulation.setEmulatedMedia', features=[
+            {'name': 'prefers-color-scheme', 'value': 'dark' if dark else 'light'}])
+
+    def picture(self, path: Path) -> None:
+        """Write what the window shows as PNG."""
+        answer = self._ask('Page.captureScreenshot', format='png')
+        path.write_bytes(base64.b64decode(answer['data']))
+
+    def click(self, selector: str) -> None:
+        """Press and release the mouse in the middle of an element."""
+        x, y = self.place(selector)
+        for kind in ('mousePressed', 'mouseReleased'):
+            self.mouse(kind, x, y, button='left', clickCount=1)
+
+    def place(self, selector: str, across: float = 0.5) -> tuple[float, float]:
+        """Bring an element into view; return a place in it, from its left 0 to its right 1."""
+        found = self.until(
+            f'(() => {{ const e = document.querySelector({json.dumps(selector)});'
+            ' e.scrollIntoView({block: "center", behavior: "instant"});'
+            f' const b = e.getBoundingClientRect(); return b.width && [b.left + {across}'
+            ' * b.width, b.top + b.height / 2]; })()')
+        return found[0], found[1]
 
     def mouse(self, kind: str, x: float, y: float, **more: Any) -> None:
         """Move, press, release or turn the wheel of the mouse, as a person does."""

@@ -25,6 +25,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+from threading import Lock
 from typing import Any
 
 from antenna_drive.article.experiments import experiments
@@ -97,7 +98,15 @@ class OwnDrive:
 
 
 class Recorder:
-    """The recorder of this package as a process of its own, which the drive does not wait for."""
+    """
+    The recorder of this package as a process of its own, which the drive does not wait for.
+
+    Attributes
+    ----------
+    path : the folder of the recording under way, or of the last one
+    said : what the recorder said at its end
+
+    """
 
     def __init__(self, folder: Path, namespace: str = '') -> None:
         """Record to bags in a folder."""
@@ -105,7 +114,9 @@ class Recorder:
         self._namespace = namespace
         self._process: subprocess.Popen[bytes] | None = None
         self._log: Any = None
+        self._stopping = Lock()
         self.path: Path | None = None
+        self.said = ''
 
     @property
     def running(self) -> bool:
@@ -140,26 +151,27 @@ class Recorder:
             [sys.executable, '-m', 'antenna_drive.nodes.recorder', '--ros-args', *arguments],
             env=environment, stdin=subprocess.DEVNULL, stdout=self._log, stderr=self._log,
             start_new_session=True)
-        self.path = path
+        self.path, self.said = path, ''
         return path
 
-    def stop(self) -> str:
-        """Complete the bag; return what the recorder said last."""
-        process = self._process
-        if process is None:
-            return ''
-        if process.poll() is None:
-            process.send_signal(signal.SIGINT)
-        try:
-            process.wait(_PATIENCE_S)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-        self._process = None
-        self._log.seek(0)
-        said = self._log.read().decode(errors='replace').strip().splitlines()
-        self._log.close()
-        return said[-1] if said else ''
+    def stop(self) -> None:
+        """Complete the bag; from any thread."""
+        with self._stopping:
+            process = self._process
+            if process is None:
+                return
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+            try:
+                process.wait(_PATIENCE_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+            self._log.seek(0)
+            lines = self._log.read().decode(errors='replace').strip().splitlines()
+            self._log.close()
+            self.said = lines[-1].rpartition(']: ')[2] if lines else ''
+            self._process = None
 
     def size(self) -> int:
         """Return how many bytes the recording has on disk."""

@@ -98,8 +98,8 @@ def _split(described: Description) -> tuple[str, str]:
     # a symbol of docs/model.md stands in brackets too; only a unit is in what is allowed as well
     body, bracket, rest = described.text.rpartition(' [')
     unit = rest.removesuffix(']')
-    if bracket and rest.endswith(']') and (
-            f' {unit}' in described.allowed or described.allowed.startswith('a list')):
+    if bracket and rest.endswith(']') and described.allowed.removesuffix(' or more').endswith(
+            f' {unit}'):
         return body, unit
     return described.text, ''
 

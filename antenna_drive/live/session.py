@@ -77,16 +77,16 @@ class Session:
             'own': own is not None, 'namespace': link.namespace or '/',
             'experiments': listed(), 'units': list(OUTPUTS)})
         self._tell_experiment(experiment)
-        self._tell_recorder('')
+        self._tell_recorder()
         board.post('drive', {'trouble': '', 'ready': False})
 
     def _tell_experiment(self, name: str | None) -> None:
         self.board.post('experiment', {'name': name})
 
-    def _tell_recorder(self, said: str) -> None:
+    def _tell_recorder(self) -> None:
         recorder = self._recorder
         self.board.post('recorder', {
-            'running': recorder.running, 'path': str(recorder.path or ''), 'said': said,
+            'running': recorder.running, 'path': str(recorder.path or ''), 'said': recorder.said,
             'folder': str(recorder.folder), 'bytes': recorder.size() if recorder.path else 0})
 
     async def look_after(self) -> None:
@@ -107,10 +107,10 @@ class Session:
                         break  # it may be starting: the next look asks again
             self.board.post('drive', {'trouble': trouble, 'ready': len(self._tables) == len(
                 OUTPUTS) and ready, 'lost': self.link.history.lost})
-            if self._recorder.running:
-                self._tell_recorder('')
-            elif was_recording and self._recorder.path is not None:
-                self._tell_recorder(await off_the_loop(self._recorder.stop))
+            if was_recording and not self._recorder.running:
+                await off_the_loop(self._recorder.stop)  # it has ended by itself
+            if was_recording or self._recorder.running:
+                self._tell_recorder()
             was_recording = self._recorder.running
 
     async def ask(self, message: Mapping[str, Any]) -> Any:
@@ -187,11 +187,11 @@ class Session:
     async def _record(self, message: Mapping[str, Any]) -> str:
         if message.get('on'):
             path = self._recorder.start(str(message.get('name') or ''))
-            self._tell_recorder('')
+            self._tell_recorder()
             return str(path)
-        said = await off_the_loop(self._recorder.stop)
-        self._tell_recorder(said)
-        return str(said)
+        await off_the_loop(self._recorder.stop)
+        self._tell_recorder()
+        return self._recorder.said
 
     async def _recordings(self, message: Mapping[str, Any]) -> list[str]:
         found: list[str] = await off_the_loop(recordings_in, self._recorder.folder)

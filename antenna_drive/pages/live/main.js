@@ -14,7 +14,8 @@ import {makeTabs} from './tabs.js';
 const link = new Link();
 const samples = new Samples();
 const charts = new Charts(samples);
-const parts = [new Run(link, samples), new Tune(link), new Signal(link), new Article(link, charts),
+const run = new Run(link, samples);
+const parts = [run, new Tune(link), new Signal(link), new Article(link, charts),
                new Tapes(link, charts, samples), new Nodes()];
 let diagram = null;
 
@@ -44,4 +45,4 @@ requestAnimationFrame(draw);
 link.open();
 
 // for tests and for the curious
-window.antennaDrive = {link, samples, charts};
+window.antennaDrive = {link, samples, charts, run};

@@ -5,7 +5,7 @@ const LOST_MS = 3000;
 
 export class Run {
   constructor(link, samples) {
-    Object.assign(this, {link, samples, state: 'waiting', connected: false, trouble: ''});
+    Object.assign(this, {link, samples, state: 'waiting', at: 0, connected: false, trouble: ''});
     const get = id => document.getElementById(id);
     this.pill = get('state');
     this.clock = get('clock');
@@ -26,7 +26,7 @@ export class Run {
 
   takes() {
     return {
-      state: told => { this.state = told.state; this.show(); },
+      state: told => { [this.state, this.at] = [told.state, told.step]; this.show(); },
       open: is => { this.connected = is; this.show(); },
       drive: told => { this.ready = told.ready; this.setTrouble(told.trouble); },
       own: told => { if (told.unit === 'test_signal') this.setPace(told.values['run.pace']); },
