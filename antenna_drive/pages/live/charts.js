@@ -26,13 +26,11 @@ export class Charts {
     let shown = SHOWN;
     try { shown = JSON.parse(localStorage.getItem(STORE)) || SHOWN; } catch { /* as usual */ }
     const chips = document.getElementById('chips');
-    chips.querySelectorAll('button').forEach(button => button.remove());
-    const before = chips.querySelector('.spacer');
+    chips.replaceChildren();
     for (const panel of panels) {
       panel.shown = shown.includes(panel.title);
-      const chip = make('button', null, panel.title, {
+      const chip = make('button', chips, panel.title, {
         type: 'button', 'aria-pressed': String(panel.shown)});
-      chips.insertBefore(chip, before);
       chip.addEventListener('click', () => {
         panel.shown = !panel.shown;
         chip.setAttribute('aria-pressed', String(panel.shown));

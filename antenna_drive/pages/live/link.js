@@ -49,16 +49,23 @@ export class Link {
     if (this.socket?.readyState !== WebSocket.OPEN)
       return Promise.resolve({ok: false, reason: 'not connected'});
     const id = ++this.number;
-    return new Promise(resolve => {
+    let settle = null;
+    const answered = new Promise(resolve => {
       const late = setTimeout(() => settle({ok: false, reason: 'no answer'}), PATIENCE_MS);
-      const settle = told => {
+      settle = told => {
         clearTimeout(late);
         this.waiting.delete(id);
         resolve(told);
       };
-      this.waiting.set(id, {settle});
-      this.socket.send(JSON.stringify({...request, id}));
     });
+    this.waiting.set(id, {settle, answered});
+    this.socket.send(JSON.stringify({...request, id}));
+    return answered;
+  }
+
+  // Waits until everything that was asked is answered.
+  async answers() {
+    await Promise.all([...this.waiting.values()].map(one => one.answered));
   }
 
   // Asks, and shows why it is refused.

@@ -28,7 +28,7 @@ export class Run {
     return {
       state: told => { [this.state, this.at] = [told.state, told.step]; this.show(); },
       open: is => { this.connected = is; this.show(); },
-      drive: told => { this.ready = told.ready; this.setTrouble(told.trouble); },
+      drive: told => { [this.ready, this.lost] = [told.ready, told.lost || 0]; this.setTrouble(told.trouble); },
       own: told => { if (told.unit === 'test_signal') this.setPace(told.values['run.pace']); },
       parameters: told => {
         const pace = told.entries.find(entry => entry.name === 'run.pace');
