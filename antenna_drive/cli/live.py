@@ -50,8 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--namespace', default='', metavar='NS',
                         help='ROS namespace of the drive, such as /east')
     parser.add_argument('--experiment', metavar='NAME',
-                        help="one of the article's: T1, T2, T3a, T3b, T4a, T4e (default: T3b, "
-                             'none with --config or --set)')
+                        help="one of the article's: T1, T2, T3a, T3b, T4a, T4e; its settings go "
+                             'over those of --set (default: T3b, none with --config or --set)')
     add_config_option(parser)
     add_settings_option(parser)
     parser.add_argument('--pace', type=float, metavar='K',

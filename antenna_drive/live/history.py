@@ -120,6 +120,11 @@ class History:
         self._lows[:] = np.nan
         self._highs[:] = np.nan
 
+    @property
+    def run(self) -> int:
+        """Return the run in progress, 0 for none."""
+        return self._run
+
     def take(self, unit: str, frames: FloatArray) -> None:
         """
         Take frames of a unit in the order in which they were sent.

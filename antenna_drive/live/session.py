@@ -91,22 +91,25 @@ class Session:
 
     async def look_after(self) -> None:
         """Ask new nodes for their parameters, and notice what has ended; never returns."""
-        was_recording = False
+        was_recording, run = False, 0
         while True:
             await asyncio.sleep(_LOOK_S)
             trouble = self._own.trouble() if self._own and not self._restarting.locked() else ''
             ready = self.link.ready()
-            if not ready:
+            if not ready or self.link.history.run != run:
+                # nodes that were started again may have other constants
+                run = self.link.history.run
                 self._tables.clear()
-            elif not trouble:
+            if ready and not trouble:
                 for unit in [name for name in OUTPUTS if name not in self._tables]:
                     try:
                         await self.link.load(unit)
                         self._tables.add(unit)
                     except UserError:
                         break  # it may be starting: the next look asks again
-            self.board.post('drive', {'trouble': trouble, 'ready': len(self._tables) == len(
-                OUTPUTS) and ready, 'lost': self.link.history.lost})
+            self.board.post('drive', {
+                'trouble': trouble, 'ready': ready and len(self._tables) == len(OUTPUTS),
+                'lost': self.link.history.lost})
             if was_recording and not self._recorder.running:
                 await off_the_loop(self._recorder.stop)  # it has ended by itself
             if was_recording or self._recorder.running:
@@ -134,6 +137,9 @@ class Session:
         refusal = await self.link.set(_text(message, 'unit'), _mapping(message, 'values'))
         if refusal:
             raise UserError(refusal)
+        if message['unit'] == TEST_SIGNAL and not all(
+                name.startswith('run.') for name in message['values']):
+            self._tell_experiment(None)  # what was published is of another test signal
 
     async def _run(self, message: Mapping[str, Any]) -> str:
         service = _text(message, 'service')
