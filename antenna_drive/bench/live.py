@@ -76,7 +76,8 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
         result: dict[str, Any] = {'first_curve_s': measuring.figure(
             [_first_curve() for _ in range(2 if quick else repetitions)], 's')}
         progress('slider, memory')
-        result |= _open_for(30.0 if quick else 600.0, 20 if quick else 100)
+        # the charts fill in the first minute
+        result |= _open_for(20.0, 20, 1.0) if quick else _open_for(600.0, 100, 65.0)
         for name, pace in (('rate_share_paced', 1.0), ('rate_share', 0.0)):
             progress(f'rate at pace {pace:g}')
             result[name] = _rate_share(pace, 5.0 if quick else 20.0, 2 if quick else repetitions)
@@ -123,13 +124,12 @@ def _first_curve() -> float:
         return time.monotonic() - began
 
 
-def _open_for(open_s: float, slides: int) -> dict[str, Any]:
+def _open_for(open_s: float, slides: int, after_s: float) -> dict[str, Any]:
     with _command() as (url, number), _page(url) as page:
         page.until('document.querySelector(\'[data-name="bias_pot"] input\')', _PATIENCE_S)
         page.tell(_SLIDE % slides)
         took = page.until('window.took', _PATIENCE_S)
-        # the charts fill in the first minute
-        page.until('antennaDrive.samples.time > 65', _PATIENCE_S)
+        page.until(f'antennaDrive.samples.time > {after_s}', _PATIENCE_S)
         server, heap = _resident_MB(number), page.heap_MB()
         pictures = page.tell('antennaDrive.samples.arrived')
         time.sleep(open_s)
