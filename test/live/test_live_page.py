@@ -147,7 +147,8 @@ def test_an_experiment_starts_the_drive_as_in_the_article(page: Page) -> None:
     run = page.tell(f'{SAMPLES}.run')
     page.click('#tab-article')
     page.click('.cards button:first-child')
-    page.until(f'{SAMPLES}.run > {run} && {SAMPLES}.time > 0.5 && {STATE} === "playing"')
+    # five processes end and five others start
+    page.until(f'{SAMPLES}.run > {run} && {SAMPLES}.time > 0.5 && {STATE} === "playing"', 240.0)
     page.until('document.querySelector(".cards button").getAttribute("aria-pressed") === "true"')
     claims = page.tell('document.querySelector("#article table").textContent')
     assert '193' in claims, 'Section IV: 193 deg/s'
