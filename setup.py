@@ -25,8 +25,8 @@ NAMES = {'signal_generator': 'test_signal'}
 # ROS 2 Kilted as wheels: CPython 3.10 to 3.14 on x86-64 Linux, and nowhere else. The wheels of
 # one release fit each other alone (ros-rclpy pins its own to the patch), so each is held to
 # Kilted's series; elsewhere the extra is empty and the nodes say what is missing.
-KILTED = ('ros-rclpy[fastrtps] ~= 9.1', 'ros-std-msgs ~= 5.5', 'ros-rosgraph-msgs ~= 2.3',
-          'ros-diagnostic-msgs ~= 5.5')
+KILTED = ('ros-rclpy[fastrtps] ~= 9.1', 'ros-std-msgs ~= 5.5', 'ros-std-srvs ~= 5.5',
+          'ros-rosgraph-msgs ~= 2.3', 'ros-diagnostic-msgs ~= 5.5')
 WHEELS_EXIST = "sys_platform == 'linux' and platform_machine == 'x86_64'"
 
 
@@ -94,6 +94,8 @@ setup(
         # trials, studies, calibrations and fleets on a cluster
         'cluster': ['dask[distributed] >= 2024.1'],
         'completion': ['shtab >= 1.6'],
+        # the page of `live`: a web server with WebSockets in one wheel that needs no other
+        'live': ['tornado >= 6.1'],
         # models that people have: `diagnose --model FILE.yaml`
         'mujoco': ['mujoco >= 3.3'],
         'fmu': ['fmpy >= 0.3.22'],

@@ -16,11 +16,12 @@
 from __future__ import annotations
 
 ROS_REMEDY = ("source a ROS 2 installation, or on x86-64 Linux: pip install 'ros-rclpy[fastrtps]' "
-              'ros-std-msgs ros-rosgraph-msgs ros-diagnostic-msgs')
+              'ros-std-msgs ros-std-srvs ros-rosgraph-msgs ros-diagnostic-msgs')
 REMEDIES = {
     'rclpy': ROS_REMEDY,
     'rcl_interfaces': ROS_REMEDY,
     'std_msgs': ROS_REMEDY,
+    'std_srvs': ROS_REMEDY,
     'rosgraph_msgs': ROS_REMEDY,
     'diagnostic_msgs': ROS_REMEDY,
     'jinja2': 'pip install Jinja2',
@@ -29,6 +30,7 @@ REMEDIES = {
     'cma': 'pip install cma',
     'distributed': "pip install 'dask[distributed]'",
     'shtab': 'pip install shtab',
+    'tornado': 'pip install tornado',
     'mujoco': 'pip install mujoco',
     'fmpy': 'pip install fmpy',
 }

@@ -25,7 +25,7 @@ from antenna_drive.bench.measuring import machine
 from antenna_drive.errors import UserError
 
 _MODULES = {'transport': 'transport', 'simulation': 'simulation', 'batch': 'batches',
-            'diagnosis': 'diagnosis', 'fleet': 'fleet', 'start': 'start'}
+            'diagnosis': 'diagnosis', 'fleet': 'fleet', 'start': 'start', 'live': 'live'}
 
 # Goals of the headline figures: at least (+) or at most (-) the number.
 GOALS: dict[str, tuple[str, float]] = {
@@ -48,6 +48,11 @@ GOALS: dict[str, tuple[str, float]] = {
     'batch.two_core_speedup': ('+', 1.8),
     'fleet.two_worker_speedup': ('+', 1.8),
     'start.second_first_step_s': ('-', 1.5),
+    'live.first_curve_s': ('-', 10.0),
+    'live.slider_ms': ('-', 50.0),
+    'live.rate_share_paced': ('+', 0.95),
+    'live.rate_share': ('+', 0.95),
+    'live.lost_steps': ('-', 0.0),
 }
 
 

@@ -61,6 +61,7 @@ COMMANDS = {
                             'processes'),
     'lockstep-check': Command('lockstep_check', 'compare five processes with one, sample by '
                                                 'sample'),
+    'live': Command('live', 'open a page to see and turn a running drive'),
     'compile': Command('compile_', 'compile the physics ahead of the first run'),
     'run': Command('run', 'run the drive in one process and write its signals'),
     'article': Command('article', "repeat the article's experiments and compare the figures"),

@@ -22,6 +22,8 @@ Groups:
   diagnosis   wall time and memory of a diagnosis
   fleet       diagnoses of several machines by one worker of a cluster, and by two
   start       import, first step, demo
+  live        the live page in a headless Chromium: first curve, sliders, what it costs the drive;
+              ten minutes of it with the page open
 
 Peers that are not installed are left out, and the result names them; pip install
 'antenna_drive[bench]' installs all. Each figure is a median with minimum and maximum; the JSON
@@ -42,7 +44,7 @@ import sys
 from antenna_drive.cli.output import add_json_option, check_options, give
 from antenna_drive.parameters.schema import Entry
 
-GROUPS = ('start', 'simulation', 'batch', 'diagnosis', 'fleet', 'transport')
+GROUPS = ('start', 'simulation', 'batch', 'diagnosis', 'fleet', 'live', 'transport')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -33,6 +33,7 @@ from antenna_drive.programs import end_with_parent, OK, PARENT, run_program
 if TYPE_CHECKING:
     from antenna_drive.emulator.unit import Unit
     from antenna_drive.emulator.wiring import Wiring
+    from antenna_drive.lockstep.node import ReadSheet
     from antenna_drive.parameters.schema import Value
     from rclpy.node import Node
 
@@ -42,7 +43,7 @@ MakeUnit = Callable[[str, 'Wiring', Sequence[str], Mapping[str, Any]], 'Unit']
 
 def run_drive_unit(default_name: str, names: Sequence[str], args: Sequence[str] | None = None,
                    fed_by_topic: Sequence[str] = (), description: str = '',
-                   wiring: str = '') -> int:
+                   wiring: str = '', read_sheet: ReadSheet | None = None) -> int:
     """
     Run a unit of the wiring as a ROS 2 node; SIGINT or SIGTERM ends the process.
 
@@ -60,6 +61,8 @@ def run_drive_unit(default_name: str, names: Sequence[str], args: Sequence[str] 
         what --help says first
     wiring
         module:NAME of the wiring unless the parameter `wiring` names another; '' is the drive's
+    read_sheet
+        see DriveNode
 
     Returns
     -------
@@ -78,7 +81,7 @@ def run_drive_unit(default_name: str, names: Sequence[str], args: Sequence[str] 
         unit.step(0, np.zeros((len(unit.inputs), 2)))
         return unit
 
-    return _run(default_name, make, args, fed_by_topic, description, wiring)
+    return _run(default_name, make, args, fed_by_topic, description, wiring, read_sheet)
 
 
 def run_unit(unit: Unit, args: Sequence[str] | None = None, wiring: str = '') -> int:
@@ -147,7 +150,8 @@ def run_partner(args: Sequence[str] | None = None, description: str = '') -> int
 
 
 def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None,
-         fed_by_topic: Sequence[str], description: str, wiring: str) -> int:
+         fed_by_topic: Sequence[str], description: str, wiring: str,
+         read_sheet: ReadSheet | None = None) -> int:
     ending = _Ending()
     if PARENT in os.environ:
         end_with_parent()
@@ -155,7 +159,7 @@ def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None,
 
     def act(arguments: list[str]) -> int:
         choose_transport(os.environ)
-        _run_node(default_name, make, arguments, fed_by_topic, wiring, ending)
+        _run_node(default_name, make, arguments, fed_by_topic, wiring, ending, read_sheet)
         # The node has left the graph. What the interpreter and the compiler would still tidy up
         # takes seconds on a busy machine, and a node must be gone within two.
         sys.stdout.flush()
@@ -220,13 +224,14 @@ def init_ros(name: str, arguments: Sequence[str], example: str) -> None:
 
 
 def _run_node(default_name: str, make: MakeUnit, arguments: list[str],
-              fed_by_topic: Sequence[str], wiring: str, ending: _Ending) -> None:
+              fed_by_topic: Sequence[str], wiring: str, ending: _Ending,
+              read_sheet: ReadSheet | None) -> None:
     import rclpy
     init_ros(default_name, arguments, "config:=\"['old_circuit']\"")
     try:
         node = _bare_node(default_name)
         try:
-            _spin(node, make, fed_by_topic, wiring, ending)
+            _spin(node, make, fed_by_topic, wiring, ending, read_sheet)
         finally:
             node.destroy_node()
     finally:
@@ -245,7 +250,7 @@ def _bare_node(default_name: str) -> Node:
 
 
 def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], wiring: str,
-          ending: _Ending) -> None:
+          ending: _Ending, read_sheet: ReadSheet | None) -> None:
     from antenna_drive.emulator.wiring import find
     from antenna_drive.lockstep.getting_ready import told_while_compiling
     from antenna_drive.lockstep.node import DriveNode, OWN_PARAMETERS
@@ -259,7 +264,8 @@ def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], wiring: str,
     wired = find(wiring)
     with told_while_compiling(node):
         unit = make(node.get_name(), wired, config, given)
-        drive_node = DriveNode(node, unit, overrides, config, fed_by_topic, wiring, wired.outputs)
+        drive_node = DriveNode(node, unit, overrides, config, fed_by_topic, wiring, wired.outputs,
+                               read_sheet)
     ending.by(drive_node.stop)
     if not ending.asked:
         drive_node.spin()

@@ -471,6 +471,10 @@ class Conductor(Member):
                   *(heard + 1.0 for heard in self._heard.values()))
         return self._begin(run, self.wanted_step_s)
 
+    def begin_again(self) -> None:
+        """Leave the run in progress, if any, for a new one."""
+        self._begin_again = True
+
     def go_on(self, stands_still: bool = True) -> FloatArray | None:
         """Make the next step if every member has made the last, and the run has not ended."""
         if self.run == NO_RUN or self.fault or self.ended or self._begin_again:

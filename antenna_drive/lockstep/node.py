@@ -15,13 +15,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 import gc
 import time
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
-from antenna_drive.errors import one_line
+from antenna_drive.errors import one_line, UserError
 from antenna_drive.lockstep import compiled_loop, ros_parameters
 from antenna_drive.lockstep.changes import CHANGES, write_record
 from antenna_drive.lockstep.compiled_unit import form_of
@@ -37,10 +37,14 @@ from antenna_drive.lockstep.readings import (
 from antenna_drive.lockstep.realtime import lock_memory, schedule_first_in_first_out
 from antenna_drive.lockstep.report import Report
 from antenna_drive.lockstep.ros_link import FrameLink
+from antenna_drive.lockstep.run_control import PAUSED, PLAYING, RunControl, RunState, STOPPED
+from antenna_drive.lockstep.run_services import RunServices, StateReader
 from antenna_drive.lockstep.serving import Serving
 from antenna_drive.parameters.schema import Entry, Value
 from numba.core.errors import NumbaError
+from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from std_msgs.msg import Float64
 
 # No wait is longer than this [s]: signals and reports are served in between.
@@ -61,6 +65,8 @@ PRIORITY = Entry('1', 0, 99, 'real-time priority (SCHED_FIFO) of the lock-step, 
 MEMORY = Entry('', description='locked: all memory of the node stays in RAM (mlockall)',
                choices=('pageable', 'locked'))
 DURATION = Entry('s', 0.0, 1e9, 'simulated time after which the run ends, 0: never')
+STEPS = Entry('1', 1, 1_000_000, 'how many macro-steps the service step makes', live=True,
+              whole=True)
 
 PARTNER_RATE = Entry('Hz', 1.0, 1e4,
                      'how often per simulated second the partner is told its inputs')
@@ -68,10 +74,17 @@ DEADLINE = Entry('s', 0.0, 1e3,
                  'how old the step may be that was answered last, in simulated time; 0: any age')
 MISS = Entry('', description='what the outputs do while an answer is overdue', choices=ON_MISS)
 
+# The test sheet that the service play plays.
+SHEET = 'run.sheet'
+
+# Returns the settings that play the test sheet in a file.
+ReadSheet = Callable[[str], Mapping[str, Value]]
+
 # The parameters of a node itself, beside the settings of its unit.
 OWN_PARAMETERS = ('config', 'wiring', 'exchange', 'publish_rate', 'realtime.priority',
                   'realtime.memory', 'partner.rate', 'partner.deadline', 'partner.on_miss',
-                  'run.step', 'run.pace', 'run.lead', 'run.duration', 'run.observers')
+                  'run.step', 'run.pace', 'run.lead', 'run.duration', 'run.observers',
+                  'run.steps', SHEET)
 
 
 class DriveNode:
@@ -84,7 +97,8 @@ class DriveNode:
 
     def __init__(self, node: Node, unit: Unit, overrides: ros_parameters.Overrides,
                  config: Collection[str] = (), fed_by_topic: Collection[str] = (),
-                 wiring: str = '', outputs: Mapping[str, Sequence[Signal]] = OUTPUTS) -> None:
+                 wiring: str = '', outputs: Mapping[str, Sequence[Signal]] = OUTPUTS,
+                 read_sheet: ReadSheet | None = None) -> None:
         """
         Declare parameters and topics.
 
@@ -103,6 +117,9 @@ class DriveNode:
             being parameters
         wiring, outputs
             what the wiring of the drive is called, and the signals of each of its units
+        read_sheet
+            returns the settings of this unit that play the test sheet in a file; None if it
+            plays none
 
         Raises
         ------
@@ -131,6 +148,9 @@ class DriveNode:
                 node, 'partner.reads', overrides.names('partner.reads', unit.inputs),
                 'signals that the partner is told')
         self._pace: Pace | None = None
+        self._control: RunControl | None = None
+        self._services: RunServices | None = None
+        self._read_sheet = read_sheet
         self._member = self._make_member(birth, overrides)
         own = overrides.own
         overrides.check_all_known([*settings, *own])
@@ -146,6 +166,11 @@ class DriveNode:
                                   _number(settings.get(_AMPERES)))
         self._record = ChangeRecord(node)
         self._report = Report(node, self._member, self._pace, self._link.publishers)
+        if self._control is not None:
+            self._services = self._offer_services(self._control)
+            self._report.told_state = self._state
+        else:
+            self._report.told_state = StateReader(node, self._member.conductor).latest
         for setting in fed_by_topic:
             self._follow(setting)
         ros_parameters.accept_changes(
@@ -156,6 +181,7 @@ class DriveNode:
         self._quiet = False
         self._stands_still = False
         self._said_end = False
+        self._told_state = ('', 0)
         self._channel: RclChannel | None = None
         self._exchange = self._make_exchange() if exchange == 'auto' else None
         if memory == 'locked':
@@ -188,11 +214,54 @@ class DriveNode:
         lead_s = overrides.number('run.lead', LEAD, LEAD_S)
         duration = overrides.number('run.duration', DURATION, 0.0)
         observers = overrides.names('run.observers', ())
+        overrides.get('run.steps', STEPS, 1)
         ros_parameters.declare_names(self._node, 'run.observers', observers,
                                      'names of recorders that every step waits for')
+        sheet = ''.join(overrides.names(SHEET, ()))
+        if self._read_sheet is not None:
+            self._node.declare_parameter(SHEET, sheet, ParameterDescriptor(
+                description='file with the test sheet that the service play plays'),
+                ignore_override=True)
         self._pace = Pace(pace, lead_s)
+        self._control = RunControl(ros_parameters.PATIENCE_S)
         return Conductor(self._unit, birth, step_s, round(duration / step_s) or None,
                          self._outputs, observers)
+
+    def _offer_services(self, control: RunControl) -> RunServices:
+        return RunServices(
+            self._node, control, self._wake, self._state,
+            lambda: int(self._node.get_parameter('run.steps').value or 1), self._restart_clock,
+            None if self._read_sheet is None else self._play)
+
+    def _state(self) -> RunState:
+        """Return what the conductor says of its run, from any thread."""
+        member = self._member
+        assert isinstance(member, Conductor) and self._control is not None
+        step = self._reached()
+        state = PAUSED if self._control.holds(step) else PLAYING
+        if member.run == 0.0 or member.ended or member.fault:
+            state = STOPPED
+        return RunState(state, int(member.run), step)
+
+    def _restart_clock(self) -> None:
+        """Let the next step be due now, and the others after it, at the pace as it is."""
+        assert self._pace is not None
+        self._pace.change(self._pace.factor, time.monotonic(), self._reached())
+
+    def _play(self) -> str:
+        """Put the waveform of the test sheet in force; return why that is refused, or ''."""
+        assert self._read_sheet is not None
+        path = str(self._node.get_parameter(SHEET).value or '')
+        if not path:
+            return f'{SHEET}: not given, set it to the file of a test sheet'
+        try:
+            settings = self._read_sheet(path)
+        except UserError as error:
+            return str(error)
+        result = self._node.set_parameters_atomically([
+            Parameter(name, value=list(value) if isinstance(value, tuple) else value)
+            for name, value in settings.items()])
+        return '' if result.successful else result.reason
 
     def _make_partner(self, unit: PartnerUnit, overrides: ros_parameters.Overrides) -> PartnerLink:
         settings = overrides.own
@@ -285,14 +354,13 @@ class DriveNode:
         """
         member, pace = self._member, self._pace
         exchange.listen()
-        if (self._stop or self._quiet or not member.steady()
+        if (self._stop or self._quiet or not member.steady() or self._held()
                 or pace is not None and pace.factor > 0.0 and not pace.begun):
             return False
         if self.tuning.pending:
             self._apply_changes()
         before = member.step
-        if self._partner is not None:
-            exchange.pauses = [self._partner.next_step()]
+        exchange.pauses = sorted(self._pauses())
         reason = exchange.run(self._every, pace)
         if member.step != before:
             self._made(exchange, before)
@@ -302,6 +370,37 @@ class DriveNode:
             self._wait_for_anything()
         return member.step != before and reason == compiled_loop.LIMIT or reason in (
             compiled_loop.STEPPED, compiled_loop.FOREIGN, compiled_loop.MISSING)
+
+    def _pauses(self) -> Iterator[int]:
+        """Yield the steps after which Python has something to do."""
+        if self._partner is not None:
+            yield self._partner.next_step()
+        if self._control is not None:
+            yield self._control.halt
+
+    def _held(self) -> bool:
+        """Return whether an operator holds the drive at its step, or wants a new run."""
+        control, member = self._control, self._member
+        if control is None:
+            return False
+        if control.reset_wanted:
+            assert isinstance(member, Conductor)
+            member.begin_again()
+        if not control.holds(member.step):
+            return False
+        if member.run and control.stands(member.step):
+            self._tell_state()
+        return True
+
+    def _tell_state(self, only_news: bool = False) -> None:
+        """Say what the run does now, to people and to the other nodes."""
+        if self._services is None:
+            return
+        state = self._state()
+        if not only_news or (state.state, state.run) != self._told_state:
+            self._told_state = (state.state, state.run)
+            self._services.publish()
+            self._report.hurry()
 
     def _made(self, exchange: Exchange, before: int) -> None:
         """Do what is due after the steps that the compiled exchange has made since `before`."""
@@ -324,12 +423,16 @@ class DriveNode:
         member = self._member
         if self._pace is None:
             return member.go_on(self._stands_still)
-        assert isinstance(member, Conductor)
+        assert isinstance(member, Conductor) and self._control is not None
+        held = self._held()
         if self._quiet:
             outputs = member.new_run(time.time_ns() / 1e3, stands_still=True)
             if outputs is not None:
                 self._pace.begin()
+                self._control.begun()
                 return outputs
+        if held:
+            return None
         if self._pace.factor > 0.0 and member.run:
             now = time.monotonic()
             if self._pace.remaining(member.step + 1, member.step_s, now) > 0.0:
@@ -370,6 +473,7 @@ class DriveNode:
         if self._partner is not None:
             self._partner.stepped()
         self._report.stepped()
+        self._tell_state(only_news=True)
         self._report.publish_if_due(time.monotonic())
 
     def _begun(self) -> None:
@@ -417,13 +521,15 @@ class DriveNode:
         now = time.monotonic()
         timeout = _LONGEST_WAIT_S
         if self._pace is not None and member.run and not missing:
-            timeout = min(timeout, self._pace.remaining(member.step + 1, member.step_s, now))
+            if not self._held():
+                timeout = min(timeout, self._pace.remaining(member.step + 1, member.step_s, now))
         else:
             self._report.waiting(now)
         if isinstance(member, Conductor) and member.ended and not self._said_end:
             self._said_end = True
             self._report.ended()
             self._hello()
+        self._tell_state(only_news=True)
         ready = self._link.wait(member.wanted(), timeout)
         for peer in ready:
             frame = self._link.take(peer)

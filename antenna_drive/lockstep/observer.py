@@ -39,6 +39,8 @@ from antenna_drive.lockstep.member import Guest, Member
 from antenna_drive.lockstep.readings import CHANGES_QOS
 from antenna_drive.lockstep.report import STANDSTILL_S
 from antenna_drive.lockstep.ros_link import FRAME_QOS, FrameLink
+from antenna_drive.lockstep.run_control import PAUSED
+from antenna_drive.lockstep.run_services import StateReader
 from antenna_drive.lockstep.serving import Serving
 import numpy as np
 from rclpy.context import Context
@@ -127,6 +129,7 @@ class Observer:
         self._begun = (0.0, 0)
         self._told = -1
         self._link = FrameLink(self._node, self._member.layouts)
+        self._state = StateReader(self._node, self._member.conductor)
         # frames of the conductor that were taken before there was room for them
         self._ahead: deque[Frame] = deque()
         self._serving: Serving | None = None
@@ -168,6 +171,12 @@ class Observer:
     def resting(self) -> bool:
         """Return whether the drive has said that its run is over."""
         return self._member.resting
+
+    @property
+    def paused(self) -> bool:
+        """Return whether an operator holds the drive; for the thread that spins."""
+        state = self._state.latest()
+        return state is not None and state.state == PAUSED and state.run == self._member.run
 
     def spin(self, until: Callable[[], bool]) -> None:
         """Follow the drive until `until()` is true; it is asked every 0.1 s and at each step."""

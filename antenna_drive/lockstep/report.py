@@ -23,6 +23,7 @@ from antenna_drive.lockstep.exchange import Exchange
 from antenna_drive.lockstep.member import Conductor, Member
 from antenna_drive.lockstep.pace import Pace
 from antenna_drive.lockstep.partner_link import PartnerLink
+from antenna_drive.lockstep.run_control import PAUSED, RunState
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
@@ -67,6 +68,9 @@ class Report:
         self.refused_values = 0
         self.exchange: Exchange | None = None
         self.partner: PartnerLink | None = None
+        # what the conductor says of its run; in the conductor itself, what it is
+        self.told_state: Callable[[], RunState | None] = _unknown
+        self._excused_s = 0.0
 
     def stepped(self) -> None:
         """Note that the node has gone on."""
@@ -81,6 +85,8 @@ class Report:
         """Note at `now` [s] that the node cannot go on; say so in the log if it lasts."""
         if self._waiting_since is None:
             self._waiting_since = now
+        if self._paused_at() is not None:
+            self._excused_s = now
         fault = self._member.fault
         if fault and fault != self._fault_told:
             self._node.get_logger().error(f'{fault}; stopped until a new run begins')
@@ -105,9 +111,25 @@ class Report:
         """Tell at `now` [s] whether the node has made no step for a while."""
         return self._waiting_since is not None and now - self._waiting_since >= STANDSTILL_S
 
+    def hurry(self) -> None:
+        """Let people who watch /diagnostics hear of it at once."""
+        self._next_s = 0.0
+
+    def _paused_at(self) -> int | None:
+        """Return the step at which an operator holds the drive, None if nobody does."""
+        told, member = self.told_state(), self._member
+        if told is None or told.state != PAUSED or told.run != member.run:
+            return None
+        missing = member.missing()
+        if missing not in ((), (member.conductor,)):
+            return None  # it would wait without a pause too
+        if missing and not self._publishers().get(member.conductor):
+            return None  # whoever said so has gone
+        return told.step
+
     def _waits_long(self, now: float) -> bool:
         return (self._waiting_since is not None and not self._at_rest()
-                and now - self._waiting_since >= PATIENCE_S)
+                and now - max(self._waiting_since, self._excused_s) >= PATIENCE_S)
 
     def _at_rest(self) -> bool:
         member = self._member
@@ -152,6 +174,9 @@ class Report:
                 return DiagnosticStatus.WARN, f'{late - self._late_before} steps late'
             if self._at_rest():
                 return DiagnosticStatus.OK, 'no run in progress'
+            paused_at = self._paused_at()
+            if paused_at is not None:
+                return DiagnosticStatus.OK, f'paused at step {paused_at}'
             return DiagnosticStatus.OK, 'stepping' if member.run else 'waiting for a run to begin'
         finally:
             self._refused_before = refused
@@ -182,3 +207,7 @@ class Report:
             values += self.partner.values()
         values.append(('last change', self.last_change))
         return values
+
+
+def _unknown() -> None:
+    return None

@@ -145,7 +145,7 @@ class RunWatch:
             return self.done >= self._last
         self._next_look = now + 0.1
         processes.check()
-        if self.done != self._seen:
+        if self.done != self._seen or observer.paused:
             self._seen, self.deadline = self.done, now + STEP_PATIENCE_S
             if self._progress is not None:
                 self._progress(self.done)

@@ -15,12 +15,16 @@
 The test signals, and the owner of the run: its macro-step, pace and end, as a ROS 2 node.
 
 With waveform:=external the command follows the Float64 topic test_signal/external [rad/s].
+The services pause, resume, step, reset, play and state control the run, as in
+  ros2 service call /test_signal/pause std_srvs/srv/Trigger
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 import sys
+from typing import Any
 
 from antenna_drive.lockstep.entry import run_drive_unit
 
@@ -28,7 +32,12 @@ from antenna_drive.lockstep.entry import run_drive_unit
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run_drive_unit('test_signal', ('test_signal',), args, fed_by_topic=('external',),
-                          description=__doc__)
+                          description=__doc__, read_sheet=_read_sheet)
+
+
+def _read_sheet(path: str) -> Mapping[str, Any]:
+    from antenna_drive.recording.sheet_signal import settings_of
+    return settings_of(Path(path))
 
 
 if __name__ == '__main__':

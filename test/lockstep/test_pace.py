@@ -97,3 +97,13 @@ def test_a_lead_lets_steps_come_early_and_makes_none_late() -> None:
 def test_a_lead_is_wall_time_at_any_pace() -> None:
     pace = begun(Pace(4.0, lead_s=0.02), 0.0)
     assert pace.remaining(81, 1e-3, 0.0) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_drive_that_was_paused_goes_on_without_a_burst() -> None:
+    pace = begun(Pace(1.0), 0.0)
+    pace.note(2, 1e-3, 0.001)
+    pace.change(pace.factor, 100.0, 2)
+    assert pace.remaining(3, 1e-3, 100.0) == pytest.approx(1e-3)
+    assert pace.remaining(1002, 1e-3, 100.0) == pytest.approx(1.0)
+    pace.note(3, 1e-3, 100.001)
+    assert pace.late_steps == 0

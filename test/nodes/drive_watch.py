@@ -34,6 +34,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from std_msgs.msg import Float64, Float64MultiArray
+from std_srvs.srv import Trigger
 
 # A hang is a failure; nothing is judged by how long it took.
 PATIENCE_S = 120.0
@@ -49,11 +50,13 @@ class Watch:
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)
         self.reports: dict[str, DiagnosticStatus] = {}
+        self.heard: list[DiagnosticStatus] = []
         self.node.create_subscription(DiagnosticArray, '/diagnostics', self._report, 100)
 
     def _report(self, message: DiagnosticArray) -> None:
         for status in message.status:
             self.reports[status.name.rpartition('/')[2]] = status
+            self.heard.append(status)
 
     def __enter__(self) -> Watch:
         return self
@@ -85,6 +88,12 @@ class Watch:
     def _answer(self, future: Any, name: str) -> Any:
         self.until(future.done, f'the answer of {name}')
         return future.result()
+
+    def call(self, service: str) -> Trigger.Response:
+        """Call a service of the run control."""
+        client: Any = self.node.create_client(Trigger, service)
+        self.until(client.service_is_ready, service)
+        return self._answer(client.call_async(Trigger.Request()), service)
 
     def set_together(self, name: str, values: Mapping[str, Any]) -> SetParametersResult:
         """Set parameters of a node, all or none."""

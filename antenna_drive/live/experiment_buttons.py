@@ -1,0 +1,203 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The article's experiments and a preview of the test signals, for the page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+import math
+from typing import Any, NamedTuple
+
+from antenna_drive.article.experiments import DriveExperiment, experiments
+from antenna_drive.article.published import Claim, CLAIMS
+from antenna_drive.emulator.units import build
+from antenna_drive.emulator.wiring import UNITS
+from antenna_drive.parameters.loading import check_waveform
+from antenna_drive.parameters.records import record_of
+from antenna_drive.parameters.schema import check_changes, Entry, Value
+from antenna_drive.parameters.sets import Drive, entries, Waveform
+from antenna_drive.physics import signal_generator
+import numpy as np
+
+_DEGREES = 180.0 / math.pi
+
+TITLES = {
+    'T1': ('Square wave, no bias', 'Figs. 8-10'),
+    'T2': ('Square wave, 15 % bias', 'Figs. 11-13'),
+    'T3a': ('Saw-tooth, old circuit', 'Figs. 18, 19'),
+    'T3b': ('Saw-tooth, new circuit', 'Figs. 18, 20'),
+    'T4a': ('Switch-on, old circuit', 'Fig. 21(a)'),
+    'T4e': ('Switch-on, new circuit', 'Fig. 23'),
+}
+
+# The claims that are a level of one signal: measure, signal, a factor to its unit, and whether
+# the level is reached both ways.
+_LEVELS = (
+    ('T1.tach_rate', 'motor_1/tach_rate', 1.0 / _DEGREES, True),
+    ('T1.current_1', 'motor_1/current', 1.0, True),
+    ('T3a.high', 'torque_share/bias_voltage', 1.0, False),
+    ('T3a.low', 'torque_share/bias_voltage', 1.0, False),
+    ('T3b.high', 'torque_share/bias_voltage', 1.0, False),
+    ('T3b.low', 'torque_share/bias_voltage', 1.0, False),
+)
+_BY_MEASURE: Mapping[str, Claim] = {claim.measure: claim for claim in CLAIMS}
+
+
+class Level(NamedTuple):
+    """A published level of a signal, in its SI unit: what the analysis gave, and the field."""
+
+    signal: str
+    analysis: float
+    field: float | None
+    note: str
+
+
+def levels(name: str) -> list[Level]:
+    """Return the published levels of an experiment that can be drawn beside a signal."""
+    found = []
+    for measure, signal, factor, both_ways in _LEVELS:
+        if measure.partition('.')[0] != name:
+            continue
+        claim = _BY_MEASURE[measure]
+        field = claim.says.get('field') if isinstance(claim.says, Mapping) else None
+        for sign in (1.0, -1.0) if both_ways else (1.0,):
+            found.append(Level(signal, sign * factor * claim.number,
+                               None if field is None else sign * factor * field, claim.note))
+    return found
+
+
+def listed() -> list[dict[str, Any]]:
+    """Return the experiments as the page lists them."""
+    return [{'name': name, 'title': TITLES[name][0], 'figures': TITLES[name][1],
+             'duration': experiment.duration,
+             'levels': [level._asdict() for level in levels(name)], 'claims': claims(name)}
+            for name, experiment in experiments().items()]
+
+
+def claims(name: str) -> list[dict[str, str]]:
+    """Return what the article says of an experiment, in words."""
+    found = []
+    for claim in CLAIMS:
+        test, _, figure = claim.measure.partition('.')
+        if test.rstrip('ab' if name == 'T2' else '') != name:
+            continue
+        says = claim.says
+        if isinstance(says, Mapping):
+            says = f'{says["analysis"]:g} (analysis), {says["field"]:g} (field)'
+        found.append({'what': figure.replace('_', ' '), 'note': claim.note,
+                      'says': says if isinstance(says, str) else f'{says:g}'})
+    return found
+
+
+class Plan(NamedTuple):
+    """
+    What an experiment changes in a drive, by unit.
+
+    Attributes
+    ----------
+    live : tuning parameters that differ
+    constants : names of the physical constants that differ, which only a restart can change
+
+    """
+
+    live: dict[str, dict[str, Value]]
+    constants: dict[str, list[str]]
+
+
+def plan(name: str, settings: Mapping[str, Mapping[str, Any]],
+         configuration: tuple[str, ...] = ()) -> Plan:
+    """
+    Compare an experiment with what is in force.
+
+    Parameters
+    ----------
+    name
+        one of `experiments`
+    settings
+        the parameters in force, by unit and name
+    configuration
+        files that the experiment is built on, as in `DriveExperiment.drive`
+
+    """
+    result = Plan({}, {})
+    for unit, (entry, value) in _wanted(experiments()[name].drive(*configuration)):
+        key, place = entry
+        now = settings.get(unit, {}).get(key)
+        if now is None or _same(now, value):
+            continue
+        if place.live:
+            result.live.setdefault(unit, {})[key] = value
+        else:
+            result.constants.setdefault(unit, []).append(key)
+    return result
+
+
+def start_of(experiment: DriveExperiment, configuration: tuple[str, ...],
+             ) -> dict[str, dict[str, Value]]:
+    """Return the parameters of nodes that differ from those of configuration and circuit."""
+    plain = replace(experiment, settings={}, bias_share=None).drive(*configuration)
+    before = {(unit, key): value for unit, ((key, _), value) in _wanted(plain)}
+    found: dict[str, dict[str, Value]] = {}
+    for unit, ((key, _), value) in _wanted(experiment.drive(*configuration)):
+        if not _same(before[unit, key], value):
+            found.setdefault(unit, {})[key] = value
+    return found
+
+
+def _wanted(drive: Drive) -> list[tuple[str, tuple[tuple[str, Entry], Value]]]:
+    return [(unit, ((key, entry), value)) for unit in UNITS
+            for key, (entry, value) in build(unit, drive).settings().items()
+            if key not in ('external', 'torque.external')]
+
+
+def _same(one: Any, other: Any) -> bool:
+    if isinstance(one, (list, tuple)):
+        return list(one) == list(other)
+    return bool(one == other)
+
+
+def preview(values: Mapping[str, Any], span_s: float, points: int = 600) -> dict[str, Any]:
+    """
+    Return a test signal as the drive would play it.
+
+    Parameters
+    ----------
+    values
+        of `Waveform` by name, SI; those that are not given are the defaults
+    span_s
+        how much of it [s]
+    points
+        how many intervals
+
+    Returns
+    -------
+    `span` [s]; `low` and `high`, least and greatest value in each interval
+
+    Raises
+    ------
+    ParameterError : a value is not allowed
+
+    """
+    allowed = dict(entries(Waveform))
+    checked: dict[str, Any] = {**check_changes(values, allowed)}
+    waveform = Waveform(**checked)
+    check_waveform(waveform, 'preview')
+    within = 8
+    time = np.linspace(0.0, span_s, points * within, endpoint=False)
+    bits = signal_generator.prbs_bits() if waveform.waveform == 'prbs' else np.ones(1)
+    value = np.empty(time.size)
+    signal_generator.values(time, record_of(waveform)[0], bits, value)
+    parts = value.reshape(points, within)
+    return {'span': span_s, 'low': parts.min(axis=1).tolist(), 'high': parts.max(axis=1).tolist()}

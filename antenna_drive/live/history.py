@@ -1,0 +1,210 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The last minute of every signal as least and greatest value of short intervals.
+
+A strip chart of a thousand pixels cannot show sixty thousand samples. Of each interval the least
+and the greatest value are kept, so no peak is lost. Memory does not grow. Nothing here needs ROS.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import struct
+from threading import Lock
+from typing import Any, NamedTuple
+
+from antenna_drive.lockstep.frame import HEADER, LARGEST_RUN, NO_RUN
+from antenna_drive.physics.arrays import FloatArray
+import numpy as np
+
+# Length of an interval [s of simulated time], if the macro-step is not longer.
+INTERVAL_S = 0.01
+# How many are kept: one minute.
+KEPT = 6000
+
+# A step this far ahead of the last one was not made by the drive.
+_FARTHEST = 100_000
+
+_RUN, _STEP, _STEP_S = range(len(HEADER))
+# kind, number of intervals, number of signals, a reserve; run, number of the first interval, its
+# length [s], time of the last step [s], macro-step [s]
+_PACKED = struct.Struct('<4I5d')
+SAMPLES = 1
+
+
+class Piece(NamedTuple):
+    """
+    A part of the history: intervals that follow each other.
+
+    Attributes
+    ----------
+    run, first, interval_s, time_s, step_s : the run, the number of the first interval, the length
+        of one [s], the time of the last step [s], the macro-step [s]
+    resume : number of the first interval that may still change: ask for it again
+    lows, highs : shape (intervals, signals), NaN where nothing was received
+    now : the last value of each signal, shape (signals,)
+
+    """
+
+    run: int
+    first: int
+    interval_s: float
+    time_s: float
+    step_s: float
+    resume: int
+    lows: FloatArray
+    highs: FloatArray
+    now: FloatArray
+
+    def packed(self) -> bytes:
+        """Return the bytes that the page reads: a header, then numbers of four bytes."""
+        intervals, signals = self.lows.shape
+        return _PACKED.pack(SAMPLES, intervals, signals, 0, float(self.run), float(self.first),
+                            self.interval_s, self.time_s, self.step_s) + b''.join(
+            part.astype('<f4').tobytes() for part in (self.lows, self.highs, self.now))
+
+
+class History:
+    """
+    Takes the frames of the units in any portions, from one thread; gives pieces to any other.
+
+    Attributes
+    ----------
+    lost : steps of any unit that were missed after the first that was received
+
+    """
+
+    def __init__(self, signals: Mapping[str, int], conductor: str) -> None:
+        """
+        Begin with no run.
+
+        Parameters
+        ----------
+        signals
+            how many signals each unit puts out, in the order of the columns
+        conductor
+            the unit whose frames tell the run
+
+        """
+        self._columns: dict[str, slice] = {}
+        first = 0
+        for unit, count in signals.items():
+            self._columns[unit] = slice(first, first + count)
+            first += count
+        self._conductor = conductor
+        self._lock = Lock()
+        self._lows = np.full((KEPT, first), np.nan)
+        self._highs = self._lows.copy()
+        self._now = np.full(first, np.nan)
+        self._early: dict[str, FloatArray] = {}
+        self.lost = 0
+        self._begin(0, 1e-3)
+
+    def _begin(self, run: int, step_s: float) -> None:
+        self._run, self._step_s = run, step_s
+        self._per = max(1, round(INTERVAL_S / step_s))
+        self._newest = -1
+        self._last = dict.fromkeys(self._columns, -1)
+        self._lows[:] = np.nan
+        self._highs[:] = np.nan
+
+    @property
+    def run(self) -> int:
+        """Return the run in progress, 0 for none."""
+        return self._run
+
+    def take(self, unit: str, frames: FloatArray) -> None:
+        """
+        Take frames of a unit in the order in which they were sent.
+
+        Parameters
+        ----------
+        frames
+            rows of a `FrameLayout`: header, then value and derivative of each signal; what is
+            not finite or of another run is left out
+
+        """
+        with self._lock:
+            early = self._early.pop(unit, None)
+            if early is not None:
+                frames = np.concatenate([early, frames])
+            frames = frames[np.isfinite(frames).all(axis=1)]
+            if unit == self._conductor:
+                runs = frames[_plausible(frames)]
+                if len(runs) and int(runs[-1, _RUN]) != self._run:
+                    self._begin(int(runs[-1, _RUN]), float(runs[-1, _STEP_S]))
+            mine = frames[frames[:, _RUN] == self._run]
+            if unit != self._conductor and early is None and len(mine) < len(frames):
+                # of a run that the conductor's frames, which are read first, did not tell yet
+                self._early[unit] = frames[frames[:, _RUN] > self._run]
+            if self._run and len(mine):
+                self._file(unit, mine)
+
+    def _file(self, unit: str, frames: FloatArray) -> None:
+        last = self._last[unit]
+        steps = frames[:, _STEP].astype(np.int64)
+        fresh = (steps > last) & (frames[:, _STEP] < LARGEST_RUN)
+        if last >= 0:
+            fresh &= steps <= last + _FARTHEST
+        # in order: what somebody else puts in between is left out
+        fresh &= steps >= np.maximum.accumulate(np.where(fresh, steps, -1))
+        steps, values = steps[fresh], frames[fresh, len(HEADER)::2]
+        if not len(steps):
+            return
+        known = np.diff(steps, prepend=last if last >= 0 else steps[0] - 1)
+        self.lost += int((known - 1)[known > 1].sum())
+        self._last[unit] = int(steps[-1])
+        columns = self._columns[unit]
+        self._now[columns] = values[-1]
+        intervals = steps // self._per
+        begins = np.flatnonzero(np.diff(intervals, prepend=-1))
+        numbers = intervals[begins]
+        self._make_room(int(numbers[-1]))
+        kept = numbers > self._newest - KEPT
+        slots = numbers[kept] % KEPT
+        for ring, least in ((self._lows, np.minimum), (self._highs, np.maximum)):
+            found = least.reduceat(values, begins)[kept]
+            ignore_nan = np.fmin if least is np.minimum else np.fmax
+            ring[slots, columns] = ignore_nan(ring[slots, columns], found)
+
+    def _make_room(self, newest: int) -> None:
+        """Forget the oldest intervals for those up to `newest`."""
+        if newest <= self._newest:
+            return
+        forget = np.arange(max(self._newest + 1, newest - KEPT + 1), newest + 1) % KEPT
+        self._lows[forget] = np.nan
+        self._highs[forget] = np.nan
+        self._newest = newest
+
+    def since(self, run: int, first: int) -> Piece:
+        """
+        Return what is known from interval `first` of `run` on, all that is kept for another run.
+
+        The last interval may still grow: it comes again with the next piece.
+        """
+        with self._lock:
+            last_step = min(self._last.values())
+            last = last_step // self._per
+            first = max(0, first if run == self._run else 0, self._newest - KEPT + 1)
+            slots = np.arange(first, last + 1) % KEPT
+            return Piece(self._run, first, self._per * self._step_s,
+                         max(0, last_step) * self._step_s, self._step_s,
+                         max(first, (last_step + 1) // self._per),
+                         self._lows[slots], self._highs[slots], self._now.copy())
+
+
+def _plausible(frames: FloatArray) -> Any:
+    run, step_s = frames[:, _RUN], frames[:, _STEP_S]
+    return (run > NO_RUN) & (run < LARGEST_RUN) & (run % 1.0 == 0.0) & (step_s > 0.0)

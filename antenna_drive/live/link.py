@@ -1,0 +1,303 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The drive as the page sees it: a ROS 2 node that nobody waits for.
+
+Frames are taken in bulk, twenty times a second, so that the drive is not slowed by a reader that
+wakes for each. Services and everything else are served in a second thread.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+import json
+import os
+from threading import Event, Thread
+import time
+from typing import Any
+
+from antenna_drive.emulator.unit import FloatArray
+from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
+from antenna_drive.errors import UserError
+from antenna_drive.live.board import Board
+from antenna_drive.live.history import History
+from antenna_drive.live.parameter_table import Description, table
+from antenna_drive.lockstep.changes import CHANGES, read_record, SETTINGS
+from antenna_drive.lockstep.entry import choose_transport
+from antenna_drive.lockstep.frame import FrameLayout
+from antenna_drive.lockstep.readings import CHANGES_QOS
+from antenna_drive.lockstep.ros_link import FrameLink
+from antenna_drive.lockstep.run_services import StateReader
+from antenna_drive.lockstep.serving import Serving
+from diagnostic_msgs.msg import DiagnosticArray
+import numpy as np
+from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterEvent, ParameterValue
+from rcl_interfaces.srv import (
+    DescribeParameters, GetParameters, ListParameters, SetParametersAtomically,
+)
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from std_msgs.msg import Float64MultiArray, String
+from std_srvs.srv import Trigger
+
+PERIOD_S = 0.05
+# An answer of a node takes a few milliseconds; a change waits up to five seconds for a step.
+PATIENCE_S = 8.0
+# How many changes the page is told of.
+_REMEMBERED = 60
+
+_UNITS = tuple(OUTPUTS)
+_KINDS = ('', 'bool_value', 'integer_value', 'double_value', 'string_value', 'byte_array_value',
+          'bool_array_value', 'integer_array_value', 'double_array_value', 'string_array_value')
+
+
+class DriveLink:
+    """
+    What can be seen of a drive, and what can be asked of it.
+
+    Attributes
+    ----------
+    history : the signals of the last minute
+    settings : the parameters of each unit as they are in force
+    """
+
+    def __init__(self, board: Board, namespace: str = '', domain_id: int | None = None) -> None:
+        """Join; the drive may come later. News goes to the board."""
+        choose_transport(os.environ)
+        self._board = board
+        self.namespace = '/' + namespace.strip('/') if namespace.strip('/') else ''
+        self._context = Context()
+        self._context.init(args=[], domain_id=domain_id)
+        self._node = Node(f'live_{os.getpid()}', namespace=self.namespace, context=self._context)
+        self._layouts = {unit: FrameLayout(signals) for unit, signals in OUTPUTS.items()}
+        self.history = History({unit: len(signals) for unit, signals in OUTPUTS.items()},
+                               TEST_SIGNAL)
+        self._frames = FrameLink(self._node, self._layouts)
+        self._state = StateReader(self._node, TEST_SIGNAL)
+        self.settings: dict[str, dict[str, Any]] = {unit: {} for unit in _UNITS}
+        self._own: dict[str, dict[str, Any]] = {unit: {} for unit in _UNITS}
+        self._changes: deque[dict[str, Any]] = deque(maxlen=_REMEMBERED)
+        self._count = 0
+        self._reports: dict[str, dict[str, Any]] = {}
+        self._listen()
+        self._clients: dict[tuple[str, str], Any] = {
+            (unit, name): self._node.create_client(kind, f'{unit}/{name}')
+            for unit in _UNITS for name, kind in (
+                ('list_parameters', ListParameters), ('describe_parameters', DescribeParameters),
+                ('get_parameters', GetParameters),
+                ('set_parameters_atomically', SetParametersAtomically))}
+        self._triggers: dict[str, Any] = {
+            name: self._node.create_client(Trigger, f'{TEST_SIGNAL}/{name}')
+            for name in ('pause', 'resume', 'step', 'reset', 'play')}
+        self._stop = Event()
+        self._serving = Serving(self._node)
+        self._thread = Thread(target=self._poll, name='frames', daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Leave the drive."""
+        self._stop.set()
+        self._thread.join()
+        self._serving.close()
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    # ---- what comes in
+
+    def _listen(self) -> None:
+        node = self._node
+        for unit in _UNITS:
+            node.create_subscription(String, f'{unit}/changes', self._of(unit), CHANGES_QOS)
+        node.create_subscription(DiagnosticArray, '/diagnostics', self._diagnosed, 50)
+        node.create_subscription(ParameterEvent, '/parameter_events', self._parameters_set, 100)
+
+    def _of(self, unit: str) -> Callable[[String], None]:
+        return lambda message: self._changed(unit, message.data)
+
+    def _changed(self, unit: str, text: str) -> None:
+        record = read_record(text)
+        if record is None:
+            return
+        if SETTINGS in record:
+            self.settings[unit] = {**record[SETTINGS]}
+            self._board.post(f'values {unit}', {'unit': unit, 'values': record[SETTINGS]})
+            return
+        self.settings[unit].update(record[CHANGES])
+        self._count += 1
+        self._changes.append({'number': self._count, 'unit': unit, 'run': record['run'],
+                              'step': record['step'], 'changes': record[CHANGES]})
+        self._board.post('changes', {'changes': list(self._changes)})
+        self._board.post(f'values {unit}', {'unit': unit, 'values': self.settings[unit]})
+
+    def _parameters_set(self, event: ParameterEvent) -> None:
+        unit = self._unit_of(event.node)
+        if unit is None:
+            return
+        # what is no setting of the unit, as run.pace, is in no record of changes
+        values = {item.name: _plain(item.value) for item in event.changed_parameters}
+        self._own[unit].update(values)
+        self._board.post(f'own {unit}', {'unit': unit, 'values': self._own[unit]})
+
+    def _diagnosed(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            unit = self._unit_of(status.name)
+            if unit is not None:
+                self._reports[unit] = {
+                    'level': ord(status.level), 'message': status.message[:300],
+                    'values': {item.key[:80]: item.value[:200] for item in status.values[:40]},
+                    'heard': time.monotonic()}
+                self._board.post('nodes', {'nodes': self.nodes()})
+
+    def _unit_of(self, full: str) -> str | None:
+        space, _, name = full.rpartition('/')
+        return name if space == self.namespace and name in OUTPUTS else None
+
+    def nodes(self) -> dict[str, Any]:
+        """Return what each node said last of itself, and how long ago [s]."""
+        now = time.monotonic()
+        return {unit: {**report, 'heard': now - report['heard']}
+                for unit, report in dict(self._reports).items()}
+
+    def _poll(self) -> None:
+        handles = self._frames.handles()[2]
+        told = None
+        while not self._stop.wait(PERIOD_S):
+            for unit, layout in self._layouts.items():
+                frames = _taken(handles[unit], layout)
+                if frames is not None:
+                    self.history.take(unit, frames)
+            state = self._state.latest()
+            if state != told and state is not None:
+                told = state
+                self._board.post('state', state._asdict())
+
+    # ---- what is asked
+
+    async def _ask(self, client: Any, request: Any, who: str) -> Any:
+        if not client.service_is_ready():
+            raise UserError(f'{who} does not answer: is the drive running?')
+        loop = asyncio.get_running_loop()
+        answered: asyncio.Future[Any] = loop.create_future()
+
+        def done(future: Any) -> None:
+            loop.call_soon_threadsafe(_settle, answered, future)
+
+        client.call_async(request).add_done_callback(done)
+        try:
+            return await asyncio.wait_for(answered, PATIENCE_S)
+        except asyncio.TimeoutError:
+            raise UserError(f'{who} has not answered for {PATIENCE_S:g} s') from None
+
+    def ready(self) -> bool:
+        """Return whether the parameters of every unit can be asked for."""
+        return all(client.service_is_ready() for client in self._clients.values())
+
+    async def load(self, unit: str) -> None:
+        """
+        Ask a unit for its parameters, and post their table.
+
+        Raises
+        ------
+        UserError : it does not answer
+        """
+        listed = await self._ask(self._clients[unit, 'list_parameters'],
+                                 ListParameters.Request(), unit)
+        names = sorted(name for name in listed.result.names
+                       if not name.startswith(('qos_overrides.', 'use_sim_time',
+                                               'start_type_description')))
+        described = await self._ask(self._clients[unit, 'describe_parameters'],
+                                    DescribeParameters.Request(names=names), unit)
+        got = await self._ask(self._clients[unit, 'get_parameters'],
+                              GetParameters.Request(names=names), unit)
+        values = {name: _plain(value) for name, value in zip(names, got.values)}
+        self.settings[unit].update(values)
+        self._board.post(f'parameters {unit}', {
+            'unit': unit, 'entries': table([_description(item) for item in described.descriptors],
+                                           values)})
+
+    async def set(self, unit: str, values: Mapping[str, Any]) -> str:  # noqa: A003
+        """
+        Set parameters of a unit, all or none; return why they are refused, or ''.
+
+        Raises
+        ------
+        UserError : there is no such unit, a value is of no kind, or the node does not answer
+        """
+        if unit not in OUTPUTS:
+            raise UserError(f'{unit}: no such node')
+        result = await self._ask(
+            self._clients[unit, 'set_parameters_atomically'], SetParametersAtomically.Request(
+                parameters=[_message(name, value) for name, value in values.items()]), unit)
+        reason: str = result.result.reason
+        return '' if result.result.successful else reason or 'refused'
+
+    async def trigger(self, service: str) -> tuple[bool, str]:
+        """
+        Call a service of the run control; return whether it is done, and what was said.
+
+        Raises
+        ------
+        UserError : it does not answer
+        """
+        answer = await self._ask(self._triggers[service], Trigger.Request(), TEST_SIGNAL)
+        return bool(answer.success), str(answer.message)
+
+
+def _taken(handle: Any, layout: FrameLayout) -> FloatArray | None:
+    """Return the frames of a unit that wait, shape (n, layout.length); None if there is none."""
+    prefix, size = layout.prefix, len(layout.prefix) + 8 * layout.length
+    numbers = []
+    while (taken := handle.take_message(Float64MultiArray, True)) is not None:
+        message = taken[0]
+        if len(message) == size and message.startswith(prefix):
+            numbers.append(message[len(prefix):])
+    if not numbers:
+        return None
+    return np.frombuffer(b''.join(numbers), '<f8').reshape(-1, layout.length)
+
+
+def _settle(answered: asyncio.Future[Any], future: Any) -> None:
+    if not answered.done():
+        if future.exception() is not None:
+            answered.set_exception(UserError(str(future.exception())))
+        else:
+            answered.set_result(future.result())
+
+
+def _plain(value: ParameterValue) -> Any:
+    if not 0 < value.type < len(_KINDS):
+        return None
+    found = getattr(value, _KINDS[value.type])
+    return list(found) if value.type >= 5 else found
+
+
+def _message(name: str, value: Any) -> ParameterMessage:
+    if isinstance(value, (list, tuple)) and not all(isinstance(item, str) for item in value):
+        value = [float(item) for item in value]
+    if not isinstance(value, (bool, int, float, str, list, tuple)):
+        raise UserError(f'{name}: {json.dumps(value)[:80]} given, allowed is a value')
+    return Parameter(name, value=value).to_parameter_msg()
+
+
+def _description(given: Any) -> Description:
+    low: float | None = None
+    high: float | None = None
+    ranges: Sequence[Any] = [*given.floating_point_range, *given.integer_range]
+    for item in ranges:
+        low, high = float(item.from_value), float(item.to_value)
+    return Description(given.name, given.description, given.additional_constraints,
+                       given.read_only, low, high, bool(given.integer_range))

@@ -1,0 +1,110 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The page from start to end: drive, link, server, and an orderly end at Ctrl-C."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+import secrets
+import signal
+import sys
+from typing import Any
+import webbrowser
+
+from antenna_drive.errors import UserError
+from antenna_drive.live.board import Board
+from antenna_drive.live.link import DriveLink
+from antenna_drive.live.own_processes import OwnDrive, Recorder
+from antenna_drive.live.server import Server
+from antenna_drive.live.session import Session
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the command was told; see `antenna-drive live --help`."""
+
+    join: bool = False
+    namespace: str = ''
+    experiment: str | None = None
+    config: tuple[str, ...] = ()
+    parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    pace: float = 1.0
+    out: Path = Path('recordings')
+    port: int = 0
+    host: str = ''
+    token: str = ''
+    open_page: bool = False
+
+
+def serve(options: Options) -> int:
+    """
+    Serve the page until SIGINT or SIGTERM.
+
+    Returns
+    -------
+    0
+
+    Raises
+    ------
+    UserError : the port is taken, a configuration or a namespace is not allowed
+    """
+    return asyncio.run(_serve(options))
+
+
+async def _serve(options: Options) -> int:
+    ended = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, ended.set)
+    own = None if options.join else OwnDrive(options.config, options.parameters,
+                                             options.namespace, options.pace)
+    try:
+        if own is not None:
+            own.start(options.experiment)  # it takes longest
+        board = Board()
+        try:
+            link = DriveLink(board, options.namespace)
+        except ValueError as error:  # rclpy names what is wrong with a namespace
+            raise UserError(f'--namespace {options.namespace}: {error}') from error
+        session = Session(link, board, Recorder(options.out, options.namespace), own,
+                          options.experiment)
+        try:
+            await _serve_session(options, session, ended)
+        finally:
+            await session.close()
+    finally:
+        if own is not None:
+            own.stop()
+    return 0
+
+
+async def _serve_session(options: Options, session: Session, ended: asyncio.Event) -> None:
+    token = (options.token or secrets.token_urlsafe(24)) if options.host else ''
+    server = Server(session, options.host, options.port, token)
+    looking = asyncio.ensure_future(session.look_after())
+    whose = 'a drive that runs' if options.join else 'a drive of its own'
+    print(f'{server.url}  shows {whose}; Ctrl-C ends it', flush=True)
+    if options.open_page:
+        webbrowser.open(server.url)
+    waiting = asyncio.ensure_future(ended.wait())
+    await asyncio.wait({waiting, looking}, return_when=asyncio.FIRST_COMPLETED)
+    waiting.cancel()
+    looking.cancel()
+    print('ending', file=sys.stderr, flush=True)
+    await server.close()
+    if looking.done() and not looking.cancelled():
+        looking.result()  # it never returns: this raises what went wrong

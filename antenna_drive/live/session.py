@@ -1,0 +1,229 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What a page may ask, and what is done about it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from antenna_drive.article.experiments import experiments
+from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
+from antenna_drive.errors import UserError
+from antenna_drive.live.board import Board
+from antenna_drive.live.experiment_buttons import listed, plan, preview
+from antenna_drive.live.link import DriveLink
+from antenna_drive.live.loading import recordings_in, thinned
+from antenna_drive.live.own_processes import off_the_loop, OwnDrive, Recorder
+from antenna_drive.parameters.schema import ParameterError
+from antenna_drive.recording.files import read_recording
+from antenna_drive.recording.panels import PANELS
+from antenna_drive.recording.sheet_signal import settings_of
+
+# How often nodes are looked after [s].
+_LOOK_S = 0.5
+_LONGEST_SPAN_S = 600.0
+_RUN_SERVICES = ('pause', 'resume', 'step', 'reset')
+
+
+class Session:
+    """
+    One drive, its recorder, and every page that is open.
+
+    `ask` raises UserError for what is refused; the message is for the page.
+    """
+
+    def __init__(self, link: DriveLink, board: Board, recorder: Recorder,
+                 own: OwnDrive | None = None, experiment: str | None = None) -> None:
+        """
+        Serve a drive.
+
+        Parameters
+        ----------
+        link, board, recorder
+            the drive, what pages are told, who records
+        own
+            the drive's processes if they are ours; None for a drive that was joined
+        experiment
+            the experiment that was started
+        """
+        self.link, self.board = link, board
+        self._recorder, self._own = recorder, own
+        self._restarting = asyncio.Lock()
+        self._tables: set[str] = set()
+        self._acts: dict[str, Callable[[Mapping[str, Any]], Awaitable[Any]]] = {
+            'set': self._set, 'run': self._run, 'experiment': self._experiment,
+            'preview': self._preview, 'record': self._record, 'load': self._load,
+            'recordings': self._recordings, 'play': self._play}
+        board.post('hello', {
+            'signals': [{'name': f'{unit}/{signal.name}', 'unit': signal.unit,
+                         'text': signal.description}
+                        for unit, signals in OUTPUTS.items() for signal in signals],
+            'panels': [{'title': panel.title, 'unit': panel.unit, 'factor': panel.factor,
+                        'names': list(panel.names)} for panel in PANELS],
+            'own': own is not None, 'namespace': link.namespace or '/',
+            'experiments': listed(), 'units': list(OUTPUTS)})
+        self._tell_experiment(experiment)
+        self._tell_recorder()
+        board.post('drive', {'trouble': '', 'ready': False})
+
+    def _tell_experiment(self, name: str | None) -> None:
+        self.board.post('experiment', {'name': name})
+
+    def _tell_recorder(self) -> None:
+        recorder = self._recorder
+        self.board.post('recorder', {
+            'running': recorder.running, 'path': str(recorder.path or ''), 'said': recorder.said,
+            'folder': str(recorder.folder), 'bytes': recorder.size() if recorder.path else 0})
+
+    async def look_after(self) -> None:
+        """Ask new nodes for their parameters, and notice what has ended; never returns."""
+        was_recording, run = False, 0
+        while True:
+            await asyncio.sleep(_LOOK_S)
+            trouble = self._own.trouble() if self._own and not self._restarting.locked() else ''
+            ready = self.link.ready()
+            if not ready or self.link.history.run != run:
+                # nodes that were started again may have other constants
+                run = self.link.history.run
+                self._tables.clear()
+            if ready and not trouble:
+                for unit in [name for name in OUTPUTS if name not in self._tables]:
+                    try:
+                        await self.link.load(unit)
+                        self._tables.add(unit)
+                    except UserError:
+                        break  # it may be starting: the next look asks again
+            self.board.post('drive', {
+                'trouble': trouble, 'ready': ready and len(self._tables) == len(OUTPUTS),
+                'lost': self.link.history.lost})
+            if was_recording and not self._recorder.running:
+                await off_the_loop(self._recorder.stop)  # it has ended by itself
+            if was_recording or self._recorder.running:
+                self._tell_recorder()
+            was_recording = self._recorder.running
+
+    async def ask(self, message: Mapping[str, Any]) -> Any:
+        """
+        Do what a page asks.
+
+        Returns
+        -------
+        plain data for the answer, None for none
+
+        Raises
+        ------
+        UserError : it is refused or makes no sense; the message says why
+        """
+        act = self._acts.get(str(message.get('do')))
+        if act is None:
+            raise UserError(f'{str(message.get("do"))[:40]}: no such request')
+        return await act(message)
+
+    async def _set(self, message: Mapping[str, Any]) -> None:
+        refusal = await self.link.set(_text(message, 'unit'), _mapping(message, 'values'))
+        if refusal:
+            raise UserError(refusal)
+        if message['unit'] == TEST_SIGNAL and not all(
+                name.startswith('run.') for name in message['values']):
+            self._tell_experiment(None)  # what was published is of another test signal
+
+    async def _run(self, message: Mapping[str, Any]) -> str:
+        service = _text(message, 'service')
+        if service not in _RUN_SERVICES:
+            raise UserError(f'{service}: no such service')
+        if service == 'step' and 'steps' in message:
+            await self._set({'unit': TEST_SIGNAL, 'values': {'run.steps': message['steps']}})
+        done, said = await self.link.trigger(service)
+        if not done:
+            raise UserError(said)
+        return said
+
+    async def _experiment(self, message: Mapping[str, Any]) -> str:
+        name = _text(message, 'name')
+        if name not in experiments():
+            raise UserError(f'{name}: no such experiment')
+        own = self._own
+        found = plan(name, self.link.settings, own.config if own else ())
+        if found.constants and own is None:
+            unit, keys = next(iter(found.constants.items()))
+            raise UserError(
+                f'{name} needs other constants in {unit} ({", ".join(keys)}), which are fixed '
+                f'while it runs: start the drive with config {experiments()[name].circuit}')
+        async with self._restarting:
+            if found.constants and own is not None:
+                self._tables.clear()
+                await off_the_loop(own.stop)
+                own.start(name)
+                said = 'the drive is started again with the constants of this experiment'
+            else:
+                for unit, values in found.live.items():
+                    await self._set({'unit': unit, 'values': values})
+                await self._run({'service': 'reset'})
+                said = 'a new run has begun'
+        self._tell_experiment(name)
+        return said
+
+    async def _preview(self, message: Mapping[str, Any]) -> Any:
+        span = message.get('span')
+        if not isinstance(span, (int, float)) or not 0.0 < span <= _LONGEST_SPAN_S:
+            raise UserError('span: allowed is a time up to 600 s')
+        return preview(_mapping(message, 'values'), float(span))
+
+    async def _play(self, message: Mapping[str, Any]) -> str:
+        path = Path(_text(message, 'path')).expanduser()
+        settings = await off_the_loop(settings_of, path)
+        await self._set({'unit': TEST_SIGNAL, 'values': settings})
+        self._tell_experiment(None)
+        return await self._run({'service': 'reset'})
+
+    async def _record(self, message: Mapping[str, Any]) -> str:
+        if message.get('on'):
+            path = self._recorder.start(str(message.get('name') or ''))
+            self._tell_recorder()
+            return str(path)
+        await off_the_loop(self._recorder.stop)
+        self._tell_recorder()
+        return self._recorder.said
+
+    async def _recordings(self, message: Mapping[str, Any]) -> list[str]:
+        found: list[str] = await off_the_loop(recordings_in, self._recorder.folder)
+        return found
+
+    async def _load(self, message: Mapping[str, Any]) -> Any:
+        path = Path(_text(message, 'path')).expanduser()
+        return await off_the_loop(lambda: thinned(read_recording(path, partial=True), path))
+
+    async def close(self) -> None:
+        """End what was started."""
+        await off_the_loop(self._recorder.stop)
+        if self._own is not None:
+            await off_the_loop(self._own.stop)
+        await off_the_loop(self.link.close)
+
+
+def _text(message: Mapping[str, Any], key: str) -> str:
+    value = message.get(key)
+    if not isinstance(value, str) or not value:
+        raise UserError(f'{key}: is missing')
+    return value
+
+
+def _mapping(message: Mapping[str, Any], key: str) -> dict[str, Any]:
+    value = message.get(key)
+    if not isinstance(value, dict) or not value:
+        raise ParameterError(f'{key}: is missing')
+    return value

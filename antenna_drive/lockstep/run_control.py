@@ -1,0 +1,196 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The state of a run as an operator controls it: playing, paused, stopped. Nothing here needs ROS.
+
+The states and what `pause`, `step` and `reset` mean are those of simulation_interfaces
+(SimulationState, StepSimulation, ResetSimulation); docs/lockstep.md says where they differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import json
+from threading import Condition
+from typing import Any, NamedTuple
+
+from antenna_drive.lockstep.frame import LARGEST_RUN
+
+STOPPED, PLAYING, PAUSED = 'stopped', 'playing', 'paused'
+STATES = (STOPPED, PLAYING, PAUSED)
+
+# Longer texts are no state.
+_LONGEST_TEXT = 200
+
+
+class RunState(NamedTuple):
+    """
+    What a conductor says of its run.
+
+    Attributes
+    ----------
+    state : one of STATES
+    run, step : the run, 0 if there is none yet, and its last step that was made
+
+    """
+
+    state: str
+    run: int
+    step: int
+
+    def text(self) -> str:
+        """Return the JSON that `read_state` reads."""
+        return json.dumps(self._asdict())
+
+    def __str__(self) -> str:
+        """Say the state in words."""
+        return f'{self.state} at step {self.step} of run {self.run}' if self.run else self.state
+
+
+def read_state(text: str) -> RunState | None:
+    """Return the state that a text holds, None if it holds none: anybody can publish anything."""
+    if len(text) > _LONGEST_TEXT:
+        return None
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(found, dict) or found.keys() != set(RunState._fields):
+        return None
+    state = RunState(**found)
+    return state if (state.state in STATES and _is_count(state.run)
+                     and _is_count(state.step)) else None
+
+
+def _is_count(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < LARGEST_RUN
+
+
+class RunControl:
+    """
+    Requests to a run, from the threads that ask to the lock-step thread.
+
+    The lock-step thread asks `holds` before each step and tells what has come of it with
+    `stands`, `begun` and `ended`. The methods that ask return why the request is refused, or ''
+    when it is in force.
+    """
+
+    def __init__(self, patience_s: float) -> None:
+        """Let requests wait for the lock-step thread for this long [s]."""
+        self._patience_s = patience_s
+        self._changed = Condition()
+        self._paused = False
+        self._until = 0
+        self._standing: int | None = None
+        self._begun = 0
+        self._reset = False
+
+    @property
+    def paused(self) -> bool:
+        """Return whether the drive is paused or on its way there."""
+        return self._paused
+
+    @property
+    def halt(self) -> int:
+        """Return the step after which a stepping drive is paused again, 0 for none."""
+        return self._until if self._paused else 0
+
+    @property
+    def reset_wanted(self) -> bool:
+        """Return whether a new run was asked for."""
+        return self._reset
+
+    def holds(self, step: int) -> bool:
+        """Return whether no step is to be made after `step`."""
+        return self._paused and step >= self._until
+
+    def stands(self, step: int) -> bool:
+        """Note that the drive stands still at `step`; return whether that is news."""
+        if self._standing == step:
+            return False
+        with self._changed:
+            if not self.holds(step):  # asked to go on just now
+                return False
+            self._standing = step
+            self._changed.notify_all()
+        return True
+
+    def begun(self) -> None:
+        """Note that a run has begun: a paused drive stands still at its step 0."""
+        with self._changed:
+            self._reset = False
+            self._until = 0
+            self._standing = None
+            self._begun += 1
+            self._changed.notify_all()
+
+    def pause(self, wake: Callable[[], None]) -> str:
+        """
+        Make no more steps; return when the drive stands still.
+
+        Parameters
+        ----------
+        wake
+            makes the lock-step thread look
+
+        """
+        with self._changed:
+            if not self._paused:
+                self._paused = True
+                self._standing = None
+            self._until = 0
+            return self._wait(wake, lambda: self._standing is not None, 'come to its next step')
+
+    def resume(self) -> str:
+        """Go on with the run."""
+        with self._changed:
+            if not self._paused:
+                return 'the drive is not paused'
+            self._paused = False
+            self._standing = None
+        return ''
+
+    def step(self, count: int, wake: Callable[[], None], patience_s: float) -> str:
+        """
+        Make some steps of a paused run; return when they are made or after `patience_s` [s].
+
+        Parameters
+        ----------
+        count
+            how many
+        wake, patience_s
+            see `pause`; after that time the steps go on to be made
+
+        """
+        with self._changed:
+            if not self._paused or self._standing is None:
+                return 'steps can be made in a paused run only: call pause first'
+            self._until = self._standing + count
+            self._standing = None
+            wake()
+            self._changed.wait_for(lambda: self._standing is not None, patience_s)
+        return ''
+
+    def reset(self, wake: Callable[[], None]) -> str:
+        """Begin a new run; return when it has begun. A paused drive stays paused."""
+        with self._changed:
+            before = self._begun
+            self._reset = True
+            return self._wait(wake, lambda: self._begun > before, 'heard from all its nodes')
+
+    def _wait(self, wake: Callable[[], None], done: Callable[[], bool], what: str) -> str:
+        wake()
+        if self._changed.wait_for(done, self._patience_s):
+            return ''
+        return f'the drive has not {what} for {self._patience_s:g} s; it will when it can'

@@ -1,0 +1,195 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The page in a real browser, beside a real drive: open, click, drag, and see the drive follow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from antenna_drive.recording.files import read_recording
+from chromium import EXECUTABLE, Page
+import pytest
+
+pytest.importorskip('rclpy', reason='rclpy is not installed: no drive to look at')
+pytest.importorskip('tornado', reason='tornado is not installed: no page')
+
+from live_command import LiveCommand  # noqa: E402, I100
+
+pytestmark = pytest.mark.skipif(EXECUTABLE is None, reason='there is no Chromium '
+                                                           '(apt-get install chromium)')
+# Eq. (9): the greatest bias voltage is this times the bias pot [V].
+FULL_BIAS_V = 13.0
+SAMPLES = 'antennaDrive.samples'
+STATE = 'document.getElementById("state").textContent'
+BIAS_POT = '[data-name="bias_pot"]'
+
+
+@pytest.fixture(scope='module')
+def live(module_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[LiveCommand]:
+    """Return the command with a drive of its own, which all tests of this file share."""
+    with LiveCommand(tmp_path_factory.mktemp('live'), module_domain) as command:
+        yield command
+
+
+@pytest.fixture(scope='module')
+def opened(live: LiveCommand, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    """Return the page with its first curves."""
+    with Page(tmp_path_factory.mktemp('profile')) as browser:
+        browser.open(live.url)
+        browser.until(f'{SAMPLES}.time > 0.2 && {STATE} === "playing"')
+        browser.until(f'document.querySelector(\'{BIAS_POT} input[type="range"]\')')
+        yield browser
+
+
+@pytest.fixture
+def page(opened: Page, live: LiveCommand) -> Iterator[Page]:
+    """Return the page, wide and on its first tab; in the end nobody has complained."""
+    opened.look(1400, 900)
+    opened.click('#tab-tune')
+    opened.tell('document.activeElement.blur()')
+    yield opened
+    assert opened.complaints == []
+    assert all(url.startswith((live.url, 'data:')) for url in opened.requests)
+
+
+def last_change(page: Page) -> Any:
+    """Return what the run's record of changes says last, as the Nodes tab shows it."""
+    return page.tell('document.querySelector("#nodes table:nth-of-type(2) td")?.textContent || ""')
+
+
+def test_curves_and_numbers_move(page: Page) -> None:
+    for signal in ('test_signal/rate_command', 'motor_1/current', 'plant/encoder'):
+        text = f'document.querySelector(\'#diagram [data-signal="{signal}"]\').textContent'
+        before = page.until(f'{text} !== "–" && {text}')
+        page.until(f'{text} !== {before!r}')
+    page.until("""(() => { const drawn = [...document.querySelectorAll('.chart canvas')];
+        return drawn.length === 5 && drawn.every(canvas => {
+          const all = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+          return new Set(new Uint32Array(all.data.buffer)).size > 20; }); })()""")
+
+
+def test_a_slider_that_is_dragged_turns_the_drive(page: Page) -> None:
+    slider = f'{BIAS_POT} input[type="range"]'
+    value = f'Number(document.querySelector({slider!r}).value)'
+    page.mouse('mousePressed', *page.place(slider, page.tell(value)), button='left', clickCount=1)
+    for share in (0.7, 0.6, 0.5):
+        page.mouse('mouseMoved', *page.place(slider, share), button='left', buttons=1)
+    page.mouse('mouseReleased', *page.place(slider, 0.5), button='left', clickCount=1)
+    pot = page.until(f'{value} > 0.4 && {value} < 0.6 && {value}')
+    page.until(f'antennaDrive.charts.changes.at(-1)?.changes.bias_pot === {pot}')
+    change = page.tell('antennaDrive.charts.changes.at(-1)')
+    assert change['unit'] == 'torque_share'
+    assert last_change(page) == f'torque_share.bias_pot = {pot:g}'
+    greatest = f"""(() => {{ const s = {SAMPLES};
+        const column = s.names.get('torque_share/bias_voltage');
+        const first = Math.ceil(({change['step']} + 1) * s.step / s.interval) + 1;
+        if (s.newest < first + 300) return 0;
+        let most = -Infinity;
+        for (let i = first; i <= s.newest; i++) {{
+          const high = s.highs[i % 6000 * s.count + column];
+          if (high > most) most = high;
+        }}
+        return most; }})()"""
+    assert page.until(greatest) == pytest.approx(FULL_BIAS_V * pot, rel=1e-6)
+
+
+def test_a_value_that_the_node_refuses_is_shown_with_its_reason(page: Page) -> None:
+    field = f'document.querySelector(\'{BIAS_POT} input[type="number"]\')'
+    before = page.tell(f'{field}.value')
+    page.tell(f'{field}.value = "2"; {field}.dispatchEvent(new Event("change"))')
+    reason = page.until(f'document.querySelector("{BIAS_POT.replace(chr(34), chr(39))} '
+                        '.refused").textContent')
+    assert 'bias_pot' in reason and '2' in reason
+    page.until(f'{field}.value === {before!r}')
+
+
+def test_the_keyboard_pauses_steps_and_goes_on(page: Page) -> None:
+    page.key(' ')
+    step = f'Math.round({SAMPLES}.time / {SAMPLES}.step)'
+    page.until(f'{STATE} === "paused" && antennaDrive.run.at === {step}')
+    before = page.tell(step)
+    page.tell('document.getElementById("steps").value = 7')
+    page.key('.')
+    page.until(f'antennaDrive.run.at > {before} && antennaDrive.run.at === {step}')
+    assert page.tell(step) == before + 7
+    assert page.tell(STATE) == 'paused'
+    page.key(' ')
+    page.until(f'{STATE} === "playing" && {step} > {before + 100}')
+
+
+def test_a_test_signal_is_seen_before_it_is_played(page: Page) -> None:
+    page.click('#tab-signal')
+    form = '[data-signal="rate"]'
+    page.until(f'document.querySelector(\'{form} [data-name="waveform"] select\')')
+    page.tell(f'(() => {{ const s = document.querySelector(\'{form} [data-name="waveform"] '
+              'select\'); s.value = "sine"; s.dispatchEvent(new Event("change")); })()')
+    page.until(f'document.querySelector(\'{form} p\').textContent.includes("-0.685 to 0.685 deg")')
+    assert page.tell(f'document.querySelector(\'{form} [data-name="bit_time"]\').hidden')
+    page.click(f'{form} button.main')
+    page.until('antennaDrive.charts.changes.at(-1)?.changes.waveform === "sine"')
+    page.until(f"document.querySelector('{form} button.main').disabled")
+
+
+def test_an_experiment_starts_the_drive_as_in_the_article(page: Page) -> None:
+    run = page.tell(f'{SAMPLES}.run')
+    page.click('#tab-article')
+    page.click('.cards button:first-child')
+    # five processes end and five others start
+    page.until(f'{SAMPLES}.run > {run} && {SAMPLES}.time > 0.5 && {STATE} === "playing"', 240.0)
+    page.until('document.querySelector(".cards button").getAttribute("aria-pressed") === "true"')
+    claims = page.tell('document.querySelector("#article table").textContent')
+    assert '193' in claims, 'Section IV: 193 deg/s'
+    assert page.tell('antennaDrive.charts.levels.length') == 4
+    page.until(f'Math.abs({SAMPLES}.last("test_signal/rate_command") * 180 / Math.PI)'
+               '.toFixed(6) === "0.013000"')
+
+
+def test_a_recording_is_made_and_drawn_beside_the_live_curves(page: Page) -> None:
+    page.click('#tab-tapes')
+    page.tell('document.getElementById("record-name").value = "from_the_page"')
+    page.click('#record')
+    page.until('document.getElementById("record").getAttribute("aria-pressed") === "true"')
+    page.until('/[1-9]/.test(document.getElementById("record").textContent)')
+    page.click('#record')
+    page.until('document.getElementById("record").getAttribute("aria-pressed") === "false"')
+    said = page.until('/steps recorded to/.exec(document.querySelector("#tapes p").textContent)'
+                      '?.input')
+    path = Path(said.rpartition(' to ')[2])
+    recorded = read_recording(path)
+    assert path.name == 'from_the_page'
+    assert len(recorded['torque_share/bias_voltage']) > 10
+    page.tell(f'document.querySelector("#tapes input[list]").value = {str(path)!r}')
+    page.click('#tapes input[list] + datalist + button')
+    page.until('antennaDrive.charts.tape?.name === "from_the_page"')
+    assert page.tell('antennaDrive.charts.tape.duration') == pytest.approx(recorded.duration_s)
+
+
+@pytest.mark.parametrize('dark', [False, True], ids=['light', 'dark'])
+@pytest.mark.parametrize('width', [1400, 768, 390])
+def test_nothing_is_cut_off(page: Page, width: int, dark: bool) -> None:
+    page.look(width, 900, dark)
+    for tab in ('tune', 'signal', 'article', 'tapes', 'nodes'):
+        page.tell(f'document.getElementById("tab-{tab}").click()')
+        page.until(f'!document.getElementById("{tab}").hidden')
+        assert page.until('document.documentElement.scrollWidth') <= width
+        cut = page.tell(f"""[...document.querySelectorAll('header button, header *, #{tab} *')]
+            .filter(e => e.getClientRects().length && !e.closest('datalist'))
+            .filter(e => {{ const b = e.getBoundingClientRect();
+                            return b.left < -1 || b.right > innerWidth + 1; }})
+            .map(e => e.outerHTML.slice(0, 80))""")
+        assert cut == []
+    paper = page.tell('getComputedStyle(document.body).backgroundColor')
+    assert (paper == 'rgb(20, 23, 26)') == dark

@@ -1,0 +1,57 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Make the pictures of the live page in docs/: python test/live_pictures.py docs/figures.
+
+They show the saw-tooth test on the new circuit, in the browser of the tests.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+import sys
+import tempfile
+
+from antenna_drive.campaign.domains import DomainClaim
+from chromium import Page
+from live_command import LiveCommand
+
+# Name, width and height of the window, dark, and the tab that is open.
+PICTURES = (('live.png', 1400, 900, False, 'tune'), ('live_768.png', 768, 1024, False, 'tune'),
+            ('live_390.png', 390, 844, True, 'tune'))
+# How much of the test the charts show [s].
+LENGTH_S = 31.0
+
+
+def main(folder: Path) -> None:
+    """Write every picture into a folder."""
+    claim = DomainClaim()
+    with tempfile.TemporaryDirectory() as scratch, \
+            LiveCommand(Path(scratch), claim.number) as live, \
+            Page(Path(scratch, 'profile')) as page:
+        page.open(live.url)
+        page.until(f'antennaDrive.samples.time > {LENGTH_S}', 600.0)
+        page.tell('(() => { const s = document.getElementById("span"); s.value = 30;'
+                  ' s.dispatchEvent(new Event("change")); })()')
+        for name, width, height, dark, tab in PICTURES:
+            page.look(width, height, dark)
+            page.tell(f'document.getElementById("tab-{tab}").click()')
+            arrived = page.tell('antennaDrive.samples.arrived')
+            page.until(f'antennaDrive.samples.arrived > {arrived + 10}')
+            page.picture(folder / name)
+    claim.release()
+
+
+if __name__ == '__main__':
+    main(Path(sys.argv[1]))
