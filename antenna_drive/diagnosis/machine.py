@@ -26,6 +26,8 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 import math
+from types import MappingProxyType
+from typing import Any
 
 from antenna_drive.diagnosis.diagram import Diagram
 import numpy as np
@@ -258,6 +260,7 @@ class Machine(ABC):
     diagram : picture of the machine for the page; None for a block for each component
     advice : tests that settle what is open: names of effects without their component (empty for
         any), and what to record
+    planning : what the design of a further test must know of the tests, as plain data
 
     """
 
@@ -268,6 +271,7 @@ class Machine(ABC):
     notes: Sequence[str] = ()
     diagram: Diagram | None = None
     advice: Sequence[tuple[Sequence[str], str]] = ()
+    planning: Mapping[str, Any] = MappingProxyType({})
 
     def __init__(self, experiments: Iterable[Experiment], nuisances: Iterable[Parameter] = (),
                  effects: Iterable[Effect] = ()) -> None:
@@ -400,6 +404,20 @@ class Machine(ABC):
     def typical_form(self, effect: Effect) -> Form:
         """Return the form of an effect by which planned tests are judged."""
         return effect.forms[0]
+
+    def form_named(self, effect: Effect, name: str) -> Form:
+        """
+        Return the form of an effect by its name.
+
+        Raises
+        ------
+        KeyError : the effect has no such form
+
+        """
+        for form in effect.forms:
+            if form.name == name:
+                return form
+        raise KeyError(f'{effect.id}: {name}')
 
     def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
         """Return the form of an effect's part that corresponds to a form of the effect."""

@@ -273,6 +273,16 @@ class ConfusabilitySettings:
 
 
 @dataclass(frozen=True)
+class PlanningSettings:
+    """Which answers of a verdict a further test is to tell apart."""
+
+    rivals: int = _setting(5, '1', 'greatest number of rivals')
+    least_probability: float = _setting(
+        0.005, '1', 'probability of an answer from which it is a rival')
+    passes: int = _setting(1, '1', "fresh derivatives of a rival's fit to another's readings")
+
+
+@dataclass(frozen=True)
 class Settings:
     """All thresholds of a diagnosis."""
 
@@ -286,6 +296,7 @@ class Settings:
     localisation: LocalisationSettings = LocalisationSettings()
     held_out: HeldOutSettings = HeldOutSettings()
     confusability: ConfusabilitySettings = ConfusabilitySettings()
+    planning: PlanningSettings = PlanningSettings()
 
     def entries(self) -> Iterator[tuple[str, Field[Any], Any]]:
         """Yield each threshold: 'group.name', its field (see `metadata`), its value."""

@@ -29,7 +29,7 @@ from typing import Any, ClassVar, get_args, get_type_hints
 from antenna_drive.errors import one_line
 from antenna_drive.parameters.plain_yaml import read_yaml
 from antenna_drive.parameters.schema import Entry, mapping_of, ParameterError
-from antenna_drive.parameters.sets import SINES_LIMIT
+from antenna_drive.parameters.sets import KNOTS_LIMIT, SINES_LIMIT
 import yaml
 
 FILE_NAME = 'test_sheet.yaml'
@@ -125,7 +125,16 @@ class Chirp:
     start_s: float | None = _entry('s', 'when it begins')
 
 
-Waveform = Square | Triangle | Multisine | Chirp
+@dataclass(frozen=True)
+class Knots:
+    """Straight lines between points, zero outside of them; two points of one time are a jump."""
+
+    kind: ClassVar[str] = 'knots'
+    times_s: tuple[float, ...] | None = _numbers('s', 'time of each point, ascending', 0.0)
+    rates_deg_s: tuple[float, ...] | None = _numbers('deg/s', 'rate command at each point')
+
+
+Waveform = Square | Triangle | Multisine | Chirp | Knots
 
 
 @dataclass(frozen=True)
@@ -231,9 +240,10 @@ def _parse(key: str, tree: object, classes: tuple[type, ...]) -> Any:
             if not isinstance(value, list):
                 raise ParameterError(f'{full}: {one_line(repr(value))} given, allowed is '
                                      'a list of numbers')
-            if len(value) > SINES_LIMIT:
+            most = KNOTS_LIMIT if chosen is Knots else SINES_LIMIT
+            if len(value) > most:
                 raise ParameterError(f'{full}: {len(value)} numbers given, '
-                                     f'allowed are up to {SINES_LIMIT}')
+                                     f'allowed are up to {most}')
             content[name] = tuple(metadata['each'].check(f'{full}[{i}]', plain_value(item))
                                   for i, item in enumerate(value))
         else:
@@ -241,7 +251,7 @@ def _parse(key: str, tree: object, classes: tuple[type, ...]) -> Any:
             content[name] = _parse(full, value, parts)
     lengths = {name: len(value) for name, value in content.items() if isinstance(value, tuple)}
     if len(set(lengths.values())) > 1:
-        raise ParameterError(f'{key}: {lengths} values given, allowed is one of each per sine')
+        raise ParameterError(f'{key}: {lengths} values given, allowed is the same number of each')
     return chosen(**content)
 
 

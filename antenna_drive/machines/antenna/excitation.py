@@ -78,6 +78,12 @@ def test_signal_of(waveform: sheets.Waveform) -> Waveform:
         kind = 'square' if isinstance(waveform, sheets.Square) else 'saw_tooth'
         return Waveform(waveform=kind, amplitude=amplitude, period=waveform.period_s or 1.0,
                         phase=waveform.phase or 0.0)
+    if isinstance(waveform, sheets.Knots):
+        rates = np.array(waveform.rates_deg_s or (0.0,))
+        greatest = float(np.abs(rates).max()) or 1.0
+        return Waveform(waveform='knots', amplitude=greatest * DEGREE,
+                        knot_times=waveform.times_s or (0.0,),
+                        knot_values=tuple((rates / greatest).tolist()))
     start = waveform.start_s or 0.0
     if isinstance(waveform, sheets.Multisine):
         return Waveform(waveform='multisine', amplitude=amplitude, start_after=start,
@@ -112,6 +118,9 @@ class SheetCommand:
             first = 0.0 if isinstance(w, sheets.Square) else 0.25
             turns = np.arange(np.floor(phase) - 1.0, end / period + phase + 1.0, 0.5) + first
             times = (turns - phase) * period
+            return times[(times > 0.0) & (times < end)]
+        if isinstance(w, sheets.Knots):
+            times = np.unique(w.times_s or ())
             return times[(times > 0.0) & (times < end)]
         edges = [w.start_s or 0.0]
         if isinstance(w, sheets.Chirp):
