@@ -90,9 +90,13 @@ setup(
         'ros': [f'{wheel} ; {WHEELS_EXIST}' for wheel in KILTED],
         'plot': ['matplotlib >= 3.6'],
         'calibrate': ['cma >= 3.2'],
+        'parquet': ['pyarrow >= 10'],
         # trials, studies, calibrations and fleets on a cluster
         'cluster': ['dask[distributed] >= 2024.1'],
         'completion': ['shtab >= 1.6'],
+        # models that people have: `diagnose --model FILE.yaml`
+        'mujoco': ['mujoco >= 3.3'],
+        'fmu': ['fmpy >= 0.3.22'],
         # the first release that can complete a chunk on demand
         'recording': ['mcap >= 1.5'],
         'test': [

@@ -270,6 +270,8 @@ PARTS: dict[str, Callable[[], Iterator[Finding]]] = {
     'calibrate': _libraries('calibrate', 'cma'),
     'cluster': _libraries('cluster', 'distributed'),
     'completion': _libraries('completion', 'shtab'),
+    'mujoco': _libraries('mujoco', 'mujoco'),
+    'fmu': _libraries('fmu', 'fmpy'),
 }
 NEEDED = ('machine', 'files', 'physics', 'pages')
 

@@ -29,6 +29,8 @@ REMEDIES = {
     'cma': 'pip install cma',
     'distributed': "pip install 'dask[distributed]'",
     'shtab': 'pip install shtab',
+    'mujoco': 'pip install mujoco',
+    'fmpy': 'pip install fmpy',
 }
 
 

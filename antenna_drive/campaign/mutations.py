@@ -55,7 +55,11 @@ def run(name: str, options: Mapping[str, Any], rng: random.Random) -> Outcome:
     longest_s = 0.0
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        own = reader(name.rpartition('_')[0], folder)
+        try:
+            own = reader(name.rpartition('_')[0], folder)
+        except ImportError as error:
+            outcome.skipped = f'{error.name} is not installed'
+            return outcome
         path = folder / own.file
         path.write_bytes(own.content)
         own.read(folder)  # or nothing that follows would say anything

@@ -15,7 +15,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 import io
 import json
 from pathlib import Path
@@ -32,13 +32,14 @@ from antenna_drive.machines.servo.bam import read_bam
 from antenna_drive.parameters.files import config_dir
 from antenna_drive.parameters.loading import load
 from antenna_drive.recording.csv_format import read_csv, write_csv
-from antenna_drive.recording.import_map import import_csv, load_map
+from antenna_drive.recording.import_map import import_file, load_map
 from antenna_drive.recording.mcap_format import read_bag, write_bag
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import load_sheet, parse_sheet
 from antenna_drive.trial.sealing import read_manifest
 from antenna_drive.trial.verdict import read_verdict
 import numpy as np
+from scipy.io import savemat
 import yaml
 
 SHEET = """\
@@ -54,6 +55,8 @@ skip_lines: 1
 signals:
   rate_command_rad_s: {column: r, unit: deg/s, sign: -1}
   plant/encoder: {column: e, unit: counts, counts_per_revolution: 4096, clock_offset_s: 0.1}
+  arm/x: {expression: "2 * r - max(e, 0.5) / column(0) ** 0", unit: mm}
+  arm/y: {column: 2, unit: "1", sign_magnitude_bits: 11}
 """
 VERDICT = {
     'verdict': 'explained', 'where': [], 'seconds': 3.0,
@@ -166,12 +169,10 @@ def reader(name: str, folder: Path) -> Reader:
                             lambda path: load_sheet(path / 'sheet.yaml'))
     if name == 'import_map':
         (folder / 'field.csv').write_text('junk\nt,r,e\n0,1,2\n1,3,4\n')
-        return _yaml_reader('map.yaml', MAP.encode(), lambda path: import_csv(
+        return _yaml_reader('map.yaml', MAP.encode(), lambda path: import_file(
             path / 'field.csv', load_map(path / 'map.yaml')))
-    if name == 'import_csv':
-        (folder / 'map.yaml').write_text(MAP)
-        return Reader('field.csv', b'junk\nt,r,e\n0,1,2\n1,3,4\n2,3,4\n', lambda path: import_csv(
-            path / 'field.csv', load_map(path / 'map.yaml')))
+    if name.startswith('import_'):
+        return _table_reader(name, folder)
     if name == 'configuration':
         return _yaml_reader('own.yaml', (config_dir() / 'new_circuit.yaml').read_bytes() + (
             b'axis: {mode_inertias: {value: [2.6e+6, 1.3e+6, 7.5e+5], unit: kg m^2,\n'
@@ -211,6 +212,41 @@ def _bag_reader(name: str, folder: Path) -> Reader:
                       lambda path: read_bag(path / 'run' / 'run_0.mcap', partial=True))
     return Reader('run/run_0.mcap', bag.read_bytes(),
                   lambda path: read_bag(path / 'run', partial=name == 'bag_part'))
+
+
+def _table_reader(name: str, folder: Path) -> Reader:
+    """Return the reader of a kind of table, each with the same columns."""
+    (folder / 'map.yaml').write_text(MAP)
+    columns = {'t': [0.0, 1.0, 2.0], 'r': [1.0, 3.0, 3.0], 'e': [2.0, 4.0, 4.0]}
+    records = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    out = io.BytesIO()
+    suffix = {'import_lines': 'jsonl'}.get(name, name.removeprefix('import_'))
+    if name == 'import_csv':
+        out.write(b'junk\nt,r,e\n0,1,2\n1,3,4\n2,3,4\n')
+    elif name == 'import_npy':
+        np.save(out, np.array([tuple(row.values()) for row in records],
+                              [(column, float) for column in columns]))
+    elif name == 'import_npz':
+        np.savez_compressed(out, **{  # type: ignore[arg-type]
+            key: np.array(column) for key, column in columns.items()})
+    elif name == 'import_mat':
+        savemat(out, columns, do_compression=True)
+    elif name == 'import_json':
+        out.write(as_json(columns))
+    elif name == 'import_lines':
+        out.write(b'\n'.join(map(as_json, records)))
+    else:
+        _write_parquet(out, columns)
+    file = f'field.{suffix}'
+    tree = columns if name == 'import_json' else None
+    return Reader(file, out.getvalue(), lambda path: import_file(
+        path / file, load_map(path / 'map.yaml')), tree, as_json if tree else None)
+
+
+def _write_parquet(out: io.BytesIO, columns: Mapping[str, Any]) -> None:
+    import pyarrow
+    from pyarrow import parquet
+    parquet.write_table(pyarrow.table(dict(columns)), out)
 
 
 def _frame(layout: FrameLayout, message: bytes) -> tuple[float, ...]:

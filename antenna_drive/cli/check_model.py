@@ -23,6 +23,7 @@ For example:
 
   antenna-drive check-model my_machine.py:machine logs/*.csv
   antenna-drive check-model my_machine.py logs/*.csv --map map.yaml
+  antenna-drive check-model my_machine.yaml logs/*.csv
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ from antenna_drive.cli.reading import warnings_in_one_line
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    parser.add_argument('model', metavar='FILE.py:NAME', help='Python file and name of the model')
+    parser.add_argument('model', metavar='FILE.py:NAME',
+                        help='Python file and name of the model, or a model file FILE.yaml')
     parser.add_argument('logs', nargs='+', type=Path, metavar='LOG.csv', help='logs of its tests')
     parser.add_argument('--map', type=Path, metavar='MAP.yaml',
                         help='which column is which, and how it is written')

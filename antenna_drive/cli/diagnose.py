@@ -39,13 +39,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from antenna_drive.cli.output import (
-    add_json_option, check_options, give, Progress, replaced,
-)
+from antenna_drive.cli.output import add_json_option, check_options, give, Progress, replaced
 from antenna_drive.cli.reading import warnings_in_one_line
 from antenna_drive.errors import UserError
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.recording.files import read_recording
+from antenna_drive.recording.import_map import import_file, load_map
 
 if TYPE_CHECKING:
     from antenna_drive.diagnosis import Diagnosis, Settings
@@ -54,11 +53,13 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     parser.add_argument('recordings', nargs='+', metavar='RECORDING',
-                        help='recordings of one machine: .csv, or bags (folder or .mcap)')
+                        help='recordings of one machine: .csv, bags (folder or .mcap), or with '
+                             '--map any file that docs/recording.md lists')
     parser.add_argument('--model', metavar='FILE.py:NAME',
-                        help='diagnose a machine of your own, in the place of the drive')
+                        help='diagnose a machine of your own in the place of the drive; also '
+                             'FILE.yaml')
     parser.add_argument('--map', type=Path, metavar='MAP.yaml',
-                        help='with --model: which column is which, and how it is written')
+                        help='which column is which, and how it is written')
     parser.add_argument('--config', action='append', default=[], metavar='FILE',
                         help='configuration of the model, a file or the name of a set in '
                              'config/; may be given several times (default: reference)')
@@ -82,9 +83,6 @@ def run(arguments: argparse.Namespace) -> int:
     check_options(arguments, jobs=Entry('', 1, whole=True))
     if arguments.model:
         return _own_machine(arguments)
-    if arguments.map:
-        raise UserError('--map: goes with --model; antenna-drive import --map makes a recording '
-                        'of the drive')
     # the compiled physics takes a while to load: not before it is needed
     from antenna_drive.machines.antenna.diagnose import corrected, diagnose_recordings
     from antenna_drive.parameters.loading import load
@@ -94,11 +92,13 @@ def run(arguments: argparse.Namespace) -> int:
     limits = dict(_numbers('--matters', arguments.matters))
     recordings = {}
     with warnings_in_one_line():
+        import_map = load_map(arguments.map) if arguments.map else None
         for path in arguments.recordings:
             name = Path(path).stem
             while name in recordings:
                 name += '_'
-            recordings[name] = read_recording(path)
+            recordings[name] = (import_file(path, import_map) if import_map
+                                else read_recording(path))
     with Progress('diagnosis', 1.0) as progress:
         diagnosis = diagnose_recordings(
             recordings, drive, lambda share, doing: progress.update(share), arguments.jobs,

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Turn a CSV from the field into a bag that every ROS 2 tool, plotter and command here opens.
+Turn a file from the field into a bag that every ROS 2 tool, plotter and command here opens.
 
 A file with the columns of a field test (time_s, rate_command_rad_s, current_1_A, current_2_A,
 tach_rate_1_rad_s, tach_rate_2_rad_s, encoder_rad, bias_voltage_V) or of `antenna-drive export`
@@ -39,13 +39,15 @@ from pathlib import Path
 
 from antenna_drive.cli.reading import warnings_in_one_line
 from antenna_drive.recording.csv_format import read_csv
-from antenna_drive.recording.import_map import import_csv, load_map
+from antenna_drive.recording.import_map import import_file, load_map
 from antenna_drive.recording.mcap_format import write_bag
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command understands."""
-    parser.add_argument('csv', type=Path, metavar='FIELD.csv', help='the file to read')
+    parser.add_argument('csv', type=Path, metavar='FILE',
+                        help='the file to read: a CSV, or with --map also .npy, .npz, .mat, '
+                             '.json, .jsonl or .parquet')
     parser.add_argument('bag', type=Path, metavar='BAG', help='the folder to write; it must not '
                                                               'be there yet')
     parser.add_argument('--map', type=Path, metavar='MAP.yaml',
@@ -55,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Read the file, write the bag."""
     with warnings_in_one_line():
-        recording = (import_csv(args.csv, load_map(args.map)) if args.map
+        recording = (import_file(args.csv, load_map(args.map)) if args.map
                      else read_csv(args.csv))
     write_bag(recording, args.bag)
     for name, channel in recording.channels.items():

@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
     paths = sorted(folder.glob('*.json'))
     if not paths:
         raise UserError(f'{folder}: holds no *.json logs')
-    tests = [ServoLog.of(path.stem, read_bam(path)) for path in paths]
+    tests = [ServoLog.of(path.stem, read_bam(path), folder) for path in paths]
     splits = tuple(SPLITS) if arguments.split == 'both' else (arguments.split,)
     chosen = directions(tests, splits)
     effort = Effort(arguments.runs, max(20, arguments.runs // 5))

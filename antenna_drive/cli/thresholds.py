@@ -44,7 +44,7 @@ from antenna_drive.diagnosis.verdict import which
 from antenna_drive.errors import UserError
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.trial import sealing
-from antenna_drive.trial.batch import diagnose_case, VERDICT
+from antenna_drive.trial.batch import diagnose_case, machine_of, model_options, VERDICT
 from antenna_drive.trial.scorecard import Case, score
 from antenna_drive.trial.verdict import parse_verdict, read_verdict
 from antenna_drive.workers import workers
@@ -149,7 +149,7 @@ def _run_again(arguments: argparse.Namespace) -> dict[str, Mapping[str, float]]:
                             'them')
         for label, _ in _halved_and_doubled(name, *known[name]):
             wanted[label] = ['--threshold', f'{name}={label.rpartition(" ")[2]}']
-    jobs = [(_linked(folder, label, case).absolute(), options)
+    jobs = [(_linked(folder, label, case).absolute(), options, machine_of(folder, case, manifest))
             for label, options in wanted.items() for case in names]
     with (Progress('diagnoses', len(jobs)) as progress,
           workers(arguments.jobs, arguments.scheduler, threads=True) as pool):
@@ -168,8 +168,9 @@ def _run_again(arguments: argparse.Namespace) -> dict[str, Mapping[str, float]]:
     return found
 
 
-def _diagnose_again(case: Path, options: list[str]) -> bool:
-    return (case / VERDICT).exists() or diagnose_case(case, ['--jobs', '1', *options], math.inf)
+def _diagnose_again(case: Path, options: list[str], machine: str | None) -> bool:
+    return (case / VERDICT).exists() or diagnose_case(
+        case, [*model_options(machine), '--jobs', '1', *options], math.inf)
 
 
 def _linked(folder: Path, label: str, case: str) -> Path:

@@ -34,12 +34,17 @@ lists, and other programmes, lengths, rates and sheets. A fourth recording is ke
 diagnosis, in DIR/kept/case_0001/rec_d.csv. docs/trial.md has the sizes. --family b draws other
 forms, outsiders and programmes, to report on only.
 
+With --machine joint, --machine axis or both, the machines are a robot joint and a linear axis.
+Each is diagnosed with a model of one's own (docs/own-machine.md). Their cases always have the
+imperfections of a wild one.
+
 With --scheduler, the workers of a cluster make and diagnose the cases. DIR must lie on a disk
 that they all have under the same path.
 
 For example:
   antenna-drive trial --cases 200 --seed 7 --out trial7 --diagnose && antenna-drive score trial7
   antenna-drive trial --wild --cases 20 --seed 7 --out wild7 --diagnose
+  antenna-drive trial --machine joint --machine axis --cases 60 --seed 7 --out other7 --diagnose
 """
 
 from __future__ import annotations
@@ -55,10 +60,12 @@ from antenna_drive.errors import UserError
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.trial import batch, sealing
 from antenna_drive.trial.family import FAMILIES
+from antenna_drive.trial.others.machines import MACHINES
 
 RATES_HZ = (50.0, 500.0)
 USUAL_RATE_HZ = 200.0
 LARGEST_TOLERANCE = 0.05
+USUAL_TOLERANCE = 0.02
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -70,9 +77,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              'was tuned on')
     parser.add_argument('--out', type=Path, required=True, metavar='DIR',
                         help='folder of the trial')
-    parser.add_argument('--tolerance', type=float, default=0.02, metavar='T',
+    parser.add_argument('--machine', action='append', choices=('antenna', *MACHINES),
+                        help='machine of the cases (default: antenna); joint and axis may be '
+                             'given both, and take turns')
+    parser.add_argument('--tolerance', type=float, metavar='T',
                         help='largest relative deviation of each parameter from the reference, '
-                             f'0 to {LARGEST_TOLERANCE} (default %(default)s)')
+                             f'0 to {LARGEST_TOLERANCE} (default {USUAL_TOLERANCE})')
     parser.add_argument('--sample-rate', type=float, metavar='HZ',
                         help='mean sample rate of the recordings, 50 to 500 '
                              f'(default {USUAL_RATE_HZ:g}; a wild case draws its own)')
@@ -92,9 +102,11 @@ def run(arguments: argparse.Namespace) -> int:
     """Make the cases and diagnose them if requested; 1 if a diagnosis failed."""
     _check(arguments)
     folder = arguments.out
-    manifest = batch.prepare(folder, arguments.cases, arguments.seed, arguments.tolerance,
-                             arguments.sample_rate or USUAL_RATE_HZ, batch.DURATION_S,
-                             wild=arguments.wild, family=arguments.family)
+    manifest = batch.prepare(
+        folder, arguments.cases, arguments.seed,
+        USUAL_TOLERANCE if arguments.tolerance is None else arguments.tolerance,
+        arguments.sample_rate or USUAL_RATE_HZ, batch.DURATION_S, wild=arguments.wild,
+        family=arguments.family, machines=_others(arguments))
     print(f'{folder}: {arguments.cases} truths sealed, manifest '
           f'{sealing.manifest_seal(manifest)}', flush=True)
     with Progress('recordings', arguments.cases, quiet=arguments.quiet) as progress:
@@ -118,11 +130,24 @@ def run(arguments: argparse.Namespace) -> int:
     return 1 if failures else 0
 
 
+def _others(arguments: argparse.Namespace) -> list[str]:
+    """Return the machines of the trial other than the antenna, each once."""
+    return [name for name in MACHINES if name in (arguments.machine or ())]
+
+
 def _check(arguments: argparse.Namespace) -> None:
     check_options(
         arguments, cases=Entry('', 1, whole=True), seed=Entry('', 0, whole=True),
         jobs=Entry('', 1, whole=True), tolerance=Entry('1', 0.0, LARGEST_TOLERANCE),
         sample_rate=Entry('Hz', *RATES_HZ), time_limit=Entry('s', 1e-3))
+    if _others(arguments):
+        for option, value in (('--wild', arguments.wild), ('--family b', arguments.family != 'a'),
+                              ('--tolerance', arguments.tolerance is not None),
+                              ('--sample-rate', arguments.sample_rate is not None),
+                              ('--machine antenna', 'antenna' in arguments.machine)):
+            if value:
+                raise UserError(f'{option}: does not go with --machine '
+                                f'{_others(arguments)[0]}; leave it out')
     if arguments.family != 'a' and not arguments.wild:
         raise UserError(f'--family {arguments.family}: its cases are wild; give --wild as well')
     if arguments.wild and arguments.sample_rate is not None:

@@ -17,6 +17,7 @@ The engine of the diagnosis: where a machine and its model part, why, and how fa
 This is its public face; machines import nothing else of it.
 """
 
+from antenna_drive.diagnosis.by_label import ByLabel, without_labels
 from antenna_drive.diagnosis.check import check_machine, idle_effects, MachineError
 from antenna_drive.diagnosis.confusability import Confusability, confusability
 from antenna_drive.diagnosis.diagnosis import diagnose, Diagnosis, Progress
@@ -34,9 +35,9 @@ from antenna_drive.diagnosis.settings import DEFAULT, Settings
 from antenna_drive.diagnosis.unknown_input import courses
 
 __all__ = [
-    'check_machine', 'Colour', 'Confusability', 'confusability', 'Course', 'courses', 'DEFAULT',
-    'diagnose', 'Diagnosis', 'Diagram', 'DiagramBlock', 'DisturbanceInput', 'Effect', 'Evidence',
-    'Experiment', 'FloatArray', 'Form', 'Hypothesis', 'idle_effects', 'LeastSquares', 'Machine',
-    'MachineError', 'Motion', 'Parameter', 'Point', 'Progress', 'rank_hypotheses', 'Ranking',
-    'Regimes', 'Settings', 'TimeScales',
+    'ByLabel', 'check_machine', 'Colour', 'Confusability', 'confusability', 'Course', 'courses',
+    'DEFAULT', 'diagnose', 'Diagnosis', 'Diagram', 'DiagramBlock', 'DisturbanceInput', 'Effect',
+    'Evidence', 'Experiment', 'FloatArray', 'Form', 'Hypothesis', 'idle_effects', 'LeastSquares',
+    'Machine', 'MachineError', 'Motion', 'Parameter', 'Point', 'Progress', 'rank_hypotheses',
+    'Ranking', 'Regimes', 'Settings', 'TimeScales', 'without_labels',
 ]

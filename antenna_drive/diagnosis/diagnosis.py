@@ -27,6 +27,7 @@ import time
 from typing import Any
 
 from antenna_drive.diagnosis import localisation, unknown_input, verdict
+from antenna_drive.diagnosis.by_label import by_label
 from antenna_drive.diagnosis.check import check_machine
 from antenna_drive.diagnosis.confusability import could_hide
 from antenna_drive.diagnosis.elimination import backward_elimination, forward_selection
@@ -34,6 +35,9 @@ from antenna_drive.diagnosis.evidence import Evidence
 from antenna_drive.diagnosis.held_out import held_out, refuted
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.intervals import inflation, values_with_intervals
+from antenna_drive.diagnosis.interventions import (
+    interventions, lines as lines_of_labels, simplified,
+)
 from antenna_drive.diagnosis.lack_of_fit import lack_of_fit, remains, residual_tests
 from antenna_drive.diagnosis.least_squares import LeastSquares
 from antenna_drive.diagnosis.machine import Machine
@@ -66,7 +70,8 @@ class Diagnosis:
     Attributes
     ----------
     result : the JSON of docs/diagnosis.md, as plain data
-    machine : that was compared, with the noise of the motion that was found
+    machine : that was compared, with the noise of the motion that was found; where tests carry
+        labels, a `by_label.ByLabel` around it
     none, best : the hypotheses without and with the likeliest effects
 
     """
@@ -98,6 +103,7 @@ class Diagnosis:
             lines.append(f'  what is not named most likely enters as {place["name"]}, which could '
                          f'explain {100.0 * place["explained"]:.0f} % of the gap')
         lines += [f'  {line}' for line in _closed(result)]
+        lines += [f'  {line}' for line in lines_of_labels(result.get('labels', ()))]
         lines += [f'  also seen: {item["effect"]}, {_why_small(item)}'
                   for item in result['also_seen']]
         lines += [f'  remains: {line}' for line in _remainders(result['remains'])]
@@ -177,7 +183,7 @@ def diagnose(machine: Machine, progress: Progress = lambda share, doing: None, t
     check_machine(machine)
     # whole fits run side by side: their matrices need no threads of their own
     with threadpool_limits(1, 'blas') if threadpool_limits else nullcontext():
-        return _diagnose(machine, progress, threads, settings, limits or {})
+        return _diagnose(by_label(machine), progress, threads, settings, limits or {})
 
 
 def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Settings,
@@ -189,6 +195,7 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         search, *backward_elimination(search, search.run(), settings), settings)
     # the noise is that of the motion that was found
     problem = search.whole
+    hypotheses, best = simplified(problem, hypotheses, best)
     none, best = hypotheses[0], best.with_jacobian(problem)
     progress(0.9, 'withheld data')
     reach = held_out(problem, none, best, threads)
@@ -232,6 +239,8 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         'seconds': time.monotonic() - began,
         'notes': notes,
     }
+    if labels := interventions(problem, none, best, threads):
+        result['labels'] = labels
     progress(1.0, 'done')
     return Diagnosis(result, problem.machine, none, best)
 

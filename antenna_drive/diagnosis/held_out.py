@@ -82,8 +82,8 @@ class _Fold:
     covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
 
-def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis,
-             threads: int = 1) -> dict[str, Any]:
+def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads: int = 1,
+             groups: Sequence[str] | None = None, what: str = _TURNS) -> dict[str, Any]:
     """
     Return the gap before and after, on data whose effect is withheld, for the JSON.
 
@@ -95,10 +95,14 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis,
         the hypotheses without and with the likeliest effects, as fitted to the whole tests
     threads
         how many tests are withheld at once
+    groups
+        of each test; the tests of a group are withheld together. None if each is its own
+    what
+        is withheld, for people
 
     """
     single = len(problem.experiments) == 1
-    judge = _Judge(problem, none, best)
+    judge = _Judge(problem, none, best, groups or [e.name for e in problem.experiments])
     with ThreadPoolExecutor(threads) as pool:
         folds = list(pool.map(judge.second_half if single else judge.withheld,
                               range(len(problem.experiments))))
@@ -117,7 +121,7 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis,
             'value': fraction, 'ci95': interval, 'bounds': list(BOUNDS),
             'reason': None if known else _reason(folds), 'interval': _INTERVAL},
         'per_signal': _per_signal(problem, counted, known or not best.effects),
-        'held_out': _HALVES if single else _TURNS,
+        'held_out': _HALVES if single else what,
         'folds': [{'withheld': fold.name, 'judged': list(fold.judged),
                    'cannot_be_judged': dict(fold.reasons)} for fold in folds],
         'training_began_at': [
@@ -163,9 +167,11 @@ def _per_signal(problem: LeastSquares, folds: Sequence[_Fold], known: bool) -> d
 class _Judge:
     """Judges a hypothesis on each test in turn."""
 
-    def __init__(self, problem: LeastSquares, none: Hypothesis, best: Hypothesis) -> None:
+    def __init__(self, problem: LeastSquares, none: Hypothesis, best: Hypothesis,
+                 groups: Sequence[str]) -> None:
         """Take the derivatives at the model as configured and at both optima."""
         self._problem = problem
+        self._groups = groups
         self._settings: Settings = problem.settings
         none, best = (h.with_jacobian(problem) for h in (none, best))
         self._none, self._best = none, best
@@ -236,11 +242,22 @@ class _Judge:
                                        f'{ratio:.1f} standard deviations')
         return reasons, spread
 
+    def _unseen_labels(self, testing: Part, training: Part) -> dict[str, str]:
+        """Return the reasons why effects cannot be judged whose label training does not have."""
+        [test] = testing.experiments
+        reasons = {}
+        for effect, form in zip(self._best.effects, self._best.forms, strict=True):
+            for key, value in {p.label for p in form.parameters if p.label}:
+                if test.labels.get(key, '') == value and not any(
+                        e.labels.get(key, '') == value for e in training.experiments):
+                    reasons[effect] = f'no other test has the label {key}: {value}'
+        return reasons
+
     # -- judging -------------------------------------------------------------------------------
 
     def withheld(self, k: int) -> _Fold:
         """Judge on test k what the other tests have taught."""
-        machine, count = self._problem.machine, len(self._problem.experiments)
+        machine, groups = self._problem.machine, self._groups
         testing = Part(machine, [k])
         state = self._fitted(testing, self._none.state.parameters, {}, self._none.state.point(),
                              self._without)
@@ -251,9 +268,10 @@ class _Judge:
         fold = self._fold(k, _gap(testing, state.point()), bare.residuals_of(state, 0))
         if not self._best.effects:
             return fold
-        part = Part(machine, [i for i in range(count) if i != k])
+        part = Part(machine, [i for i, group in enumerate(groups) if group != groups[k]])
         problem, unaided, found = self._trained(part)
         reasons, spread = self._undetermined(problem, unaided, found)
+        reasons = {**reasons, **self._unseen_labels(testing, part)}
         fold = replace(fold, reasons=reasons)
         judged = self._judged(reasons)
         if not judged:

@@ -37,7 +37,9 @@ from antenna_drive.diagnosis.machine import FloatArray, Parameter
 from antenna_drive.diagnosis.settings import IntervalSettings
 import numpy as np
 
-_TWO_SIDED_95 = 1.96
+TWO_SIDED_95 = 1.96
+# Share of a variance that data of single precision can account for.
+_BY_DATA = 1e-6
 
 
 def inflation(problem: LeastSquares, state: FitState) -> FloatArray:
@@ -54,6 +56,30 @@ def inflation(problem: LeastSquares, state: FitState) -> FloatArray:
         of a fit that has converged, with its Jacobian
 
     """
+    spread = covariance(state, 1.0, problem.settings.interval)
+    return _inflation(problem, state, spread)
+
+
+def contrast_deviation(problem: LeastSquares, state: FitState, contrast: FloatArray) -> float:
+    """
+    Return the standard deviation of a sum of fitted values, robust to dependent residuals.
+
+    Parameters
+    ----------
+    problem, state
+        as in `inflation`
+    contrast
+        factor of each value in the sum, shape (m,)
+
+    """
+    settings = problem.settings.interval
+    along = covariance(state, 1.0, settings) @ contrast[:, np.newaxis]
+    [inflated] = _inflation(problem, state, along)
+    return float(np.sqrt(contrast @ covariance(state, float(inflated), settings) @ contrast))
+
+
+def _inflation(problem: LeastSquares, state: FitState, spread: FloatArray) -> FloatArray:
+    """Return the inflation along the columns of a product with the covariance, shape (k,)."""
     jacobian, weight = state.jacobian, state.weight
     block_s = problem.machine.time_scales.block_s
     labels = np.concatenate([
@@ -62,10 +88,12 @@ def inflation(problem: LeastSquares, state: FitState) -> FloatArray:
     starts = np.flatnonzero(np.diff(labels, prepend=-1.0))
     scores = np.add.reduceat(
         jacobian * (weight * state.residual).astype(np.float32)[:, np.newaxis], starts, axis=0)
-    spread = covariance(state, 1.0, problem.settings.interval)
     found = np.sum(np.square(scores.astype(float) @ spread), axis=0)
     independent = np.sum((state.hessian @ spread) * spread, axis=0)
-    return np.asarray(np.maximum(found / np.maximum(independent, 1e-30), 1.0))
+    prior = proper_precision(state.parameters) @ np.square(spread)
+    # a value that priors alone determine has no scatter to compare
+    by_data = independent > _BY_DATA * (independent + prior)
+    return np.where(by_data, np.maximum(found / np.where(by_data, independent, 1.0), 1.0), 1.0)
 
 
 def covariance(state: FitState, inflated: float, settings: IntervalSettings) -> FloatArray:
@@ -121,8 +149,8 @@ def values_with_intervals(hypothesis: Hypothesis, inflated: Callable[[str], floa
     for parameter, value in hypothesis.values:
         place = names.index(parameter.name)
         variance = _covariance(state, known / inflated(parameter.name))[place, place]
-        half_width = _TWO_SIDED_95 * math.hypot(
-            float(variance) ** 0.5, _same_number(parameter, value),
+        half_width = TWO_SIDED_95 * math.hypot(
+            float(variance) ** 0.5, same_number(parameter, value),
             settings.model_error * value)
         found[parameter.name] = {
             'value': value, 'ci95': [max(value - half_width, parameter.low),
@@ -131,7 +159,7 @@ def values_with_intervals(hypothesis: Hypothesis, inflated: Callable[[str], floa
     return found
 
 
-def _same_number(parameter: Parameter, value: float) -> float:
+def same_number(parameter: Parameter, value: float) -> float:
     """
     Return the standard deviation that the tolerance of the same number adds to a change.
 

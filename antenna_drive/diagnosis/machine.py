@@ -56,6 +56,7 @@ class Parameter:
     start : where a fit begins
     is_shape : True for a shape parameter, which has no meaning while its effect is absent
     tolerance : size up to which the model's number may be off without being wrong
+    label : key and value of the label of the tests that it acts on; None for all
 
     """
 
@@ -70,6 +71,7 @@ class Parameter:
     start: float = 0.0
     is_shape: bool = False
     tolerance: float = 0.0
+    label: tuple[str, str] | None = field(default=None, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -181,6 +183,7 @@ class Experiment:
     model_error : slow error that the model may have in each signal however right it is, shape
         (c,), in the signals' units; None for a usual share of the motion
     colours : of the noise, one for each signal, as a diagnosis finds it; empty for white noise
+    labels : what was different in this test, such as load: A; see `interventions`
 
     """
 
@@ -193,6 +196,7 @@ class Experiment:
     quantised: tuple[str, ...] = ()
     model_error: FloatArray | None = None
     colours: tuple[Colour, ...] = ()
+    labels: Mapping[str, str] = field(default_factory=dict)
 
     def model_error_of(self, channel: int, share: float) -> float:
         """Return the model's error in a signal; by default a share of the signal's spread."""

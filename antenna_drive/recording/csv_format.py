@@ -74,11 +74,13 @@ class Cell(NamedTuple):
     path: Path
     line: int
     column: str
+    counted: str = 'line'
 
     def refuse(self, problem: str) -> RecordingError:
         """Return the error that names the place."""
         column = one_line(self.column, 60)
-        return RecordingError(f'{self.path}: line {self.line}, column {column}: {problem}')
+        return RecordingError(
+            f'{self.path}: {self.counted} {self.line}, column {column}: {problem}')
 
 
 def parse_number(text: str, cell: Cell) -> float:

@@ -33,6 +33,7 @@ from antenna_drive.parameters.sets import KNOTS_LIMIT, SINES_LIMIT
 import yaml
 
 FILE_NAME = 'test_sheet.yaml'
+LONGEST_LABEL = 60
 
 
 def _entry(unit: str, description: str, low: float = -math.inf, high: float = math.inf,
@@ -185,6 +186,7 @@ class TestSheet:
     sensors : how good the sensors are
     parameter_tolerance : how far the machine's parameters may lie from the configuration [1]
     tolerances : the same for zeros, recorders and clocks
+    labels : names and values of what was different in this test, such as load: A
 
     """
 
@@ -199,6 +201,7 @@ class TestSheet:
     sensors: Sensors | None = None
     parameter_tolerance: float | None = _entry('1', 'relative tolerance', 0.0, 1.0)
     tolerances: Tolerances | None = None
+    labels: tuple[tuple[str, str], ...] | None = field(default=None, metadata={'labels': True})
 
     def __bool__(self) -> bool:
         """Tell whether anything is known."""
@@ -234,7 +237,9 @@ def _parse(key: str, tree: object, classes: tuple[type, ...]) -> Any:
         if value is None:
             continue
         metadata = known[name].metadata
-        if 'entry' in metadata:
+        if 'labels' in metadata:
+            content[name] = parse_labels(full, value)
+        elif 'entry' in metadata:
             content[name] = metadata['entry'].check(full, plain_value(value))
         elif 'each' in metadata:
             if not isinstance(value, list):
@@ -249,10 +254,34 @@ def _parse(key: str, tree: object, classes: tuple[type, ...]) -> Any:
         else:
             parts = tuple(c for c in get_args(types[name]) if c is not type(None))
             content[name] = _parse(full, value, parts)
-    lengths = {name: len(value) for name, value in content.items() if isinstance(value, tuple)}
+    lengths = {name: len(value) for name, value in content.items()
+               if 'each' in known[name].metadata}
     if len(set(lengths.values())) > 1:
         raise ParameterError(f'{key}: {lengths} values given, allowed is the same number of each')
     return chosen(**content)
+
+
+def parse_labels(key: str, tree: object) -> tuple[tuple[str, str], ...]:
+    """
+    Read the labels of a test: what was different in it, such as load: A.
+
+    YAML reads on and off as truth values; here they are words again.
+
+    Raises
+    ------
+    ParameterError : no mapping from short names to short texts or numbers
+
+    """
+    found = {}
+    for name, given in mapping_of(key, tree).items():
+        value = {True: 'on', False: 'off'}[given] if isinstance(given, bool) else str(
+            plain_value(given))
+        if not (isinstance(name, str) and isinstance(given, (str, int, float)) and all(
+                0 < len(text) <= LONGEST_LABEL for text in (name, value))):
+            raise ParameterError(f'{key}.{one_line(name)}: {one_line(repr(value), 40)} given, '
+                                 f'allowed is a text of up to {LONGEST_LABEL} characters')
+        found[one_line(name)] = value
+    return tuple(found.items())
 
 
 def plain_value(value: object) -> object:
@@ -275,7 +304,9 @@ def sheet_tree(sheet: Any) -> dict[str, Any]:
         value = getattr(sheet, item.name)
         if value is None:
             continue
-        if is_dataclass(value):
+        if 'labels' in item.metadata:
+            tree[item.name] = dict(value)
+        elif is_dataclass(value):
             tree[item.name] = sheet_tree(value)
         else:
             tree[item.name] = list(value) if isinstance(value, tuple) else value

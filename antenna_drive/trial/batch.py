@@ -33,6 +33,8 @@ from antenna_drive.errors import UserError
 from antenna_drive.subcommand import run_command
 from antenna_drive.trial import sealing
 from antenna_drive.trial.cases import draw_truths, make_recording, Truth
+from antenna_drive.trial.others import cases as others
+from antenna_drive.trial.others.machines import kind_of
 from antenna_drive.trial.programme import RECORDINGS
 from antenna_drive.trial.real_antenna import FloatArray
 from antenna_drive.trial.sensors import COLUMNS
@@ -55,7 +57,8 @@ Done = Callable[[int, int], None]
 
 
 def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: float,
-            duration: float, *, wild: bool = False, family: str = 'a') -> dict[str, Any]:
+            duration: float, *, wild: bool = False, family: str = 'a',
+            machines: Sequence[str] = ()) -> dict[str, Any]:
     """
     Draw and seal the truths of a trial, unless they are sealed already.
 
@@ -65,6 +68,9 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
         of the trial
     count, seed, tolerance, sample_rate, duration, wild, family
         as in `cases.draw_truths`
+    machines
+        other machines than the antenna, as in `others.cases.draw_truths`; of the entries above,
+        only `count` and `seed` are then used
 
     Returns
     -------
@@ -75,11 +81,14 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
     UserError : the folder holds a trial with other settings
 
     """
-    settings: dict[str, Any] = {'cases': count, 'seed': seed, 'tolerance': tolerance}
-    if wild:
-        settings |= {'wild': True, 'family': family}
+    settings: dict[str, Any] = {'cases': count, 'seed': seed}
+    if machines:
+        settings |= {'machines': list(machines)}
+    elif wild:
+        settings |= {'tolerance': tolerance, 'wild': True, 'family': family}
     else:
-        settings |= {'sample_rate_hz': sample_rate, 'duration_s': duration}
+        settings |= {'tolerance': tolerance, 'sample_rate_hz': sample_rate,
+                     'duration_s': duration}
     if (folder / sealing.MANIFEST).exists():
         manifest = sealing.read_manifest(folder)
         if manifest['settings'] != settings:
@@ -90,16 +99,20 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
             raise UserError(f'{folder}: holds a trial with {"; ".join(differing)}; '
                             'give the same settings to resume it, or another --out')
         return manifest
-    truths = draw_truths(count, seed, tolerance, sample_rate=sample_rate, duration=duration,
-                         wild=wild, family=family)
+    if machines:
+        truths = others.draw_truths(count, seed, machines)
+    else:
+        truths = draw_truths(count, seed, tolerance, sample_rate=sample_rate, duration=duration,
+                             wild=wild, family=family)
     return sealing.seal(folder, settings, truths)
 
 
-def write_csv(path: Path, columns: dict[str, FloatArray]) -> None:
+def write_csv(path: Path, columns: Mapping[str, FloatArray],
+              formats: Mapping[str, str] = FORMATS) -> None:
     """Write the columns of a recording as CSV with a heading."""
-    formats = ','.join(FORMATS.get(name, USUAL_FORMAT) for name in COLUMNS)
-    rows = zip(*(columns[name].tolist() for name in COLUMNS))
-    lines = [','.join(COLUMNS), *(formats % row for row in rows)]
+    row_format = ','.join(formats.get(name, USUAL_FORMAT) for name in columns)
+    rows = zip(*(values.tolist() for values in columns.values()))
+    lines = [','.join(columns), *(row_format % row for row in rows)]
     path.write_text('\n'.join(lines) + '\n', encoding='utf-8')
 
 
@@ -115,7 +128,7 @@ def make_case(folder: Path, truth: Truth) -> None:
         of the case
 
     """
-    if len(truth['sheets']) > len(RECORDINGS):
+    if len(truth.get('sheets', ())) > len(RECORDINGS):
         (folder / KEPT).mkdir(exist_ok=True)
         _make_folder(folder / KEPT / truth['case'], truth, {len(RECORDINGS): KEPT_BACK})
     _make_folder(folder / truth['case'], truth, dict(enumerate(RECORDINGS)))
@@ -128,7 +141,12 @@ def _make_folder(final: Path, truth: Truth, names: Mapping[int, str]) -> None:
     draft.mkdir()
     try:
         for number, name in names.items():
-            write_csv(draft / f'{name}.csv', make_recording(truth, number))
+            if 'machine' in truth:
+                write_csv(draft / f'{name}.csv', others.make_recording(truth, number),
+                          kind_of(truth['machine']).formats)
+                continue
+            columns = make_recording(truth, number)
+            write_csv(draft / f'{name}.csv', {key: columns[key] for key in COLUMNS})
             given = (truth.get('given_sheets') or truth['sheets'])[number]
             if given is not None:
                 sheet = yaml.safe_dump(given, sort_keys=False, default_flow_style=None)
@@ -206,6 +224,18 @@ def _remove_drafts(folder: Path) -> None:
     """Remove incomplete cases of an interrupted run or of a worker that was killed."""
     for draft in (*folder.glob('.case_*'), *(folder / KEPT).glob('.case_*')):
         shutil.rmtree(draft, ignore_errors=True)
+
+
+def machine_of(folder: Path, name: str, manifest: Mapping[str, Any]) -> str | None:
+    """Return the machine of a case if it is no antenna: a diagnosis is told that much."""
+    if 'machines' not in manifest['settings']:
+        return None
+    return str(sealing.open_truth(folder, name, dict(manifest))['machine'])
+
+
+def model_options(machine: str | None) -> list[str]:
+    """Return the options of a diagnosis that name the model of a machine; None: the antenna."""
+    return [] if machine is None else ['--model', kind_of(machine).model]
 
 
 def diagnose_case(case: Path, options: Sequence[str], limit: float,
@@ -337,7 +367,8 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
     done(complete, len(names))
     late = [(here, here / name, options, limit, path) for name, path in kept.items()
             if path is not None and _unpredicted(folder / name)]
-    tasks = [*late, *((here, here / name, options, limit, kept[name]) for name in wanted)]
+    tasks = [*late, *((here, here / name, options, limit, kept[name],
+                       machine_of(folder, name, manifest)) for name in wanted)]
     with workers(jobs, scheduler, threads=True) as pool:
         for number, result in pool.each(_complete, tasks):
             success = result()
@@ -349,11 +380,11 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
 
 
 def _complete(folder: Path, case: Path, options: Sequence[str], limit: float,
-              kept: Path | None) -> bool:
+              kept: Path | None, machine: str | None = None) -> bool:
     """Do what a case still lacks: its diagnosis, the predictions of what was kept back."""
     _check_seen(folder)
     if not (case / VERDICT).exists():
-        return diagnose_case(case, options, limit, kept)
+        return diagnose_case(case, [*model_options(machine), *options], limit, kept)
     if kept is not None and _unpredicted(case):
         predict_kept(case, options, kept)
     return True

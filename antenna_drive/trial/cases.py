@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 import dataclasses
-from typing import Any
+from typing import Any, TypeVar
 
 from antenna_drive.trial.effect import Defect
 from antenna_drive.trial.family import FAMILIES
@@ -42,6 +42,7 @@ import numpy as np
 MIX = {'single': 0.55, 'pair': 0.15, 'none': 0.15, 'outside': 0.15}
 SMALLEST_IN_PAIR = 0.25     # of the range of sizes: both effects must show
 Truth = dict[str, Any]
+Effect = TypeVar('Effect')
 
 
 def case_name(number: int) -> str:
@@ -77,12 +78,12 @@ def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float =
     """
     forms = FAMILIES[family]
     random = np.random.default_rng([seed, 0])
-    kinds = random.permutation(_kinds(count))
+    kinds = random.permutation(kinds_of(count))
     catalogue = list(forms.catalogue.values())
-    singles = _turns(catalogue, random)
-    firsts, seconds = _turns(catalogue, random), _turns(catalogue, random)
-    outsiders = _turns(list(forms.outside.values()), random)
-    sizes = {kind: iter(_even_sizes(int(np.sum(kinds == kind)), random)) for kind in MIX}
+    singles = turns(catalogue, random)
+    firsts, seconds = turns(catalogue, random), turns(catalogue, random)
+    outsiders = turns(list(forms.outside.values()), random)
+    sizes = {kind: iter(even_sizes(int(np.sum(kinds == kind)), random)) for kind in MIX}
     truths = []
     for number, kind in enumerate(kinds, start=1):
         own = np.random.default_rng([seed, number])
@@ -120,20 +121,21 @@ def _wild_tests(family: str, tolerance: float, random: np.random.Generator) -> d
             'given_sheets': tests.given, 'imperfections': draw_imperfections(random)}
 
 
-def _kinds(count: int) -> list[str]:
+def kinds_of(count: int) -> list[str]:
     """Return the kinds in the proportions of MIX, rounded to a total of `count`."""
     bounds = np.round(np.cumsum([0.0, *MIX.values()]) * count).astype(int)
     return [kind for kind, low, high in zip(MIX, bounds[:-1], bounds[1:])
             for _ in range(high - low)]
 
 
-def _turns(effects: Sequence[Defect], random: np.random.Generator) -> Iterator[Defect]:
+def turns(effects: Sequence[Effect], random: np.random.Generator) -> Iterator[Effect]:
+    """Yield effects in turn and for ever, each round in another order."""
     while True:
         for k in random.permutation(len(effects)):
             yield effects[k]
 
 
-def _even_sizes(count: int, random: np.random.Generator) -> list[float]:
+def even_sizes(count: int, random: np.random.Generator) -> list[float]:
     """Return one size from each of `count` equal slices of 0 to 1, in random order."""
     slices = random.permutation(count)
     return [float(s) for s in (slices + random.uniform(0.0, 1.0, count)) / max(count, 1)]

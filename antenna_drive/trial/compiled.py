@@ -35,7 +35,7 @@ Function = TypeVar('Function', bound=Callable[..., Any])
 
 def _cache_folder() -> Path:
     digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted(Path(__file__).parent.glob('*.py')):
+    for source in sorted(Path(__file__).parent.rglob('*.py')):
         digest.update(source.name.encode() + b'\0' + source.read_bytes() + b'\0')
     home = os.environ.get('XDG_CACHE_HOME') or str(Path('~/.cache').expanduser())
     if not os.access(home if Path(home).exists() else Path(home).parent, os.W_OK):

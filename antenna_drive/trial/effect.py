@@ -15,7 +15,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import math
 from typing import Any
@@ -110,11 +110,29 @@ class Defect:
         value of each quantity by name
 
         """
-        first, *others = self.quantities
-        values = {first.name: first.at(size, random)}
-        for quantity in others:
-            values[quantity.name] = quantity.at(float(random.uniform()), random)
-        return values
+        return drawn(self.quantities, size, random)
+
+
+def drawn(quantities: Sequence[Quantity], size: float,
+          random: np.random.Generator) -> dict[str, float]:
+    """
+    Draw numbers of an effect by name, the first of them at a size and the others uniformly.
+
+    Parameters
+    ----------
+    quantities
+        the first one is the size
+    size
+        0 for just detectable, 1 for strong
+    random
+        source of all other numbers
+
+    """
+    first, *others = quantities
+    values = {first.name: first.at(size, random)}
+    for quantity in others:
+        values[quantity.name] = quantity.at(float(random.uniform()), random)
+    return values
 
 
 def defects(table: Mapping[str, Mapping[str, Any]],

@@ -21,7 +21,7 @@ sheet says, spikes and missing rows. docs/trial.md has the table of their sizes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 import math
 from typing import Any
@@ -59,13 +59,28 @@ USUAL_DURATION_S = 30.0
 Imperfections = Mapping[str, Any]
 
 
+def draw_recorder(delayed: Sequence[str], analogue: Sequence[str],
+                  random: np.random.Generator) -> dict[str, Any]:
+    """Draw what any recorder does: delays and noise of its columns, clock, gaps and spikes."""
+    def between(low: float, high: float) -> float:
+        return float(math.exp(random.uniform(math.log(low), math.log(high))))
+
+    return {
+        'delay_samples': {name: float(random.uniform(0.0, DELAY_SAMPLES)) for name in delayed},
+        'clock_ppm': float(random.uniform(-CLOCK_PPM, CLOCK_PPM)),
+        'clock_drift_ppm_per_min': float(
+            random.uniform(-CLOCK_DRIFT_PPM_PER_MIN, CLOCK_DRIFT_PPM_PER_MIN)),
+        'noise': {name: {'level': between(1.0 / NOISE_LEVEL, NOISE_LEVEL),
+                         'coloured_share': float(random.uniform(0.0, COLOURED_SHARE)),
+                         'corner_hz': between(*CORNER_HZ)} for name in analogue},
+        'missing_share': between(*MISSING_SHARE),
+        'spike_share': between(*SPIKE_SHARE)}
+
+
 def draw_imperfections(random: np.random.Generator) -> dict[str, Any]:
     """Draw the imperfections of one antenna and its recorder."""
     def within(limit: float) -> float:
         return float(random.uniform(-limit, limit))
-
-    def between(low: float, high: float) -> float:
-        return float(math.exp(random.uniform(math.log(low), math.log(high))))
 
     return {
         'tach_zero_rad_s': [within(TACH_ZERO_RAD_S) for _ in range(2)],
@@ -75,14 +90,7 @@ def draw_imperfections(random: np.random.Generator) -> dict[str, Any]:
         'bias_gain': within(RECORDER_GAIN),
         'current_zero_A': [within(CURRENT_ZERO_A) for _ in range(2)],
         'bias_zero_V': within(BIAS_ZERO_V),
-        'delay_samples': {name: float(random.uniform(0.0, DELAY_SAMPLES)) for name in DELAYED},
-        'clock_ppm': within(CLOCK_PPM),
-        'clock_drift_ppm_per_min': within(CLOCK_DRIFT_PPM_PER_MIN),
-        'noise': {name: {'level': between(1.0 / NOISE_LEVEL, NOISE_LEVEL),
-                         'coloured_share': float(random.uniform(0.0, COLOURED_SHARE)),
-                         'corner_hz': between(*CORNER_HZ)} for name in ANALOGUE},
-        'missing_share': between(*MISSING_SHARE),
-        'spike_share': between(*SPIKE_SHARE)}
+        **draw_recorder(DELAYED, ANALOGUE, random)}
 
 
 def apply_imperfections(machine: Records, imperfections: Imperfections) -> None:
@@ -222,7 +230,7 @@ def imperfect_recording(machine: Records, sheet: CaseSheet, imperfections: Imper
     delays = {name: part / rate for name, part in imperfections['delay_samples'].items()}
     history = late_history(machine, sheet, instants, delays, place)
     columns = record(history, machine, sheet.sensors, _clock(stamps, imperfections), random,
-                     _noise(imperfections, rate, random))
+                     recorder_noise(imperfections, rate, random))
     rows = kept_rows(len(stamps), imperfections['missing_share'], random)
     return {name: column[rows] for name, column in columns.items()}
 
@@ -233,7 +241,9 @@ def _clock(stamps: FloatArray, imperfections: Imperfections) -> FloatArray:
     return stamps * (1.0 + 1e-6 * (imperfections['clock_ppm'] + 0.5 * drift * stamps))
 
 
-def _noise(imperfections: Imperfections, rate: float, random: np.random.Generator) -> Noise:
+def recorder_noise(imperfections: Imperfections, rate: float,
+                   random: np.random.Generator) -> Noise:
+    """Return what gives so many samples of a column's noise and spikes, in units of its noise."""
     def noise(column: str, count: int) -> FloatArray:
         own = imperfections['noise'][column]
         found = own['level'] * coloured(count, rate, own['coloured_share'], own['corner_hz'],

@@ -65,6 +65,11 @@ class Case:
         return str(self.truth['kind'])
 
     @property
+    def machine(self) -> str:
+        """Return 'antenna', or the name of another machine."""
+        return str(self.truth.get('machine', 'antenna'))
+
+    @property
     def effects(self) -> frozenset[str]:
         """Return the right answer: the effects, UNKNOWN outside the catalogue, or NONE."""
         if self.kind == 'outside':
@@ -361,6 +366,8 @@ def score(cases: Sequence[Case], pending: int = 0) -> dict[str, Any]:
         'by_kind': {kind: _summary(group) for kind, group in by_kind.items()},
         'by_size': {size: _summary([case for case in singles if case.size == size])
                     for size in SIZES},
+        'by_machine': {name: _summary([case for case in cases if case.machine == name])
+                       for name in sorted({case.machine for case in cases})},
         'by_effect': {label: _summary([case for case in (*singles, *outside)
                                        if case.label == label])
                       for label in sorted({case.label for case in (*singles, *outside)})},

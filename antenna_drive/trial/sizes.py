@@ -29,6 +29,7 @@ from typing import Any, NamedTuple
 from antenna_drive.trial.effect import Parameters
 from antenna_drive.trial.family_b import LAWS
 from antenna_drive.trial.machine import nominal
+from antenna_drive.trial.others.machines import kind_of
 from antenna_drive.trial.table import read_table
 from antenna_drive.trial.verdict import Interval, Verdict
 
@@ -62,7 +63,7 @@ class StatedSize(NamedTuple):
 _TABLE = read_table('sizes.yaml')
 
 
-def size_of(effect: str, values: Parameters) -> Size | None:
+def size_of(effect: str, values: Parameters, machine: str | None = None) -> Size | None:
     """
     Return how a verdict states the size of an effect; None if it is not comparable.
 
@@ -72,10 +73,15 @@ def size_of(effect: str, values: Parameters) -> Size | None:
         id
     values
         its quantities in the truth
+    machine
+        one of others.machines.MACHINES; None for the antenna
 
     """
-    row = _TABLE.get(effect) or _TABLE.get(effect.split('.', 1)[1])
-    if row is None:
+    if machine is None:
+        row = _TABLE.get(effect) or _TABLE.get(effect.split('.', 1)[1])
+    else:
+        row = kind_of(machine).cause(effect).stated
+    if not row:
         return None
     true = values[row['number']] - (1.0 if row['number'] == 'factor' else 0.0)
     if 'times' in row:
@@ -103,7 +109,7 @@ def stated_sizes(truth: Mapping[str, Any], verdict: Verdict) -> list[StatedSize]
         if key not in first.effects or (
                 truth.get('family') == 'b' and key.split('.')[1] in LAWS):
             continue
-        size = size_of(key, entry['parameters'])
+        size = size_of(key, entry['parameters'], truth.get('machine'))
         stated = first.parameters.get(f'{key}.{size.parameter}') if size else None
         if size and stated and size.unit in ('', stated.unit):
             found.append(StatedSize(key, size.true, stated))

@@ -22,8 +22,8 @@ import yaml
 
 
 def read_table(name: str) -> dict[str, Any]:
-    """Return the content of a YAML file of this folder."""
-    text = Path(__file__).with_name(name).read_text(encoding='utf-8')
+    """Return the content of a YAML file of this folder, or of one below it."""
+    text = (Path(__file__).parent / name).read_text(encoding='utf-8')
     # libyaml, where it is there, is several times as fast
     loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
     content: dict[str, Any] = yaml.load(text, Loader=loader)

@@ -15,11 +15,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from antenna_drive.cli import main
 from antenna_drive.diagnosis import Form, Hypothesis
+from antenna_drive.diagnosis.by_label import split
 from antenna_drive.diagnosis.least_squares import FitState
 from antenna_drive.errors import UserError
 from antenna_drive.machines.antenna.circuits import nearest_circuit
@@ -136,6 +138,23 @@ def test_a_gust_has_no_place_in_a_file(machine: AntennaMachine) -> None:
                    hypothesis(machine, {'axis.wind_gust.torque:0:3': 2e4}))
     assert made.unwritten == ('axis.wind_gust',)
     assert 'wind' not in made.text.split('\n', 1)[1]
+
+
+def test_an_effect_that_differs_between_labels_has_no_place_in_a_file(
+        machine: AntennaMachine) -> None:
+    name = 'motor_1.torque_constant.change'
+    point = hypothesis(machine, {name: -0.1})
+    [form] = point.forms
+    own = split(form, 'load', ('A', 'B'))
+    state = point.state
+    parameters = (*(p for p in state.parameters if p.name != name), *own.parameters)
+    values = [*(x for p, x in zip(state.parameters, state.x, strict=True) if p.name != name),
+              -0.1, -0.2]
+    both = replace(point, forms=(own,), state=replace(
+        state, parameters=parameters, x=np.array(values)))
+    made = correct(load(), machine.records, both)
+    assert made.unwritten == ('motor_1.torque_constant',)
+    assert 'torque_constant:' not in made.text
 
 
 def test_a_value_beyond_the_range_of_its_entry_is_told(

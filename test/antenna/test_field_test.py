@@ -15,8 +15,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from antenna_drive.errors import UserError
 from antenna_drive.machines.antenna.field_test import FieldTest, prepared
+from antenna_drive.machines.antenna.machine import AntennaMachine
 from antenna_drive.machines.antenna.planned_tests import BUILT_IN, planned
 from antenna_drive.parameters import load
 from antenna_drive.recording.recording import Recording
@@ -73,3 +76,10 @@ def test_too_few_samples_are_refused_in_one_line() -> None:
     few = Recording({'test_signal/rate_command': command, 'motor_1/ammeter': reading})
     with pytest.raises(UserError, match='field: 6 samples to compare'):
         ready(few)
+
+
+def test_labels_of_a_sheet_reach_the_experiment() -> None:
+    recording = field()
+    labelled = replace(recording, sheet=replace(recording.sheet, labels=(('load', 'A'),)))
+    machine = AntennaMachine({'a': labelled, 'b': recording}, load(), threads=1)
+    assert [dict(e.labels) for e in machine.experiments] == [{'load': 'A'}, {}]

@@ -63,6 +63,27 @@ def test_noise_that_lasts_inflates_the_variance_by_its_length(lasts: int) -> Non
     assert inflation(problem, fitted) == pytest.approx([lasts], rel=0.08)
 
 
+@pytest.mark.parametrize('seed', range(5))
+def test_a_value_that_only_priors_tell_from_others_is_not_inflated(seed: int) -> None:
+    """
+    A gain in every test, and one of each test: the data see their sums alone, and exactly.
+
+    What rounding leaves of the difference is no scatter, and may be negative.
+    """
+    random = np.random.default_rng(seed)
+    parts = 2e5 * random.normal(size=(3000, 1)) * np.repeat(np.eye(3), 1000, axis=0)
+    own = [replace(OTHER, name=f'zero {k}', prior_sigma=1e-4) for k in range(3)]
+    common = replace(OTHER, name='zero.offset')
+    fitted = replace(state([parts.sum(axis=1), *parts.T], (common, *own)),
+                     residual=random.normal(size=3000))
+    time = np.arange(3000) / 100.0
+    problem: Any = SimpleNamespace(
+        settings=DEFAULT, machine=SimpleNamespace(time_scales=SimpleNamespace(block_s=1.0)),
+        experiments=[SimpleNamespace(time=time, measured=fitted.residual[:, np.newaxis])])
+    found = inflation(problem, fitted)
+    assert ((found >= 1.0) & (found < 10.0)).all()
+
+
 @pytest.mark.parametrize('rounding', [0.0, 0.005, 0.05])
 def test_a_change_is_no_surer_than_the_tolerance_of_its_number(rounding: float) -> None:
     """Rounded derivatives do not tell the two apart, however many samples there are."""

@@ -55,9 +55,11 @@ def test_named_arrays_are_columns(tmp_path: Path, suffix: str) -> None:
     assert log.time.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
     assert {name: column.tolist() for name, column in log.columns.items()} == {
         'x': [0.0, 1.0, 2.0, 3.0, 4.0]}
-    (tmp_path / 'm.yaml').write_text(MAP)
-    with pytest.raises(UserError, match='a map is for text'):
-        read_logs([path], tmp_path / 'm.yaml')
+    (tmp_path / 'm.yaml').write_text('time: {column: t, unit: ms}\n'
+                                     'signals: {angle: {column: x, unit: deg}}\n')
+    [log] = read_logs([path], tmp_path / 'm.yaml')
+    assert log.time == pytest.approx([0.0, 1e-3, 2e-3, 3e-3, 4e-3])
+    assert log['angle'] == pytest.approx(np.radians([0.0, 1.0, 2.0, 3.0, 4.0]))
     path.write_bytes(b'no such file at all')
     with pytest.raises(UserError, match=f'a{suffix}: '):
         read_log(path)

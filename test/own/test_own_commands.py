@@ -58,7 +58,7 @@ def test_diagnose_writes_verdict_and_page(folder: Path,
     (['--model', 'none.py', 'a.csv'], 'no such Python file'),
     (['--model', 'x.py', 'a.csv', '--config', 'reference'], '--config: does not go with --model'),
     (['--model', 'x.py', 'a.csv', '--corrected', 'c.yaml'], '--corrected: does not go with'),
-    (['a.csv', '--map', 'm.yaml'], '--map: goes with --model'),
+    (['a.csv', '--map', 'none.yaml'], 'none.yaml: No such file'),
 ])
 def test_options_that_do_not_go_together(options: list[str], message: str,
                                          capsys: pytest.CaptureFixture[str]) -> None:

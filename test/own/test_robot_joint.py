@@ -28,11 +28,16 @@ MAKER = runpy.run_path(str(FOLDER / 'make_logs.py'))
 
 
 def logs_of(fault: str) -> list[Log]:
+    return logs_with(MAKER['FAULTS'][fault])
+
+
+def logs_with(faults: dict[str, float], first_seed: int = 0, **labels: str) -> list[Log]:
     made = []
-    for seed, name in enumerate(('steps', 'sweep')):
-        rows: Any = MAKER['log_of'](MAKER[name], MAKER['FAULTS'][fault], seed)
-        made.append(Log(name, rows[:, 0], {'reference_rad': rows[:, 1], 'motor_rad': rows[:, 2],
-                                           'current_A': rows[:, 3]}))
+    for seed, name in enumerate(('steps', 'sweep'), first_seed):
+        rows: Any = MAKER['log_of'](MAKER[name], faults, seed)
+        made.append(Log(' '.join([name, *labels.values()]), rows[:, 0], {
+            'reference_rad': rows[:, 1], 'motor_rad': rows[:, 2], 'current_A': rows[:, 3]},
+            labels=labels))
     return made
 
 
@@ -53,3 +58,25 @@ def test_the_fault_of_a_joint_is_named_with_its_size(fault: str, effect: str, nu
     first = diagnose_logs(MODEL, logs_of(fault)).result['which'][0]
     assert first['effects'] == [effect]
     assert first['parameters'][f'{effect}.{number}']['value'] == pytest.approx(size, rel=0.1)
+
+
+def test_what_a_repair_changes_is_told_and_what_it_leaves_too() -> None:
+    """The asymmetry falls from 0.35 to 0.15; the delay of the bus is the same."""
+    found = diagnose_logs(MODEL, [
+        *logs_with({'asymmetry': 0.35, 'delay': 0.004}, 0, repair='before'),
+        *logs_with({'asymmetry': 0.15, 'delay': 0.004}, 2, repair='after')])
+    result = found.result
+    assert set(result['which'][0]['effects']) == {'motor.friction_asymmetry', 'controller.delay'}
+    [label] = result['labels']
+    assert label['differ'] == ['motor.friction_asymmetry']
+    assert label['stay'] == ['controller.delay']
+    asymmetry, delay = (next(item for item in label['numbers'] if item['effect'] == effect)
+                        for effect in ('motor.friction_asymmetry', 'controller.delay'))
+    [difference] = asymmetry['differences']
+    assert difference['value'] == pytest.approx(-0.2, rel=0.1)
+    assert difference['ci95'][1] < -0.15
+    for value in delay['values'].values():
+        assert value['value'] == pytest.approx(0.004, rel=0.1)
+    assert result['numbers']['asymmetry[steps before]']['value'] == pytest.approx(0.35, rel=0.1)
+    assert result['numbers']['asymmetry[sweep after]']['value'] == pytest.approx(0.15, rel=0.1)
+    assert result['numbers']['delay']['value'] == pytest.approx(0.004, rel=0.1)

@@ -19,7 +19,7 @@ import math
 from pathlib import Path
 
 from antenna_drive.parameters.schema import ParameterError
-from antenna_drive.recording.import_map import import_csv, load_map, parse_map, UNITS
+from antenna_drive.recording.import_map import import_file, load_map, parse_map, UNITS
 from antenna_drive.recording.recording import Recording, RecordingError, RecordingWarning
 import pytest
 import yaml
@@ -54,7 +54,7 @@ t;RATE;I1;N1;ENC;WIND;other
 def read(tmp_path: Path, table: str, text: str) -> Recording:
     (tmp_path / 'map.yaml').write_text(text)
     (tmp_path / 'field.csv').write_bytes(table.encode('latin-1'))
-    return import_csv(tmp_path / 'field.csv', load_map(tmp_path / 'map.yaml'))
+    return import_file(tmp_path / 'field.csv', load_map(tmp_path / 'map.yaml'))
 
 
 def test_units_signs_scales_offsets_and_clocks(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ from typing import Any
 from antenna_drive.errors import UserError
 from antenna_drive.limits import BAG, BAG_RECORD, CSV_LINE, Limit, LIMITS, SAMPLES, SIGNALS, TEXT
 from antenna_drive.recording.csv_format import read_csv
-from antenna_drive.recording.import_map import import_csv, load_map
+from antenna_drive.recording.import_map import import_file, load_map
 from antenna_drive.recording.mcap_format import MESSAGE_DEFINITION, MESSAGE_TYPE, read_bag
 from antenna_drive.recording.recording import RecordingError
 import lz4.frame
@@ -203,9 +203,9 @@ def test_a_csv_with_a_map_of_more_than_allowed(
     path.write_text('t,x\n' + ''.join(f'{k}.0,1.0\n' for k in range(100)))
     map_path.write_text('time: {column: t}\nsignals: {a/x: {column: x, unit: "1"}}\n')
     import_map = load_map(map_path)
-    assert len(import_csv(path, import_map)['a/x']) == 100
+    assert len(import_file(path, import_map)['a/x']) == 100
     set_limit(SAMPLES, 99)
-    assert SAMPLES.variable in refusal_within(5e6, lambda: import_csv(path, import_map))
+    assert SAMPLES.variable in refusal_within(5e6, lambda: import_file(path, import_map))
 
 
 def test_what_lies_beside_a_csv(tmp_path: Path, set_limit: Callable[[Limit, int], None]) -> None:

@@ -31,7 +31,7 @@ from antenna_drive.campaign.mutating import mutations, POISON
 from antenna_drive.campaign.readers import MAP, one_recording, SHEET
 from antenna_drive.errors import UserError
 from antenna_drive.recording.csv_format import read_csv, write_csv
-from antenna_drive.recording.import_map import import_csv, load_map
+from antenna_drive.recording.import_map import import_file, load_map
 from antenna_drive.recording.mcap_format import read_bag, write_bag
 from antenna_drive.recording.recording import RecordingError, RecordingWarning
 from antenna_drive.recording.sheet import load_sheet
@@ -162,7 +162,7 @@ def test_mutated_maps_are_refused_or_maps(count: int, tmp_path: Path) -> None:
         path.write_bytes(data)
         import_map = outcome(lambda: load_map(path), path)
         if import_map is not None:
-            got = outcome(lambda: import_csv(table, import_map), table)
+            got = outcome(lambda: import_file(table, import_map), table)
             assert got is None or len(got.channels) == len(import_map.signals)
 
 

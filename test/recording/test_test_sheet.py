@@ -131,3 +131,21 @@ def test_files_that_are_no_sheet_are_refused(tmp_path: Path) -> None:
     long.write_bytes(b'#' * (LONGEST_FILE + 1))
     with pytest.raises(ParameterError, match='longer than'):
         load_sheet(long)
+
+
+def test_labels_are_words_numbers_or_on_and_off(tmp_path: Path) -> None:
+    path = tmp_path / 'sheet.yaml'
+    path.write_text('labels: {load: A, compensation: on, mass: 2.5, round: 3}\n')
+    sheet = load_sheet(path)
+    assert sheet.labels == (('load', 'A'), ('compensation', 'on'), ('mass', '2.5'), ('round', '3'))
+    path.write_text(dump_sheet(sheet))
+    assert load_sheet(path) == sheet and hash(sheet) == hash(load_sheet(path))
+
+
+@pytest.mark.parametrize('labels', ['A', '[A]', '{load: [A]}', '{load: {a: 1}}', '{load: ""}',
+                                    '{load: }', '{load: ' + 'x' * 61 + '}', '{1: A}'])
+def test_other_labels_are_refused(labels: str, tmp_path: Path) -> None:
+    path = tmp_path / 'sheet.yaml'
+    path.write_text(f'labels: {labels}\n')
+    with pytest.raises(ParameterError, match=r'sheet\.yaml: labels'):
+        load_sheet(path)

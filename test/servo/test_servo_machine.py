@@ -30,7 +30,8 @@ from antenna_drive.diagnosis import rank_hypotheses
 from antenna_drive.machines.servo import refit as servo_refit
 from antenna_drive.machines.servo.bam import read_bam
 from antenna_drive.machines.servo.catalogue import BASE, catalogue, number, NUMBERS, TIED, vector
-from antenna_drive.machines.servo.log import FIRMWARE, ServoLog
+from antenna_drive.machines.servo.firmware import firmware_of
+from antenna_drive.machines.servo.log import ServoLog
 from antenna_drive.machines.servo.machine import ServoMachine
 from antenna_drive.machines.servo.physics import GRAVITY, ORDER
 from antenna_drive.machines.servo.rounds import Effort, folds, lacking, numbers
@@ -58,7 +59,7 @@ def goal_of(name: str, time: FloatArray) -> FloatArray:
 def made(kp: float, name: str, seconds: float = 3.0, *, delay: float = 0.0,
          load_friction: float = 0.0, sag: float = 0.0, offset: float = 0.0) -> ServoLog:
     """Return the log of a servo with known numbers and perhaps one effect."""
-    firmware = FIRMWARE['xl330']
+    firmware = firmware_of('xl330')
     gain = kp * firmware.error_gain
     time = np.arange(0.0, seconds, 0.01)
     goal = goal_of(name, time)

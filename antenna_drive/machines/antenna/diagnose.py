@@ -28,7 +28,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from antenna_drive.diagnosis import DEFAULT, diagnose, Diagnosis, Progress, Settings
+from antenna_drive.diagnosis import (
+    DEFAULT, diagnose, Diagnosis, Progress, Settings, without_labels,
+)
 from antenna_drive.errors import UserError
 from antenna_drive.machines.antenna.corrected import correct, Corrected
 from antenna_drive.machines.antenna.machine import AntennaMachine
@@ -78,6 +80,6 @@ def diagnose_recordings(recordings: Mapping[str, Recording], drive: Drive,
 
 def corrected(drive: Drive, diagnosis: Diagnosis) -> Corrected:
     """Return the configuration of a diagnosis of recordings, with what was found in it."""
-    machine = diagnosis.machine
+    machine = without_labels(diagnosis.machine)
     assert isinstance(machine, AntennaMachine)
     return correct(drive, machine.records, diagnosis.best)

@@ -16,7 +16,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 import math
 from typing import Any
@@ -79,6 +79,7 @@ class FieldTest:
     sheet : what the tester knows, and what was inferred
     known_start : False if the simulation begins in the middle of a motion, whose state is not
         known; the zero of the encoder then follows from the readings alone
+    labels : what was different in this test, by its sheet
 
     """
 
@@ -94,6 +95,7 @@ class FieldTest:
     period: float
     sheet: sheets.TestSheet
     known_start: bool = True
+    labels: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def tolerances(self) -> sheets.Tolerances:
@@ -189,7 +191,8 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
         name, record_of(drive), command,
         bias.later(window.begin), time - window.begin, measured, slope,
         sensors, jitter_of(recording.command, recording.rates.time_s, recording.rates.values),
-        recording.period, recording.sheet, window.known_start)
+        recording.period, recording.sheet, window.known_start,
+        dict(recording.sheet.labels or ()))
     if not window.known_start:
         off = measured[:, ENCODER] - test.simulated(_STEP_S)[:, ENCODER]
         if np.isfinite(off).any():

@@ -173,7 +173,8 @@ class AntennaMachine(Machine):
             slope = np.fmax(np.abs(out[:, :, 1]), np.abs(test.slope))
             noise = test.sensors.noise(out[:, :, 0], slope, test.jitter)
             found.append(Experiment(test.name, test.time, tuple(CHANNELS.values()), UNITS,
-                                    test.measured, noise, quantised=('encoder',)))
+                                    test.measured, noise, quantised=('encoder',),
+                                    labels=test.labels))
         return tuple(found)
 
     # -- variants of the machine ---------------------------------------------------------------

@@ -23,6 +23,7 @@ from antenna_drive.machines.own.declaration import (
     within,
 )
 from antenna_drive.machines.own.diagnose import diagnose_logs, pushes_found, summary_of
+from antenna_drive.machines.own.gaps import without_gaps
 from antenna_drive.machines.own.loading import load_model
 from antenna_drive.machines.own.log import Log, LogError, OneTest, read_log, read_logs
 from antenna_drive.machines.own.machine import OwnMachine
@@ -34,5 +35,5 @@ __all__ = [
     'Log', 'LogError', 'machine', 'Model', 'ModelError', 'Numbers', 'OneTest', 'OwnMachine',
     'push', 'pushes_found', 'reading', 'read_log',
     'read_logs', 'ripple', 'shape', 'size', 'summary_of', 'Unseen', 'unseen',
-    'within',
+    'within', 'without_gaps',
 ]

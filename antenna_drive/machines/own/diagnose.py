@@ -28,7 +28,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from antenna_drive.diagnosis import (
-    DEFAULT, diagnose, Diagnosis, LeastSquares, Point, Progress, Settings,
+    ByLabel, DEFAULT, diagnose, Diagnosis, LeastSquares, Machine, Point, Progress, Settings,
+    without_labels,
 )
 from antenna_drive.errors import UserError
 from antenna_drive.machines.own.declaration import Model
@@ -86,37 +87,45 @@ def diagnose_logs(model: Model, logs: Sequence[Log],
             raise UserError(f'{name}: no such reading{nearest(name, model.readings)}; there are '
                             f'{", ".join(model.readings)}')
     found = diagnose(machine.without(without), progress, threads, settings, limits)
-    found.result['numbers'] = numbers_as_fitted(machine, found.best.state.point())
+    found.result['numbers'] = numbers_as_fitted(found.machine, found.best.state.point())
     found.result['pushes'] = pushes_found(found, settings)
     return found
 
 
-def numbers_as_fitted(machine: OwnMachine, point: Point) -> dict[str, Any]:
+def numbers_as_fitted(machine: Machine, point: Point) -> dict[str, Any]:
     """Return every number of the simulation as fitted, per test where it is a test's own."""
-    model = machine.model
-    fitted = [machine.numbers(point, k) for k in range(len(machine.logs))]
+    own = without_labels(machine)
+    assert isinstance(own, OwnMachine)
+    model = own.model
+    points = [machine.in_test(point, k) if isinstance(machine, ByLabel) else point
+              for k in range(len(own.logs))]
+    fitted = [own.numbers(here, k) for k, here in enumerate(points)]
     numbers: dict[str, Any] = {
         name: {'value': fitted[0][name], 'configured': item.value, 'unit': item.unit}
         for name, item in model.base.items()}
     for name, item in model.per_test.items():
-        for log, values in zip(machine.logs, fitted, strict=True):
+        for log, values in zip(own.logs, fitted, strict=True):
             numbers[f'{name}[{log.name}]'] = {
                 'value': values[name], 'configured': item.value, 'unit': item.unit}
-    known = {p.name for p in machine.nuisances}
-    for parameter in point:
-        name = machine.number_of(parameter)
-        if parameter in known or not name:
-            continue
-        numbers[name] = {'value': fitted[0][name], 'configured': None}
-        if '@' in parameter:
-            order = f'{name.rpartition("_")[0]}_order'
-            numbers[order] = {'value': fitted[0][order], 'configured': None, 'unit': '1/rev'}
+    known = {p.name for p in own.nuisances}
+    for log, here, values in zip(own.logs, points, fitted, strict=True):
+        for parameter in here:
+            name = own.number_of(parameter)
+            if parameter in known or not name:
+                continue
+            # a number by label is one of each test
+            ending = '' if parameter in point else f'[{log.name}]'
+            numbers[name + ending] = {'value': values[name], 'configured': None}
+            if '@' in parameter:
+                order = f'{name.rpartition("_")[0]}_order'
+                numbers[order + ending] = {'value': values[order], 'configured': None,
+                                           'unit': '1/rev'}
     return numbers
 
 
 def pushes_found(diagnosis: Diagnosis, settings: Settings = DEFAULT) -> list[dict[str, Any]]:
     """Return when something enters that no effect names, and how strongly; empty for nothing."""
-    machine = diagnosis.machine
+    machine = without_labels(diagnosis.machine)
     assert isinstance(machine, OwnMachine)
     labels = {place.name: place for place in machine.disturbance_inputs}
     best = next(iter(diagnosis.result['may_enter_at']), None)

@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Load a model from a Python file: 'my_machine.py:machine'."""
+"""Load a model from a Python file, 'my_machine.py:machine', or from a model file in YAML."""
 
 from __future__ import annotations
 
@@ -22,31 +22,37 @@ import traceback
 
 from antenna_drive.errors import UserError
 from antenna_drive.machines.own.declaration import Model, ModelError
+from antenna_drive.machines.own.model_file import load_model_file
 from antenna_drive.parameters.schema import nearest
 
 _USUAL_NAME = 'machine'
+_MODEL_FILES = ('.yaml', '.yml')
 
 
 def load_model(place: str) -> Model:
     """
-    Return the model that a Python file names.
+    Return the model of a Python file or of a model file.
 
     Parameters
     ----------
     place
-        'FILE.py:NAME', or 'FILE.py' if the name is 'machine'
+        'FILE.py:NAME', 'FILE.py' if the name is 'machine', or 'FILE.yaml' (see `model_file`)
 
     Raises
     ------
     ModelError : there is no such file or name, or the file fails; the message says at which line
+    ModuleNotFoundError : a model file needs mujoco or fmpy, which is not installed
 
     """
+    if place.endswith(_MODEL_FILES):
+        return load_model_file(Path(place))
     text, mark, name = place.rpartition(':')
     if not mark or not name.isidentifier():
         text, name = place, _USUAL_NAME
     path = Path(text).resolve()
     if not path.is_file() or path.suffix != '.py':
-        raise ModelError(f'--model {place}: no such Python file; give FILE.py:NAME')
+        raise ModelError(f'--model {place}: no such Python file; give FILE.py:NAME, or '
+                         'FILE.yaml')
     title = f'antenna_drive_model_{path.stem}'
     spec = importlib.util.spec_from_file_location(title, path)
     assert spec is not None and spec.loader is not None

@@ -17,25 +17,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+import math
 from pathlib import Path
-from zipfile import BadZipFile
 
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.errors import UserError
+from antenna_drive.limits import SAMPLES
 from antenna_drive.parameters.plain_yaml import read_yaml
 from antenna_drive.parameters.schema import Entry, mapping_of, nearest, ParameterError
-from antenna_drive.recording.csv_format import Cell, open_text, parse_number, rows
-from antenna_drive.recording.import_map import import_csv, ImportMap, load_map
-from antenna_drive.recording.recording import NANOSECONDS
-from antenna_drive.recording.sheet import plain_value
+from antenna_drive.recording.csv_format import Cell, parse_number
+from antenna_drive.recording.import_map import import_file, ImportMap, load_map
+from antenna_drive.recording.recording import NANOSECONDS, RecordingError
+from antenna_drive.recording.sheet import parse_labels, plain_value
+from antenna_drive.recording.tables import open_table, Text
 import numpy as np
-from scipy.io import loadmat
-from scipy.io.matlab import MatReadError
 
 _TIME = ('time_s', 'time', 't')
 _LEAST_SAMPLES = 2
 _CONSTANT = Entry('')
-_ARRAYS = ('.npz', '.mat')
 
 
 class LogError(UserError):
@@ -154,8 +153,8 @@ def read_log(path: str | Path, import_map: ImportMap | None = None) -> Log:
     Parameters
     ----------
     path
-        a CSV, or named arrays in a .npz of numpy or a .mat of MATLAB (not of version 7.3); without
-        a map its columns keep their names, and time_s, time or t is the time
+        a file of any kind that `recording.tables` knows; without a map its columns keep their
+        names, and time_s, time or t is the time
     import_map
         which column is which, and how it is written
 
@@ -165,12 +164,7 @@ def read_log(path: str | Path, import_map: ImportMap | None = None) -> Log:
 
     """
     path = Path(path)
-    if path.suffix in _ARRAYS and import_map:
-        raise LogError(f'{path}: a map is for text; arrays of a {path.suffix} keep their names')
-    if path.suffix in _ARRAYS:
-        time, columns = _arrays(path)
-    else:
-        time, columns = _mapped(path, import_map) if import_map else _plain(path)
+    time, columns = _mapped(path, import_map) if import_map else _plain(path)
     constants, labels = _sheet(path.with_suffix('.yaml'))
     try:
         return Log(path.stem, time, columns, constants, labels)
@@ -197,53 +191,51 @@ def read_logs(paths: Sequence[str | Path], map_path: str | Path | None = None) -
 
 
 def _plain(path: Path) -> tuple[FloatArray, dict[str, FloatArray]]:
-    with open_text(path, 'utf-8-sig') as stream:
-        table = rows(path, stream, ',')
-        line, header = next(table, (1, []))
-        names = [cell.strip() for cell in header]
+    with open_table(path) as table:
+        names = list(table.names)
         if len(set(names)) < len(names):
-            raise LogError(f'{path}: line {line}: a column is there twice')
-        cells = [[] for _ in names]  # type: list[list[float]]
-        for line, row in table:
-            if len(row) != len(names):
-                raise LogError(f'{path}: line {line}: {len(row)} cells, but the header has '
-                               f'{len(names)}')
-            for name, values, text in zip(names, cells, row, strict=True):
-                text = text.strip()
-                values.append(parse_number(text, Cell(path, line, name)) if text else np.nan)
-    return _with_time(path, {
-        name: np.array(values) for name, values in zip(names, cells, strict=True)})
+            raise LogError(f'{path}: {table.start}' + (
+                'a column is there twice' if any(names) else
+                'the columns have no names; --map says which is which'))
+        cells: dict[str, list[float]] = {name: [] for name in names}
+        room = SAMPLES.value()
+        for line, row in table.rows:
+            room -= len(names)
+            if room < 0:
+                raise RecordingError(f'{path}: {table.counted} {line}: {SAMPLES.exceeded()}')
+            for name, given in zip(names, row, strict=True):
+                if name not in cells:
+                    continue
+                try:
+                    cells[name].append(_number(given, Cell(path, line, name, table.counted)))
+                except RecordingError:
+                    if table.is_text:
+                        raise
+                    del cells[name]  # a column of another kind beside the numbers
+    return _with_time(path, {name: np.array(values[:table.lengths.get(name)])
+                             for name, values in cells.items()})
 
 
-def _arrays(path: Path) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Read the vectors of a file of named arrays; what is no vector of numbers is left out."""
-    try:
-        if path.suffix == '.npz':
-            with np.load(path, allow_pickle=False) as file:
-                found = {name: np.asarray(file[name]) for name in file.files}
-        else:
-            found = {name: np.asarray(values) for name, values in loadmat(path).items()
-                     if not name.startswith('__')}
-    except (ValueError, NotImplementedError, BadZipFile, EOFError, TypeError,
-            MatReadError) as error:
-        raise LogError(f'{path}: {error}') from None
-    return _with_time(path, {name: values.squeeze().astype(float)
-                             for name, values in found.items()
-                             if values.dtype.kind in 'biuf' and values.squeeze().ndim == 1})
+def _number(given: Text, cell: Cell) -> float:
+    """Return the number in a cell; NaN if it is empty."""
+    if isinstance(given, list):
+        raise cell.refuse('a vector; --map takes numbers out of vectors')
+    text = given.strip()
+    return parse_number(text, cell) if text else math.nan
 
 
 def _with_time(path: Path, columns: dict[str, FloatArray],
                ) -> tuple[FloatArray, dict[str, FloatArray]]:
     time = next((name for name in _TIME if name in columns), '')
     if not time:
-        raise LogError(f'{path}: no column {" or ".join(_TIME)}; with --map another column of a '
-                       'CSV is the time')
+        raise LogError(f'{path}: no column {" or ".join(_TIME)}; with --map another column '
+                       'is the time')
     return columns.pop(time), columns
 
 
 def _mapped(path: Path, import_map: ImportMap) -> tuple[FloatArray, dict[str, FloatArray]]:
     """Read a file with a map; the signal with most samples gives the times."""
-    recording = import_csv(path, import_map, sheet=False)
+    recording = import_file(path, import_map, sheet=False)
     stamps = max((channel.time_ns for channel in recording.channels.values()), key=len)
     if len(stamps) < _LEAST_SAMPLES:
         raise LogError(f'{path}: fewer than {_LEAST_SAMPLES} samples')
@@ -262,12 +254,12 @@ def _sheet(path: Path) -> tuple[dict[str, float], dict[str, str]]:
     try:
         top = mapping_of('', read_yaml(path), ('constants', 'labels'))
         constants = mapping_of('constants', top.get('constants', {}))
-        labels = mapping_of('labels', top.get('labels', {}))
+        labels = dict(parse_labels('labels', top.get('labels', {})))
         numbers = {name: float(_CONSTANT.check(f'constants.{name}', plain_value(  # type: ignore
             value))) for name, value in constants.items()}
     except ParameterError as error:
         raise LogError(f'{path}: {error}') from None
-    return numbers, {name: str(value) for name, value in labels.items()}
+    return numbers, labels
 
 
 def _held(values: FloatArray) -> FloatArray:

@@ -261,7 +261,7 @@ class OwnMachine(Machine):
             log.name, log.time[::stride], tuple(self.model.readings),
             tuple(item.unit for item in readings), measured,
             np.tile([item.sigma for item in readings], (len(measured), 1)),
-            model_error=np.where(np.isnan(errors), usual, errors))
+            model_error=np.where(np.isnan(errors), usual, errors), labels=log.labels)
 
 
 def _stride(log: Log, judged_hz: float | None) -> int:

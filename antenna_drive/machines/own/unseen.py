@@ -24,7 +24,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 
-from antenna_drive.diagnosis import Diagnosis, FloatArray, Hypothesis, Point
+from antenna_drive.diagnosis import (
+    ByLabel, Diagnosis, FloatArray, Hypothesis, Machine, Point, without_labels,
+)
 from antenna_drive.machines.own.log import Log
 from antenna_drive.machines.own.machine import OwnMachine
 import numpy as np
@@ -59,7 +61,7 @@ def unseen(diagnosis: Diagnosis, log: Log,
     Return how well a log that was not used is predicted, by reading.
 
     Nothing is fitted to the log: a number that each test has of its own is the mean of those of
-    the diagnosed tests.
+    the diagnosed tests. An effect that has a size by label has that of the log's label.
 
     Parameters
     ----------
@@ -71,13 +73,16 @@ def unseen(diagnosis: Diagnosis, log: Log,
         what is known to have entered at some of the model's places, shape (n,) each
 
     """
-    machine = diagnosis.machine
+    whole, machine = diagnosis.machine, without_labels(diagnosis.machine)
     assert isinstance(machine, OwnMachine)
     other = OwnMachine(machine.model, [log])
     measured = other.experiments[0].measured
     found = {}
-    readings = [other.pushed(_carried(machine, log.name, point), 0, push or {}) for point in (
-        {}, refitted(machine, diagnosis.none), refitted(machine, diagnosis.best))]
+    points: list[Point] = [{}, *(refitted(whole, h) for h in (diagnosis.none, diagnosis.best))]
+    if isinstance(whole, ByLabel):
+        points = [whole.at(point, log.labels) for point in points]
+    readings = [other.pushed(_carried(machine, log.name, point), 0, push or {})
+                for point in points]
     for j, (name, item) in enumerate(machine.model.readings.items()):
         configured, before, after = (math.sqrt(float(np.nanmean(
             (values[:, j] - measured[:, j]) ** 2))) for values in readings)
@@ -85,7 +90,7 @@ def unseen(diagnosis: Diagnosis, log: Log,
     return found
 
 
-def refitted(machine: OwnMachine, hypothesis: Hypothesis) -> dict[str, float]:
+def refitted(machine: Machine, hypothesis: Hypothesis) -> dict[str, float]:
     """Return the values of a hypothesis as fitted to the machine's logs by least squares."""
     point = hypothesis.state.point()
     numbers = [p for p in (*machine.nuisances, *(p for form in hypothesis.forms

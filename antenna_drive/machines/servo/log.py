@@ -17,9 +17,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 import math
+from pathlib import Path
 
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.errors import UserError
+from antenna_drive.machines.servo.firmware import Firmware, firmware_of
 from antenna_drive.machines.servo.physics import swing
 from antenna_drive.recording.recording import Recording
 import numpy as np
@@ -28,33 +30,6 @@ CHANNELS = ('position', 'speed', 'duty')
 UNITS = ('rad', 'rad/s', '1')
 POSITION, SPEED, DUTY = range(3)
 STEP_S = 2.8e-3
-# The servo reports the mean rate over this time [s].
-SPEED_WINDOW_S = 0.04
-
-
-@dataclass(frozen=True)
-class Firmware:
-    """
-    The drive law and the registers of a kind of servo.
-
-    Attributes
-    ----------
-    error_gain : duty per position error and unit of the position gain [1/rad]
-    duty_count : the load register at full duty
-    position_step : of the encoder [rad]
-    rate_step : of the speed register [rad/s]
-
-    """
-
-    error_gain: float
-    duty_count: float
-    position_step: float
-    rate_step: float
-
-
-_COUNTS = 4096 / (2.0 * math.pi)
-FIRMWARE = {'xl330': Firmware(_COUNTS / (256.0 * 885.0), 885.0, 1.0 / _COUNTS,
-                              0.229 * 2.0 * math.pi / 60.0)}
 
 
 @dataclass(frozen=True)
@@ -94,9 +69,18 @@ class ServoLog:
     measured: FloatArray
 
     @classmethod
-    def of(cls, name: str, recording: Recording) -> ServoLog:
+    def of(cls, name: str, recording: Recording, beside: Path | None = None) -> ServoLog:
         """
         Prepare a log that `bam.read_bam` has read.
+
+        Parameters
+        ----------
+        name
+            for people
+        recording
+            of the log
+        beside
+            folder in which the servo's firmware may lie; see `firmware_of`
 
         Raises
         ------
@@ -104,13 +88,13 @@ class ServoLog:
 
         """
         notes = recording.notes
-        if notes['motor'] not in FIRMWARE:
-            raise UserError(f'{name}: motor: {notes["motor"]!r} given, the drive law is known of '
-                            f'{", ".join(FIRMWARE)}')
         for key in ('mass', 'length', 'kp', 'vin'):
             if not 0.0 < float(notes[key]) < math.inf:
                 raise UserError(f'{name}: {key}: {notes[key]} given, allowed is more than 0')
-        firmware = FIRMWARE[notes['motor']]
+        try:
+            firmware = firmware_of(notes['motor'], beside)
+        except UserError as error:
+            raise UserError(f'{name}: {error}') from None
         time = np.asarray(recording['servo/position'].time_s, dtype=np.float64)
         if time.size < 50:
             raise UserError(f'{name}: {time.size} samples, at least 50 are needed')
@@ -164,5 +148,6 @@ class ServoLog:
     def readings(self, values: FloatArray, step: float = STEP_S) -> FloatArray:
         """Return what the servo would have reported, shape (n, 3) like `measured`."""
         run = self.simulate(values, step)
-        past = np.interp(self.time - SPEED_WINDOW_S, self.time, run[:, 0])
-        return np.column_stack([run[:, 0], (run[:, 0] - past) / SPEED_WINDOW_S, run[:, 2]])
+        window = self.firmware.rate_window_s
+        past = np.interp(self.time - window, self.time, run[:, 0])
+        return np.column_stack([run[:, 0], (run[:, 0] - past) / window, run[:, 2]])

@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The search for effects, on a machine of two springs that pull at one body."""
+"""An effect in its other places, on a machine of two springs that pull at one body."""
 
 from __future__ import annotations
 
