@@ -81,8 +81,13 @@ class Rival:
         return self.covariance[np.ix_(places, places)]
 
     def as_data(self) -> dict[str, Any]:
-        """Return the rival as plain data, for the JSON; of the covariance its lower triangle."""
-        rows = [[float(f'{x:.{_DIGITS - 1}e}') for x in row[:i + 1]]
+        """
+        Return the rival as plain data, for the JSON.
+
+        Of the covariance it has the lower triangle, each row a text: thousands of numbers, a line
+        each, would bury the verdict.
+        """
+        rows = [' '.join(f'{x:.{_DIGITS}g}' for x in row[:i + 1])
                 for i, row in enumerate(self.covariance)]
         return {'named': list(self.named), 'effects': list(self.effects),
                 'forms': list(self.forms), 'probability': self.probability,
@@ -95,13 +100,13 @@ class Rival:
 
         Raises
         ------
-        KeyError, TypeError, ValueError : it is none
+        KeyError, TypeError, ValueError, AttributeError : it is none
 
         """
         names = tuple(data['names'])
         lower = np.zeros((len(names), len(names)))
         for i, row in enumerate(data['covariance']):
-            lower[i, :i + 1] = row
+            lower[i, :i + 1] = [float(x) for x in row.split()]
         return cls(tuple(data['named']), tuple(data['effects']), tuple(data['forms']),
                    float(data['probability']), names, np.array(data['values'], float),
                    lower + np.tril(lower, -1).T)

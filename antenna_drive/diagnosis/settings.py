@@ -268,6 +268,8 @@ class HeldOutSettings:
 class ConfusabilitySettings:
     """Which effects a planned test can tell apart, from derivatives alone."""
 
+    caution: float = _setting(
+        3.0, '1', 'by what a promised lack of fit is divided where tests are compared')
     alike: float = _setting(
         0.95, '1', 'share of what an effect does that another must imitate to pass for it')
 
@@ -280,6 +282,14 @@ class PlanningSettings:
     least_probability: float = _setting(
         0.005, '1', 'probability of an answer from which it is a rival')
     passes: int = _setting(1, '1', "fresh derivatives of a rival's fit to another's readings")
+    least_information: float = _setting(
+        0.02, 'nat', 'expected information from which a test helps; of standard deviations, the '
+        'share by which one shrinks')
+    caution: float = _setting(
+        3.0, '1', 'by what a promised lack of fit is divided where tests are compared')
+    alike: float = _setting(
+        1.0, 'temperature', 'lack of fit up to which a test does not tell two rivals apart')
+    sure: float = _setting(0.9, 'probability', 'probability from which an answer is sure')
 
 
 @dataclass(frozen=True)

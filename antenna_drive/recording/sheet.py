@@ -22,6 +22,7 @@ names the file, the key and what is allowed.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, is_dataclass
+from itertools import pairwise
 import math
 from pathlib import Path
 from typing import Any, ClassVar, get_args, get_type_hints
@@ -257,7 +258,12 @@ def _parse(key: str, tree: object, classes: tuple[type, ...]) -> Any:
     lengths = {name: len(value) for name, value in content.items()
                if 'each' in known[name].metadata}
     if len(set(lengths.values())) > 1:
-        raise ParameterError(f'{key}: {lengths} values given, allowed is the same number of each')
+        raise ParameterError(f'{key}: {lengths} values given, allowed is one of each for '
+                             'every sine or point')
+    times = content.get('times_s', ())
+    if any(later < earlier for earlier, later in pairwise(times)):
+        raise ParameterError(f'{key}.times_s: a time before the one that precedes it, allowed are '
+                             'times in their order')
     return chosen(**content)
 
 

@@ -18,15 +18,19 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+from antenna_drive.diagnosis import FloatArray
 from antenna_drive.machines.antenna.drive_limits import DriveLimits
 from antenna_drive.recording.sheet import (
-    Chirp, CircuitBias, Knots, Multisine, Square, TestSheet, Triangle, Waveform,
+    Chirp, CircuitBias, FixedBias, Knots, Multisine, Square, TestSheet, Triangle, Waveform,
 )
 import numpy as np
 
 # Everything stands still for this long at the beginning [s].
 _REST_S = 1.0
 _LEAST_SHARE, _SLOWEST_HZ, _FASTEST_HZ = 0.01, 0.05, 8.0
+# Voltages of a bias source, as shares of the circuit's greatest; rates of a torque test, as shares
+# of the greatest; elevations [deg].
+_BIAS, _CREEP, _ELEVATIONS = (0.2, 0.9), (0.002, 0.05), (15.0, 75.0)
 _ROUNDED = 4
 _Make = Callable[['_Draw'], Waveform]
 
@@ -79,24 +83,29 @@ def _multisine(draw: _Draw) -> Waveform:
     weights = (frequencies / frequencies[0]) ** -tilt
     # the greatest value of sines with random phases is about twice their rms
     weights /= np.sqrt(2.0 * np.sum(weights ** 2))
-    return Multisine(draw.amplitude, *(tuple(map(rounded, part.tolist())) for part in (
-        frequencies, weights, draw.random.uniform(0.0, 2.0 * np.pi, count))), start_s=_REST_S)
+    phases = draw.random.uniform(0.0, 2.0 * np.pi, count)
+    return Multisine(draw.amplitude, _numbers(frequencies), _numbers(weights), _numbers(phases),
+                     _REST_S)
 
 
-def _levels(draw: _Draw, times: np.ndarray, levels: np.ndarray) -> Knots:
+def _numbers(values: FloatArray) -> tuple[float, ...]:
+    return tuple(map(rounded, values.tolist()))
+
+
+def _levels(draw: _Draw, times: FloatArray, levels: FloatArray) -> Knots:
     """Return a command that jumps to each level at its time, and ends at zero."""
     times = np.r_[times, draw.duration - _REST_S]
-    at = np.repeat(times, 2)[1:-1] if len(times) > 1 else times
-    rates = np.repeat(levels, 2)
-    return Knots(tuple(map(rounded, at.tolist())), tuple(map(rounded, rates.tolist())))
+    return Knots(_numbers(np.repeat(times, 2)[1:-1]), _numbers(np.repeat(levels, 2)))
 
 
 def _steps(draw: _Draw) -> Waveform:
     hold = draw.between(1.0, draw.duration / 5.0)
     times = np.arange(_REST_S, draw.duration - _REST_S - 0.5 * hold, hold)[:30]
     greatest = draw.amplitude
-    return _levels(draw, times, greatest * draw.random.choice(
-        [-1.0, -0.5, -0.2, -0.05, 0.0, 0.05, 0.2, 0.5, 1.0], times.size))
+    shares = draw.random.choice([-1.0, -0.5, -0.2, -0.05, 0.0, 0.05, 0.2, 0.5, 1.0], times.size)
+    # a test that begins with a long rest wastes time
+    shares[0] = shares[0] or 1.0
+    return _levels(draw, times, greatest * shares)
 
 
 def _prbs(draw: _Draw) -> Waveform:
@@ -117,15 +126,22 @@ def _slews(draw: _Draw) -> Waveform:
         times.append(at)
         rates.append(0.0)
         sign = -sign
-    return Knots(tuple(map(rounded, times)), tuple(map(rounded, rates)))
+    return Knots(_numbers(np.array(times)), _numbers(np.array(rates)))
+
+
+def _torque(draw: _Draw) -> Waveform:
+    """Return a creep to both sides: the torque of the bias source is what moves the drive."""
+    rate = draw.limits.rate_deg_s * draw.between(*_CREEP)
+    times = np.linspace(_REST_S, draw.duration, 5)[:4]
+    return _levels(draw, times, rate * np.array([1.0, 0.0, -1.0, 0.0]))
 
 
 FAMILIES: Mapping[str, _Make] = {
     'square': _square, 'triangle': _triangle, 'chirp': _chirp, 'multisine': _multisine,
-    'steps': _steps, 'prbs': _prbs, 'slews': _slews}
+    'steps': _steps, 'prbs': _prbs, 'slews': _slews, 'torque': _torque}
 
 
-def drawn(family: str, base: TestSheet, limits: DriveLimits, duration: float,
+def drawn(family: str, base: TestSheet, limits: DriveLimits, full_bias: float, duration: float,
           random: np.random.Generator) -> TestSheet:
     """
     Draw a test of a family.
@@ -138,13 +154,21 @@ def drawn(family: str, base: TestSheet, limits: DriveLimits, duration: float,
         what a further test shares with those that were made
     limits
         of the drive
+    full_bias
+        greatest bias voltage that the torque-share circuit gives [V]
     duration
         of the test [s]
     random
         source of randomness
 
     """
-    sheet = replace(base, waveform=FAMILIES[family](_Draw(limits, duration, random)))
+    draw = _Draw(limits, duration, random)
+    sheet = replace(base, waveform=FAMILIES[family](draw))
+    if random.uniform() < 0.5:
+        sheet = replace(sheet, elevation_deg=round(float(random.uniform(*_ELEVATIONS)), 1))
+    if family == 'torque':
+        # the source steps when the test begins
+        return replace(sheet, bias=FixedBias(rounded(full_bias * draw.between(*_BIAS))))
     if isinstance(base.bias, CircuitBias) and base.bias.bias_pot is not None:
         pot = base.bias.bias_pot * float(random.choice([0.4, 0.7, 1.0, 1.2]))
         sheet = replace(sheet, bias=replace(base.bias, bias_pot=rounded(min(pot, 1.0))))

@@ -14,14 +14,15 @@
 """
 Limits of the drive that a test must keep, and how near a simulated test comes to them.
 
-A limit that the user does not give follows from the configuration: the current limit, the voltage
-limit, and the rate and the torque that they allow.
+A limit that the user does not give follows from the configuration. The drive limits currents and
+voltages by itself, in tests as in service: a test may reach these limits, and may go beyond them
+only by what `BEYOND` says. What it may not do is stay there, see `hot_s`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 import math
 from pathlib import Path
 
@@ -31,18 +32,26 @@ from antenna_drive.parameters.schema import Entry, mapping_of, ParameterError
 from antenna_drive.parameters.sets import Drive
 import numpy as np
 
+# What must be known of a simulated test.
 CHANNELS = ('plant/axis_rate', 'plant/axis_angle', 'motor_1/current', 'motor_2/current',
             'motor_1/gear_torque', 'motor_2/gear_torque', 'motor_1/tach_rate',
             'motor_2/tach_rate')
-# Shares of the greatest rate and current that a long test keeps, and the travel of a test of half
-# a minute. None of them is in the article.
-_RATE, _HOT, _HOT_S, _TRAVEL_DEG = 0.9, 0.8, 2.0, 10.0
+# The drive's own limiters, and the tolerance and the margin beyond them.
+BEYOND = 1.2
+# Shares of the greatest rate and current that a test keeps, the time above that current, and the
+# travel of a test of half a minute. None of them is in the article.
+_RATE, _HOT, _HOT_S, _TRAVEL_DEG = 0.9, 0.8, 10.0, 10.0
+
+
+def _limit(unit: str, description: str) -> float:
+    found: float = field(metadata={'entry': Entry(unit, 1e-6, 1e12, description)})
+    return found
 
 
 @dataclass(frozen=True)
 class DriveLimits:
     """
-    What a test must not exceed; the same names say what a test reaches.
+    What a test must not exceed.
 
     Attributes
     ----------
@@ -50,17 +59,18 @@ class DriveLimits:
     current_A : of each motor, article amperes
     voltage_V : of each armature
     axis_torque_N_m : of both gearboxes together, at the axis
-    hot_s : time that a motor spends above hot_current_A
+    hot_current_A, hot_s : a motor may spend `hot_s` above that current, in all
 
     """
 
-    rate_deg_s: float
-    acceleration_deg_s2: float
-    travel_deg: float
-    current_A: float
-    voltage_V: float
-    axis_torque_N_m: float
-    hot_s: float
+    rate_deg_s: float = _limit('deg/s', 'rate of the axis')
+    acceleration_deg_s2: float = _limit('deg/s^2', 'acceleration of the axis')
+    travel_deg: float = _limit('deg', 'from the lowest to the highest elevation of a test')
+    current_A: float = _limit('A', 'current of each motor, article amperes')
+    voltage_V: float = _limit('V', 'voltage of each armature')
+    axis_torque_N_m: float = _limit('N m', 'torque of both gearboxes at the axis')
+    hot_current_A: float = _limit('A', 'current above which the time is limited')
+    hot_s: float = _limit('s', 'time of each motor above hot_current_A')
 
     @classmethod
     def of_drive(cls, drive: Drive) -> DriveLimits:
@@ -69,10 +79,13 @@ class DriveLimits:
         ratio = drive.motor_1.gear_ratio
         rate = armature.voltage_limit / armature.back_emf_constant / ratio
         torque = 2.0 * motor.current_limit * motor.torque_constant * ratio
-        inertia = (drive.plant.axis.inertia_hub + sum(drive.plant.axis.mode_inertias)
-                   + 2.0 * motor.rotor_inertia * ratio ** 2)
-        return cls(_RATE * math.degrees(rate), math.degrees(torque / inertia), _TRAVEL_DEG,
-                   motor.current_limit, armature.voltage_limit, torque, _HOT_S)
+        return cls(
+            rate_deg_s=_RATE * math.degrees(rate),
+            # the modes follow the hub later
+            acceleration_deg_s2=BEYOND * math.degrees(torque / drive.plant.axis.inertia_hub),
+            travel_deg=_TRAVEL_DEG, current_A=BEYOND * motor.current_limit,
+            voltage_V=BEYOND * armature.voltage_limit, axis_torque_N_m=BEYOND * torque,
+            hot_current_A=_HOT * motor.current_limit, hot_s=_HOT_S)
 
     def changed(self, given: Mapping[str, object]) -> DriveLimits:
         """
@@ -85,15 +98,42 @@ class DriveLimits:
         """
         known = {item.name: item for item in fields(self)}
         return replace(self, **{
-            name: Entry('', 1e-6, 1e12).check(name, value)
+            name: known[name].metadata['entry'].check(name, value)
             for name, value in mapping_of('', given, known).items()})
 
-    def worst(self, reached: DriveLimits) -> tuple[str, float]:
-        """Return the limit that a test uses most, and its share of it."""
-        shares = {item.name: getattr(reached, item.name) / getattr(self, item.name)
-                  for item in fields(self)}
-        name = max(shares, key=lambda key: shares[key])
-        return name, shares[name]
+    def as_data(self) -> dict[str, float]:
+        """Return the limits by name."""
+        return asdict(self)
+
+    def use(self, time: FloatArray, out: FloatArray, drive: Drive) -> dict[str, float]:
+        """
+        Return the share of each limit that a simulated test uses, 1 at the limit.
+
+        Parameters
+        ----------
+        time
+            shape (n,) [s]
+        out
+            values and slopes of `CHANNELS`, shape (n, 8, 2)
+        drive
+            the configuration
+
+        """
+        value, slope = out[:, :, 0], out[:, :, 1]
+        armature, ratio = drive.motor_1.armature, drive.motor_1.gear_ratio
+        current = value[:, 2:4]
+        voltage = (armature.physical_amperes_per_article_ampere * (
+            armature.inductance * slope[:, 2:4] + armature.resistance * current)
+            + armature.back_emf_constant * value[:, 6:8])
+        hot = np.gradient(time) @ (np.abs(current) > self.hot_current_A)
+        reached = {
+            'rate_deg_s': math.degrees(_greatest(value[:, 0])),
+            'acceleration_deg_s2': math.degrees(_greatest(slope[:, 0])),
+            'travel_deg': math.degrees(_greatest(value[:, 1] - value[:, 1].min())),
+            'current_A': _greatest(current), 'voltage_V': _greatest(voltage),
+            'axis_torque_N_m': ratio * _greatest(value[:, 4] + value[:, 5]),
+            'hot_s': _greatest(hot)}
+        return {name: amount / getattr(self, name) for name, amount in reached.items()}
 
 
 def read_limits(path: Path, drive: Drive) -> DriveLimits:
@@ -110,34 +150,6 @@ def read_limits(path: Path, drive: Drive) -> DriveLimits:
         return DriveLimits.of_drive(drive).changed(mapping_of('', {} if tree is None else tree))
     except ParameterError as error:
         raise ParameterError(f'{path}: {error}') from None
-
-
-def reached(time: FloatArray, out: FloatArray, drive: Drive) -> DriveLimits:
-    """
-    Return what a simulated test reaches.
-
-    Parameters
-    ----------
-    time
-        shape (n,) [s]
-    out
-        values and slopes of `CHANNELS`, shape (n, 8, 2)
-    drive
-        the configuration
-
-    """
-    value, slope = out[:, :, 0], out[:, :, 1]
-    armature, ratio = drive.motor_1.armature, drive.motor_1.gear_ratio
-    current = value[:, 2:4]
-    voltage = (armature.physical_amperes_per_article_ampere * (
-        armature.inductance * slope[:, 2:4] + armature.resistance * current)
-        + armature.back_emf_constant * value[:, 6:8])
-    hot = np.abs(current) > _HOT * drive.motor_1.motor.current_limit
-    spent = np.gradient(time) @ hot
-    return DriveLimits(
-        math.degrees(_greatest(value[:, 0])), math.degrees(_greatest(slope[:, 0])),
-        math.degrees(float(np.ptp(value[:, 1]))), _greatest(current), _greatest(voltage),
-        ratio * _greatest(value[:, 4] + value[:, 5]), float(spent.max()))
 
 
 def _greatest(values: FloatArray) -> float:

@@ -73,17 +73,17 @@ class CommandedRate(Protocol):
 
 def test_signal_of(waveform: sheets.Waveform) -> Waveform:
     """Return the drive's test signal that plays the waveform of a test sheet."""
-    amplitude = float(waveform.amplitude_deg_s or 0.0) * DEGREE
-    if isinstance(waveform, (sheets.Square, sheets.Triangle)):
-        kind = 'square' if isinstance(waveform, sheets.Square) else 'saw_tooth'
-        return Waveform(waveform=kind, amplitude=amplitude, period=waveform.period_s or 1.0,
-                        phase=waveform.phase or 0.0)
     if isinstance(waveform, sheets.Knots):
         rates = np.array(waveform.rates_deg_s or (0.0,))
         greatest = float(np.abs(rates).max()) or 1.0
         return Waveform(waveform='knots', amplitude=greatest * DEGREE,
                         knot_times=waveform.times_s or (0.0,),
                         knot_values=tuple((rates / greatest).tolist()))
+    amplitude = float(waveform.amplitude_deg_s or 0.0) * DEGREE
+    if isinstance(waveform, (sheets.Square, sheets.Triangle)):
+        kind = 'square' if isinstance(waveform, sheets.Square) else 'saw_tooth'
+        return Waveform(waveform=kind, amplitude=amplitude, period=waveform.period_s or 1.0,
+                        phase=waveform.phase or 0.0)
     start = waveform.start_s or 0.0
     if isinstance(waveform, sheets.Multisine):
         return Waveform(waveform='multisine', amplitude=amplitude, start_after=start,
