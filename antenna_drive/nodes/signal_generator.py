@@ -14,21 +14,40 @@
 """
 The test signals, and the owner of the run: its macro-step, pace and end, as a ROS 2 node.
 
+With sheet:=next.yaml it plays the waveform of a test sheet, from the beginning of the run; a
+parameter that is given beside it counts more.
+
 With waveform:=external the command follows the Float64 topic test_signal/external [rad/s].
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 import sys
+from typing import TYPE_CHECKING
 
+from antenna_drive.errors import UserError
 from antenna_drive.lockstep.entry import run_drive_unit
+
+if TYPE_CHECKING:
+    from antenna_drive.parameters.schema import Value
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
     return run_drive_unit('test_signal', ('test_signal',), args, fed_by_topic=('external',),
-                          description=__doc__)
+                          description=__doc__, of_sheet=_of_sheet)
+
+
+def _of_sheet(path: str) -> Mapping[str, Value]:
+    """Return the settings that play the waveform of a test sheet."""
+    from antenna_drive.recording.sheet import load_sheet
+    from antenna_drive.recording.sheet_signal import settings_of
+    sheet = load_sheet(Path(path))
+    if sheet.waveform is None:
+        raise UserError(f'{path}: waveform: is missing, there is nothing to play')
+    return settings_of(sheet.waveform)
 
 
 if __name__ == '__main__':

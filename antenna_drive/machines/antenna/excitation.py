@@ -30,15 +30,14 @@ from typing import Any, Protocol
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.emulator import batch
 from antenna_drive.parameters.records import record_of
-from antenna_drive.parameters.sets import Waveform
 from antenna_drive.physics import signal_generator
 from antenna_drive.recording import sheet as sheets
+from antenna_drive.recording.sheet_signal import test_signal_of
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-DEGREE = np.pi / 180.0
 # Places within a step at which the command is read; jumps may be at its ends.
 _PLACES = np.array([0.1, 0.5, 0.9])
 _NO_BITS = np.ones(1)   # no test sheet has a pseudo-random sequence
@@ -69,29 +68,6 @@ class CommandedRate(Protocol):
 
     def knots(self, end: float) -> FloatArray:
         """Return the times up to `end` at which the command or its slope jumps [s]."""
-
-
-def test_signal_of(waveform: sheets.Waveform) -> Waveform:
-    """Return the drive's test signal that plays the waveform of a test sheet."""
-    if isinstance(waveform, sheets.Knots):
-        rates = np.array(waveform.rates_deg_s or (0.0,))
-        greatest = float(np.abs(rates).max()) or 1.0
-        return Waveform(waveform='knots', amplitude=greatest * DEGREE,
-                        knot_times=waveform.times_s or (0.0,),
-                        knot_values=tuple((rates / greatest).tolist()))
-    amplitude = float(waveform.amplitude_deg_s or 0.0) * DEGREE
-    if isinstance(waveform, (sheets.Square, sheets.Triangle)):
-        kind = 'square' if isinstance(waveform, sheets.Square) else 'saw_tooth'
-        return Waveform(waveform=kind, amplitude=amplitude, period=waveform.period_s or 1.0,
-                        phase=waveform.phase or 0.0)
-    start = waveform.start_s or 0.0
-    if isinstance(waveform, sheets.Multisine):
-        return Waveform(waveform='multisine', amplitude=amplitude, start_after=start,
-                        frequencies=waveform.frequencies_hz or (),
-                        weights=waveform.weights or (), phases=waveform.phases or ())
-    return Waveform(waveform='chirp', amplitude=amplitude, start_after=start,
-                    sweep_from=waveform.f0_hz or 0.0, sweep_to=waveform.f1_hz or 0.0,
-                    sweep_time=waveform.duration_s or 1.0)
 
 
 @dataclass(frozen=True)

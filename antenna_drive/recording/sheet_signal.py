@@ -1,0 +1,54 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The drive's test signal for the waveform of a test sheet."""
+
+from __future__ import annotations
+
+import math
+
+from antenna_drive.parameters.schema import Value
+from antenna_drive.parameters.sets import values, Waveform
+from antenna_drive.recording import sheet as sheets
+
+_DEGREE = math.pi / 180.0
+
+
+def test_signal_of(waveform: sheets.Waveform) -> Waveform:
+    """Return the drive's test signal that plays the waveform of a test sheet."""
+    if isinstance(waveform, sheets.Knots):
+        rates = waveform.rates_deg_s or (0.0,)
+        greatest = max(map(abs, rates)) or 1.0
+        return Waveform(waveform='knots', amplitude=greatest * _DEGREE,
+                        knot_times=waveform.times_s or (0.0,),
+                        knot_values=tuple(rate / greatest for rate in rates))
+    amplitude = float(waveform.amplitude_deg_s or 0.0) * _DEGREE
+    if isinstance(waveform, (sheets.Square, sheets.Triangle)):
+        kind = 'square' if isinstance(waveform, sheets.Square) else 'saw_tooth'
+        return Waveform(waveform=kind, amplitude=amplitude, period=waveform.period_s or 1.0,
+                        phase=waveform.phase or 0.0)
+    start = waveform.start_s or 0.0
+    if isinstance(waveform, sheets.Multisine):
+        return Waveform(waveform='multisine', amplitude=amplitude, start_after=start,
+                        frequencies=waveform.frequencies_hz or (),
+                        weights=waveform.weights or (), phases=waveform.phases or ())
+    return Waveform(waveform='chirp', amplitude=amplitude, start_after=start,
+                    sweep_from=waveform.f0_hz or 0.0, sweep_to=waveform.f1_hz or 0.0,
+                    sweep_time=waveform.duration_s or 1.0)
+
+
+def settings_of(waveform: sheets.Waveform) -> dict[str, Value]:
+    """Return the settings of the node test_signal that play the waveform of a test sheet."""
+    return {name: value for name, _, value in values(test_signal_of(waveform))
+            # it is commanded from outside
+            if name != 'external'}
