@@ -74,6 +74,7 @@ COMMANDS = {
     'report': Command('report', 'write a self-contained page about a recording'),
     'diagnose': Command('diagnose', 'say where a real drive and the model part, and why'),
     'propose': Command('propose', 'design the next test: the one that settles a verdict'),
+    'investigate': Command('investigate', 'test a drive until it is clear what is wrong with it'),
     'check-model': Command('check_model', 'tell what is wrong with a model of your own machine'),
     'predict': Command('predict', 'predict a recording that the diagnosis has not seen'),
     'diagnose-many': Command('diagnose_many', 'the diagnosis of many machines, one row each'),

@@ -31,14 +31,15 @@ from antenna_drive.diagnosis.machine import (
     Point, Regimes, TimeScales,
 )
 from antenna_drive.diagnosis.motion import Motion
+from antenna_drive.diagnosis.proposal import as_data
 from antenna_drive.diagnosis.ranking import rank_hypotheses, Ranking
 from antenna_drive.diagnosis.rivals import Rival
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
 from antenna_drive.diagnosis.unknown_input import courses
 
 __all__ = [
-    'ByLabel', 'check_machine', 'Colour', 'confusability', 'Confusability', 'Course',
-    'courses', 'DEFAULT', 'diagnose', 'Diagnosis', 'Diagram', 'DiagramBlock',
+    'as_data', 'ByLabel', 'check_machine', 'Colour', 'confusability', 'Confusability',
+    'Course', 'courses', 'DEFAULT', 'diagnose', 'Diagnosis', 'Diagram', 'DiagramBlock',
     'DisturbanceInput', 'Effect', 'Effort', 'Evidence', 'Experiment', 'FloatArray', 'Form',
     'Hypothesis', 'idle_effects', 'Judged', 'LeastSquares', 'Machine', 'MachineError',
     'Motion', 'Parameter', 'Point', 'Progress', 'Proposal', 'rank_hypotheses', 'Ranking',

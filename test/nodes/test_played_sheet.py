@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 
-TIME: NDArray[np.float64] = np.arange(601) * 1e-3
+TIME: NDArray[np.float64] = np.arange(601, dtype=np.float64) * 1e-3
 SHEET = """\
 waveform:
   type: knots
