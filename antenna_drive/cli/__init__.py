@@ -79,6 +79,7 @@ COMMANDS = {
     'predict': Command('predict', 'predict a recording that the diagnosis has not seen'),
     'diagnose-many': Command('diagnose_many', 'the diagnosis of many machines, one row each'),
     'trial': Command('trial', 'make sealed test cases with an independent antenna'),
+    'trial-next': Command('trial_next', 'try designed tests on sealed cases'),
     'score': Command('score', 'score the verdicts of a trial against its truths'),
     'thresholds': Command('thresholds', "list the diagnosis' thresholds and what they decide"),
     'servo': Command('servo', 'say what the model of an ordinary servo lacks'),

@@ -29,6 +29,7 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 import math
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from antenna_drive.diagnosis.confusability import confusability
@@ -66,12 +67,14 @@ class TestSpace(ABC):
     Attributes
     ----------
     families : names of the kinds of test
+    limits : that a test must keep, by name
 
     """
 
     __test__ = False  # not a test case, whatever pytest makes of the name
 
     families: Sequence[str]
+    limits: Mapping[str, float] = MappingProxyType({})
 
     @abstractmethod
     def draw(self, family: str, random: np.random.Generator) -> Any:

@@ -58,7 +58,7 @@ def as_data(proposal: Proposal, space: TestSpace, settings: Settings = DEFAULT) 
         'rivals': [{'effects': list(rival.named) or ['none'], 'probability': rival.probability}
                    for rival in rivals],
         'tried': proposal.tried, 'refused': dict(proposal.refused),
-        'helps': bool(proposal.tests), 'test': None}
+        'limits': dict(space.limits), 'helps': bool(proposal.tests), 'test': None}
     if proposal.tests:
         best = proposal.tests[0]
         found |= {'family': best.family, 'test': space.as_data(best.test),

@@ -67,6 +67,7 @@ class AntennaTests(TestSpace):
         """Take what all the tests have in common."""
         self._base, self._drive, self._limits = base, drive, limits
         self._duration, self._rate = duration, rate
+        self.limits = limits.as_data()
 
     def draw(self, family: str, random: np.random.Generator) -> TestSheet:
         """Return the sheet of a test of a family."""

@@ -45,6 +45,7 @@ class OwnTests(TestSpace):
         """Take the model."""
         self.families = tuple(model.tests)
         self._model, self._duration = model, duration_s
+        self.limits = model.limits
 
     def draw(self, family: str, random: np.random.Generator) -> Log:
         """Return the log of a test of a family, without readings."""
