@@ -23,9 +23,10 @@ is designed, run and recorded. One page tells the story.
   antenna-drive investigate --out found --by './run_on_the_antenna.sh {sheet} {out} {duration}'
 
 The drive is one of five nodes, started for each test, with the configuration of --real and the
-parameters of --set. With --by a command of your own runs each test on any drive: it plays {sheet}
-for {duration} seconds and writes the recording to {out}, a bag or CSV. For a drive that runs
-already these are test_signal with -p sheet:={sheet} and the recorder with -p out:={out}.
+parameters of --set. Noise and digits of the sheet's sensors are added to what they say. With --by
+a command of your own runs each test on any drive: it plays {sheet} for {duration} seconds and
+writes the recording to {out}, a bag or CSV. For a drive that runs already these are test_signal
+with -p sheet:={sheet} and the recorder with -p out:={out}.
 
 --out holds a file for each step. The same command goes on where an interrupted one was. The exit
 code is 1 if nothing was decided.
@@ -36,15 +37,18 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
+import os
 from pathlib import Path
 import shlex
 import subprocess
+import sys
 from typing import TYPE_CHECKING
 
 from antenna_drive.cli.output import add_json_option, check_options, give, Progress, replaced
 from antenna_drive.cli.settings import add_settings_option, parse_settings
 from antenna_drive.errors import UserError
 from antenna_drive.parameters.schema import Entry
+from antenna_drive.programs import PARENT
 
 if TYPE_CHECKING:
     from antenna_drive.machines.antenna.investigation import RunTest
@@ -95,6 +99,7 @@ def run(arguments: argparse.Namespace) -> int:
         DECIDED, headline, Investigation, lines, Plan,
     )
     from antenna_drive.machines.antenna.planned_tests import BUILT_IN
+    from antenna_drive.machines.antenna.sensors import SensorModel
     from antenna_drive.pages import render
     from antenna_drive.parameters.loading import load
     from antenna_drive.recording.sheet import load_sheet
@@ -116,7 +121,8 @@ def run(arguments: argparse.Namespace) -> int:
         story = Investigation(
             arguments.out, drive, limits, replace(base, waveform=None, start='rest'), run_test,
             Plan(arguments.max_tests, arguments.until, arguments.duration, arguments.seed), first,
-            arguments.jobs).run(show)
+            # the nodes give true values, another drive what its sensors read
+            None if arguments.by else SensorModel.of(base.sensors), arguments.jobs).run(show)
     title, lead = headline(story)
     with replaced(arguments.out / PAGE) as stream:
         stream.write(render('story.html', title=title, lead=lead, story=story,
@@ -127,30 +133,24 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _run_test(arguments: argparse.Namespace) -> RunTest:
     """Return what runs a test: a command, or a drive of five nodes."""
-    settings = parse_settings(arguments.settings)
     if arguments.by:
-        if settings or arguments.real:
+        if arguments.settings or arguments.real:
             raise UserError('--by: another drive has its own parameters; --real and --set are '
                             'those of the five nodes')
-        return _Command(arguments.by, arguments.out)
-
-    def on_nodes(sheet: TestSheet, duration: float, out: Path) -> None:
-        from antenna_drive.cli.record import record_drive
-        from antenna_drive.machines.antenna.played import parameters_of
-        from antenna_drive.parameters.loading import load
-        parameters = dict(settings)
-        for unit, values in parameters_of(sheet, load(*arguments.real)).items():
-            # what was set to stand for a fault is not set right again by a test
-            parameters[unit] = {**values, **settings.get(unit, {})}
-        record_drive(parameters, arguments.real, out, sheet, duration, quiet=True)
-
-    return on_nodes
+        return _Command(shlex.split(arguments.by))
+    # a fault of the middleware must not end an investigation
+    parse_settings(arguments.settings)
+    words = [sys.executable, '-m', 'antenna_drive', 'record', '--quiet', '--play', '{sheet}',
+             '--out', '{out}', '--duration', '{duration}']
+    for option, given in (('--config', arguments.real), ('--set', arguments.settings)):
+        words += [option, *given] if given else []
+    return _Command(words)
 
 
 class _Command:
-    """Runs tests by a command of the user's own."""
+    """Runs tests by a command."""
 
-    def __init__(self, words: str, folder: Path) -> None:
+    def __init__(self, words: Sequence[str]) -> None:
         """
         Take the command.
 
@@ -160,10 +160,9 @@ class _Command:
 
         """
         for place in ('{sheet}', '{out}'):
-            if place not in words:
-                raise UserError(f'--by {words}: {place} is missing')
-        self._words: Sequence[str] = shlex.split(words)
-        self._folder = folder
+            if not any(place in word for word in words):
+                raise UserError(f'--by: {place} is missing in {" ".join(words)}')
+        self._words = words
 
     def __call__(self, sheet: TestSheet, duration: float, out: Path) -> None:
         """Run a test, see `RunTest`."""
@@ -173,13 +172,14 @@ class _Command:
         words = [word.replace('{sheet}', str(path)).replace('{out}', str(out)).replace(
             '{duration}', f'{duration:g}') for word in self._words]
         try:
-            found = subprocess.run(words, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE,
-                                   text=True, check=False)
+            found = subprocess.run(words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.PIPE, text=True, check=False,
+                                   env={**os.environ, PARENT: str(os.getpid())})
         except OSError as error:
-            raise UserError(f'--by {words[0]}: {error.strerror}') from error
+            raise UserError(f'{words[0]}: {error.strerror}') from error
         finally:
             path.unlink(missing_ok=True)
         if found.returncode or not out.exists():
             last = (found.stderr.strip().splitlines() or ['nothing said'])[-1]
-            raise UserError(f'--by {words[0]}: exit code {found.returncode}, '
+            raise UserError(f'{words[0]}: exit code {found.returncode}, '
                             + ('' if out.exists() else 'no recording; ') + last)

@@ -26,10 +26,13 @@ from antenna_drive.diagnosis import Judged, Proposal, Rival, TestSpace
 from antenna_drive.errors import UserError
 from antenna_drive.machines.antenna import investigation
 from antenna_drive.machines.antenna.drive_limits import DriveLimits
-from antenna_drive.machines.antenna.investigation import Investigation, lines, Plan
+from antenna_drive.machines.antenna.field_recording import CHANNELS, RATE_COMMAND
+from antenna_drive.machines.antenna.investigation import Investigation, lines, Plan, sensed
 from antenna_drive.machines.antenna.planned_tests import BUILT_IN
+from antenna_drive.machines.antenna.sensors import SensorModel
 from antenna_drive.pages import render
 from antenna_drive.parameters.loading import load
+from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import load_sheet, TestSheet
 import numpy as np
 import pytest
@@ -144,6 +147,26 @@ def test_a_folder_of_another_investigation_is_refused(
     investigate(tmp_path, lab)
     with pytest.raises(UserError, match='other settings \\(duration_s\\)'):
         investigate(tmp_path, lab, duration=30.0)
+
+
+def test_readings_of_an_emulated_drive_get_the_errors_of_sensors() -> None:
+    time = np.arange(20000) * 1e-3
+    clean = {name: 3.0 * np.sin(time) for name in CHANNELS}
+    recording = Recording.from_arrays(time, {RATE_COMMAND: np.sin(time), **clean},
+                                      sheet=BUILT_IN['square'])
+    sensors = SensorModel(current_noise=0.02, current_step=0.05, tach_noise=0.01,
+                          tach_relative=0.0, tach_step=0.0, encoder_step=1e-3, bias_noise=0.0)
+    found = sensed(recording, sensors, [1, 2])
+    assert found.sheet == BUILT_IN['square']
+    assert found[RATE_COMMAND].values == pytest.approx(np.sin(time[::5]))
+    off = {name: found[name].values - 3.0 * np.sin(time[::5]) for name in CHANNELS}
+    # n = 4000 samples: their deviation is known to 1.2 percent
+    assert off['motor_1/ammeter'].std() == pytest.approx(
+        np.hypot(0.02, 0.05 / np.sqrt(12.0)), rel=0.05)
+    assert off['motor_2/tach_rate'].std() == pytest.approx(0.01, rel=0.05)
+    assert np.abs(off['plant/encoder']).max() <= 0.5001e-3
+    counts = found['motor_1/ammeter'].values / 0.05
+    assert counts == pytest.approx(np.round(counts), abs=1e-6)
 
 
 def test_the_page_tells_the_story(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,7 +20,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.trial import batch, third_tests
+from antenna_drive.trial import batch, sealing, third_tests
 from antenna_drive.trial.third_tests import is_open, reached, run_trial, set_of, with_test
 from antenna_drive.trial.verdict import parse_verdict, Verdict
 import numpy as np
@@ -111,7 +111,7 @@ def test_open_cases_get_third_tests_on_the_independent_antenna_and_a_trial_goes_
 
 def test_a_test_more_changes_nothing_else_of_a_case(tmp_path: Path, commands: Commands) -> None:
     manifest = batch.prepare(tmp_path, **SETTINGS, wild=True)  # type: ignore[arg-type]
-    truth = third_tests.sealing.open_truth(tmp_path, 'case_0001', manifest)
+    truth = sealing.open_truth(tmp_path, 'case_0001', manifest)
     sheet = {**truth['sheets'][0], 'waveform': SLEW}
     whole, number = with_test(truth, sheet, 2)
     assert whole['sheets'][:4] == truth['sheets'] and whole['sheets'][number] == sheet

@@ -36,14 +36,20 @@ from antenna_drive.errors import UserError
 from antenna_drive.machines.antenna.allowed_tests import AntennaTests
 from antenna_drive.machines.antenna.diagnose import diagnose_recordings
 from antenna_drive.machines.antenna.drive_limits import DriveLimits
+from antenna_drive.machines.antenna.field_recording import CHANNELS, RATE_COMMAND
+from antenna_drive.machines.antenna.sensors import SensorModel
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.files import read_recording
+from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import dump_sheet, parse_sheet, TestSheet
+import numpy as np
 
 SETTINGS, STORY = 'investigation.json', 'story.json'
 # Why an investigation ends.
 DECIDED, NO_MORE, NOTHING_HELPS = 'decided', 'no more tests', 'nothing helps'
 
+# Of a recording with added errors of sensors [Hz].
+_RATE_HZ = 200.0
 # Runs a test on the drive: from its sheet and its length [s] to a recording at a path.
 RunTest = Callable[[TestSheet, float, Path], None]
 Progress = Callable[[str, float], None]
@@ -89,6 +95,8 @@ class Investigation:
         what is to be done
     first
         the first test; None for the one that detects most
+    sensors
+        whose errors are added to the recordings, for a drive that has none; None for a real one
     threads
         simulations at once
     settings, effort
@@ -102,11 +110,12 @@ class Investigation:
 
     def __init__(self, folder: Path, drive: Drive, limits: DriveLimits, base: TestSheet,
                  run_test: RunTest, plan: Plan = Plan(), first: TestSheet | None = None,
-                 threads: int = 2, settings: Settings = DEFAULT,
-                 effort: Effort = Effort()) -> None:
+                 sensors: SensorModel | None = None, threads: int = 2,
+                 settings: Settings = DEFAULT, effort: Effort = Effort()) -> None:
         """Begin, or go on where an earlier run of the same investigation was."""
         self._folder, self._drive, self._base = folder, drive, base
         self._run_test, self._plan, self._first = run_test, plan, first
+        self._sensors = sensors
         self._threads, self._settings, self._effort = threads, settings, effort
         self._space = AntennaTests(base, drive, limits, plan.duration)
         folder.mkdir(parents=True, exist_ok=True)
@@ -213,13 +222,43 @@ class Investigation:
         for k in range(1, number + 1):
             recorded = self._recording(k)
             assert recorded is not None
-            recordings[f'test_{k}'] = read_recording(recorded)
+            recording = read_recording(recorded)
+            if self._sensors is not None:
+                recording = sensed(recording, self._sensors, [self._plan.seed, k])
+            recordings[f'test_{k}'] = recording
         diagnosis: Diagnosis = diagnose_recordings(
             recordings, self._drive,
             lambda share, doing: progress(f'diagnosis after test {number}', share),
             self._threads, self._settings)
         _write(path, diagnosis.result)
         return json.loads(path.read_text(encoding='utf-8'))  # type: ignore[no-any-return]
+
+
+def sensed(recording: Recording, sensors: SensorModel, seed: Sequence[int]) -> Recording:
+    """
+    Return the recording of an emulated drive as sensors would have read it.
+
+    The nodes give true values. A residual of theirs is smoother than any noise, and a verdict
+    would take that for something unknown.
+
+    Parameters
+    ----------
+    recording
+        with the readings of every macro-step
+    sensors
+        whose errors are added
+    seed
+        of their noise
+
+    """
+    command = recording[RATE_COMMAND]
+    every = slice(None, None, max(1, round(1.0 / _RATE_HZ / float(
+        np.median(np.diff(command.time_s))))))
+    clean = np.column_stack([recording[name].values for name in CHANNELS])[every]
+    readings = sensors.read(clean, np.random.default_rng(seed))
+    return Recording.from_arrays(
+        command.time_s[every], {RATE_COMMAND: command.values[every], **dict(zip(
+            CHANNELS, readings.T, strict=True))}, sheet=recording.sheet)
 
 
 def _chapter(number: int, proposal: Mapping[str, Any],
