@@ -19,7 +19,7 @@ recordings are diagnosed. While no answer is --until sure, the test that tells t
 is designed, run and recorded. One page tells the story.
 
   antenna-drive investigate --out found --real my_drive.yaml
-  antenna-drive investigate --out found --set axis.coulomb_torque=9.0e4 --max-tests 4 --until 0.9
+  antenna-drive investigate --out found --set motor_1.motor.coulomb_torque=0.095 --until 0.9
   antenna-drive investigate --out found --by './run_on_the_antenna.sh {sheet} {out} {duration}'
 
 The drive is one of five nodes, started for each test, with the configuration of --real and the
