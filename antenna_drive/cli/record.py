@@ -20,12 +20,16 @@ in force too. Without --config it is the reference set at rest; give the test si
   antenna-drive record --duration 20 --out run --config old_circuit
       --set test_signal.waveform=saw_tooth test_signal.amplitude=0.01196 test_signal.period=5
 
+--play plays a test sheet, such as `antenna-drive propose` writes: its waveform, bias, circuit and
+elevation are set on the nodes, and the bag carries it.
+
 To record a drive that runs already: ros2 run antenna_drive recorder --ros-args -p out:=run
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 import time
 from typing import Any
@@ -35,9 +39,10 @@ from antenna_drive.cli.settings import (
     add_config_option, add_settings_option, parse_settings,
 )
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
+from antenna_drive.errors import UserError
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.recording.recorder import RunRecorder
-from antenna_drive.recording.sheet import load_sheet
+from antenna_drive.recording.sheet import load_sheet, TestSheet
 
 _NAME = 'recorder'
 
@@ -50,7 +55,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='the folder to write; it must not be there yet')
     add_config_option(parser)
     add_settings_option(parser)
-    parser.add_argument('--sheet', type=Path, metavar='FILE', help='a test sheet for the bag')
+    given = parser.add_mutually_exclusive_group()
+    given.add_argument('--sheet', type=Path, metavar='FILE', help='a test sheet for the bag')
+    given.add_argument('--play', type=Path, metavar='FILE',
+                       help='a test sheet that the drive plays, and for the bag')
     parser.add_argument('--step', type=float, default=0.001, metavar='S',
                         help='macro-step [s]; 0.001 if not given')
     parser.add_argument('--pace', type=float, default=0.0, metavar='K',
@@ -62,16 +70,68 @@ def run(args: argparse.Namespace) -> int:
     """Start, record, end."""
     check_options(args, duration=Entry('s', 1e-5, 1e9), step=Entry('s', 1e-5, 0.1))
     parameters = parse_settings(args.settings)
+    sheet = load_sheet(args.play or args.sheet) if args.play or args.sheet else None
+    if args.play:
+        for unit, values in _played(args.play, sheet, args.config).items():
+            parameters[unit] = {**values, **parameters.get(unit, {})}
+    steps = record_drive(parameters, args.config, args.out, sheet, args.duration, args.step,
+                         args.pace, args.quiet)
+    print(f'{steps} steps, {round(args.duration / args.step) * args.step:g} s: {args.out}')
+    return 0
+
+
+def _played(path: Path, sheet: TestSheet | None,
+            config: Sequence[str]) -> Mapping[str, Mapping[str, Any]]:
+    """Return what a sheet sets on each node."""
+    from antenna_drive.machines.antenna.played import parameters_of
+    from antenna_drive.parameters.loading import load
+    assert sheet is not None
+    try:
+        return parameters_of(sheet, load(*config))
+    except UserError as error:
+        raise UserError(f'{path}: {error}') from None
+
+
+def record_drive(parameters: Mapping[str, Mapping[str, Any]], config: Sequence[str], out: Path,
+                 sheet: TestSheet | None, duration: float, step_s: float = 0.001,
+                 pace: float = 0.0, quiet: bool = False) -> int:
+    """
+    Start a drive in its five processes and record it.
+
+    Parameters
+    ----------
+    parameters, config
+        of its nodes, as `DriveProcesses` takes them
+    out
+        the folder to write, which must not be there yet
+    sheet
+        for the bag
+    duration, step_s
+        simulated time and macro-step [s]
+    pace
+        times real time; 0 for as fast as possible
+    quiet
+        show no progress
+
+    Returns
+    -------
+    number of steps that were recorded
+
+    Raises
+    ------
+    UserError : a node has ended by itself, or the bag cannot be written
+
+    """
     recorder = RunRecorder(
-        args.out, {f'{unit}/{s.name}': s.unit for unit, own in OUTPUTS.items() for s in own},
-        load_sheet(args.sheet) if args.sheet else None, recorded_by=_NAME)
+        out, {f'{unit}/{s.name}': s.unit for unit, own in OUTPUTS.items() for s in own},
+        sheet, recorded_by=_NAME)
     from antenna_drive.lockstep.observer import Observer
     from antenna_drive.lockstep.processes import DriveProcesses
     from antenna_drive.lockstep.sampling import RunWatch
-    last = round(args.duration / args.step)
-    parameters.setdefault(TEST_SIGNAL, {}).update({
-        'run.step': args.step, 'run.pace': args.pace, 'run.duration': last * args.step,
-        'run.observers': [_NAME]})
+    last = round(duration / step_s)
+    parameters = {**parameters, TEST_SIGNAL: {**parameters.get(TEST_SIGNAL, {}), **{
+        'run.step': step_s, 'run.pace': pace, 'run.duration': last * step_s,
+        'run.observers': [_NAME]}}}
 
     def step(number: int, time_s: float, samples: Any) -> None:
         if number <= last:
@@ -87,11 +147,10 @@ def run(args: argparse.Namespace) -> int:
 
     try:
         with Observer(_NAME, step, on_begin=recorder.begin, on_change=recorder.told) as observer, \
-                DriveProcesses(parameters, config=args.config) as processes, \
-                Progress('recording', last, quiet=args.quiet) as progress:
+                DriveProcesses(parameters, config=config) as processes, \
+                Progress('recording', last, quiet=quiet) as progress:
             watch = RunWatch(last, progress.update)
             observer.spin(complete)
     finally:
         recorder.close()
-    print(f'{recorder.steps} steps, {last * args.step:g} s: {recorder.path}')
-    return 0
+    return recorder.steps

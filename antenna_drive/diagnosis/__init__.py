@@ -20,6 +20,7 @@ This is its public face; machines import nothing else of it.
 from antenna_drive.diagnosis.by_label import ByLabel, without_labels
 from antenna_drive.diagnosis.check import check_machine, idle_effects, MachineError
 from antenna_drive.diagnosis.confusability import Confusability, confusability
+from antenna_drive.diagnosis.design import Effort, Judged, Proposal, TestDesign, TestSpace
 from antenna_drive.diagnosis.diagnosis import diagnose, Diagnosis, Progress
 from antenna_drive.diagnosis.diagram import Diagram, DiagramBlock
 from antenna_drive.diagnosis.evidence import Evidence
@@ -30,14 +31,17 @@ from antenna_drive.diagnosis.machine import (
     Point, Regimes, TimeScales,
 )
 from antenna_drive.diagnosis.motion import Motion
+from antenna_drive.diagnosis.proposal import as_data
 from antenna_drive.diagnosis.ranking import rank_hypotheses, Ranking
+from antenna_drive.diagnosis.rivals import Rival
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
 from antenna_drive.diagnosis.unknown_input import courses
 
 __all__ = [
-    'ByLabel', 'check_machine', 'Colour', 'Confusability', 'confusability', 'Course', 'courses',
-    'DEFAULT', 'diagnose', 'Diagnosis', 'Diagram', 'DiagramBlock', 'DisturbanceInput', 'Effect',
-    'Evidence', 'Experiment', 'FloatArray', 'Form', 'Hypothesis', 'idle_effects', 'LeastSquares',
-    'Machine', 'MachineError', 'Motion', 'Parameter', 'Point', 'Progress', 'rank_hypotheses',
-    'Ranking', 'Regimes', 'Settings', 'TimeScales', 'with_initial_conditions', 'without_labels',
+    'as_data', 'ByLabel', 'check_machine', 'Colour', 'Confusability', 'confusability', 'Course',
+    'courses', 'DEFAULT', 'diagnose', 'Diagnosis', 'Diagram', 'DiagramBlock', 'DisturbanceInput',
+    'Effect', 'Effort', 'Evidence', 'Experiment', 'FloatArray', 'Form', 'Hypothesis',
+    'idle_effects', 'Judged', 'LeastSquares', 'Machine', 'MachineError', 'Motion', 'Parameter',
+    'Point', 'Progress', 'Proposal', 'rank_hypotheses', 'Ranking', 'Regimes', 'Rival', 'Settings',
+    'TestDesign', 'TestSpace', 'TimeScales', 'with_initial_conditions', 'without_labels',
 ]

@@ -43,6 +43,7 @@ from antenna_drive.diagnosis.interventions import (
 from antenna_drive.diagnosis.lack_of_fit import lack_of_fit, remains, residual_tests
 from antenna_drive.diagnosis.least_squares import LeastSquares
 from antenna_drive.diagnosis.machine import Machine
+from antenna_drive.diagnosis.rivals import rivals_of
 from antenna_drive.diagnosis.search import Search
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
 try:
@@ -234,6 +235,10 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         'residual_tests': residual_tests(problem, best.state, lack),
         'may_enter_at': [vars(place) for place in places if place.evidence > 0.0],
         'fits': evidence.as_data(),
+        'planning': {
+            'inflation': evidence.inflation, **machine.planning,
+            'rivals': [rival.as_data() for rival in rivals_of(
+                problem, decision.answers, evidence.inflation, settings.planning)]},
         'seconds': time.monotonic() - began,
         'notes': notes,
     }

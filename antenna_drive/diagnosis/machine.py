@@ -26,10 +26,15 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 import math
+from types import MappingProxyType
+from typing import Any, TYPE_CHECKING
 
 from antenna_drive.diagnosis.diagram import Diagram
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from antenna_drive.diagnosis.design import TestSpace
 
 FloatArray = NDArray[np.float64]
 Point = Mapping[str, float]
@@ -265,6 +270,7 @@ class Machine(ABC):
     diagram : picture of the machine for the page; None for a block for each component
     advice : tests that settle what is open: names of effects without their component (empty for
         any), and what to record
+    planning : what the design of a further test must know of the tests, as plain data
 
     """
 
@@ -275,6 +281,7 @@ class Machine(ABC):
     notes: Sequence[str] = ()
     diagram: Diagram | None = None
     advice: Sequence[tuple[Sequence[str], str]] = ()
+    planning: Mapping[str, Any] = MappingProxyType({})
 
     def __init__(self, experiments: Iterable[Experiment], nuisances: Iterable[Parameter] = (),
                  effects: Iterable[Effect] = ()) -> None:
@@ -407,6 +414,37 @@ class Machine(ABC):
     def typical_form(self, effect: Effect) -> Form:
         """Return the form of an effect by which planned tests are judged."""
         return effect.forms[0]
+
+    def form_named(self, effect: Effect, name: str) -> Form:
+        """
+        Return the form of an effect by its name.
+
+        Raises
+        ------
+        KeyError : the effect has no such form
+
+        """
+        for form in effect.forms:
+            if form.name == name:
+                return form
+        raise KeyError(f'{effect.id}: {name}')
+
+    def test_space(self, duration_s: float) -> TestSpace:
+        """
+        Return the tests that the machine may run; the next one is chosen among them.
+
+        Parameters
+        ----------
+        duration_s
+            of a test [s]
+
+        Raises
+        ------
+        NotImplementedError : the machine does not say
+
+        """
+        raise NotImplementedError(f'{type(self).__name__} does not say what a test may be: '
+                                  'it lacks test_space')
 
     def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
         """Return the form of an effect's part that corresponds to a form of the effect."""

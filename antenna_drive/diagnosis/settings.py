@@ -280,8 +280,28 @@ class HeldOutSettings:
 class ConfusabilitySettings:
     """Which effects a planned test can tell apart, from derivatives alone."""
 
+    caution: float = _setting(
+        3.0, '1', 'by what a promised lack of fit is divided where tests are compared')
     alike: float = _setting(
         0.95, '1', 'share of what an effect does that another must imitate to pass for it')
+
+
+@dataclass(frozen=True)
+class PlanningSettings:
+    """Which answers of a verdict a further test is to tell apart."""
+
+    rivals: int = _setting(5, '1', 'greatest number of rivals')
+    least_probability: float = _setting(
+        0.005, '1', 'probability of an answer from which it is a rival')
+    passes: int = _setting(1, '1', "fresh derivatives of a rival's fit to another's readings")
+    least_information: float = _setting(
+        0.02, 'nat', 'expected information from which a test helps; of standard deviations, the '
+        'share by which one shrinks')
+    caution: float = _setting(
+        3.0, '1', 'by what a promised lack of fit is divided where tests are compared')
+    alike: float = _setting(
+        1.0, 'temperature', 'lack of fit up to which a test does not tell two rivals apart')
+    sure: float = _setting(0.9, 'probability', 'probability from which an answer is sure')
 
 
 @dataclass(frozen=True)
@@ -298,6 +318,7 @@ class Settings:
     localisation: LocalisationSettings = LocalisationSettings()
     held_out: HeldOutSettings = HeldOutSettings()
     confusability: ConfusabilitySettings = ConfusabilitySettings()
+    planning: PlanningSettings = PlanningSettings()
 
     def entries(self) -> Iterator[tuple[str, Field[Any], Any]]:
         """Yield each threshold: 'group.name', its field (see `metadata`), its value."""

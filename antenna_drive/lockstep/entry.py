@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from antenna_drive.parameters.schema import Value
     from rclpy.node import Node
 
+# A node's parameter: a test sheet that its unit plays.
+SHEET = 'sheet'
 # Makes the unit of a node: its name, the wiring, configuration files, what else was given by name.
 MakeUnit = Callable[[str, 'Wiring', Sequence[str], Mapping[str, Any]], 'Unit']
 
@@ -62,7 +64,8 @@ def run_drive_unit(default_name: str, names: Sequence[str], args: Sequence[str] 
     wiring
         module:NAME of the wiring unless the parameter `wiring` names another; '' is the drive's
     read_sheet
-        see DriveNode
+        returns the settings for a test sheet, where the unit has a parameter `sheet`; see
+        DriveNode
 
     Returns
     -------
@@ -72,6 +75,9 @@ def run_drive_unit(default_name: str, names: Sequence[str], args: Sequence[str] 
     def make(name: str, wired: Wiring, config: Sequence[str], given: Mapping[str, Any]) -> Unit:
         from antenna_drive.emulator import units
         import numpy as np
+        if read_sheet is not None and SHEET in given:
+            given = dict(given)
+            given = {**read_sheet(str(given.pop(SHEET))), **given}
         if name not in names:
             raise UserError(f'{name}: no such unit, allowed for this node are {", ".join(names)}; '
                             f'choose with --ros-args -r __node:={names[-1]}')
@@ -262,6 +268,8 @@ def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], wiring: str,
              if name not in OWN_PARAMETERS}
     wiring = ''.join(overrides.names('wiring', [wiring]))
     wired = find(wiring)
+    # the settings that a sheet stands for are parameters; its own name is none
+    overrides.names(SHEET, ())
     with told_while_compiling(node):
         unit = make(node.get_name(), wired, config, given)
         drive_node = DriveNode(node, unit, overrides, config, fed_by_topic, wiring, wired.outputs,

@@ -14,6 +14,9 @@
 """
 The test signals, and the owner of the run: its macro-step, pace and end, as a ROS 2 node.
 
+With sheet:=next.yaml it plays the waveform of a test sheet, from the beginning of the run; a
+parameter that is given beside it counts more.
+
 With waveform:=external the command follows the Float64 topic test_signal/external [rad/s].
 The services pause, resume, step, reset, play and state control the run, as in
   ros2 service call /test_signal/pause std_srvs/srv/Trigger
@@ -24,9 +27,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 import sys
-from typing import Any
+from typing import TYPE_CHECKING
 
 from antenna_drive.lockstep.entry import run_drive_unit
+
+if TYPE_CHECKING:
+    from antenna_drive.parameters.schema import Value
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -35,7 +41,8 @@ def main(args: Sequence[str] | None = None) -> int:
                           description=__doc__, read_sheet=_read_sheet)
 
 
-def _read_sheet(path: str) -> Mapping[str, Any]:
+def _read_sheet(path: str) -> Mapping[str, Value]:
+    """Return the settings that play the waveform of a test sheet."""
     from antenna_drive.recording.sheet_signal import settings_of
     return settings_of(Path(path))
 

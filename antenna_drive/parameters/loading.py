@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, MISSING, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -221,15 +222,19 @@ def _check_modes(axis: Axis, given: _Given) -> None:
 
 def check_waveform(waveform: Waveform, key: str) -> None:
     """
-    Check what no single entry shows: that the lists of a multisine are of one length.
+    Check what no single entry shows: lists that belong together, and the order of times.
 
     Raises
     ------
-    ParameterError : they are not; the message begins with `key`
+    ParameterError : lists differ in length, or times go back; the message begins with `key`
 
     """
-    count = len(waveform.frequencies)
-    for name in ('weights', 'phases'):
-        if len(getattr(waveform, name)) != count:
-            raise ParameterError(f'{key}.{name}: {len(getattr(waveform, name))} numbers given, '
-                                 f'allowed is {count}, one for each of frequencies')
+    for first, name in (('frequencies', 'weights'), ('frequencies', 'phases'),
+                        ('knot_times', 'knot_values')):
+        count, given = len(getattr(waveform, first)), len(getattr(waveform, name))
+        if given != count:
+            raise ParameterError(f'{key}.{name}: {given} numbers given, allowed is {count}, '
+                                 f'one for each of {first}')
+    if any(later < earlier for earlier, later in pairwise(waveform.knot_times)):
+        raise ParameterError(f'{key}.knot_times: a time before the one that precedes it, allowed '
+                             'are times in their order')

@@ -35,9 +35,11 @@ Choice = Any
 # The greatest numbers of flexible modes and of sines in a multisine that a set can hold.
 MODES_LIMIT = 6
 SINES_LIMIT = 32
+# ... and so many points has a signal of straight lines.
+KNOTS_LIMIT = 64
 
 WAVEFORMS = ('zero', 'square', 'saw_tooth', 'saw_tooth_jump', 'step', 'sine', 'chirp', 'multisine',
-             'prbs', 'external')
+             'prbs', 'external', 'knots')
 BIAS_SOURCES = ('circuit', 'fixed')
 SHARE_STARTS = ('zero', 'steady')
 
@@ -368,11 +370,22 @@ class Waveform:
     bit_time: float = _option(0.2, Entry('s', 1e-3, 1e3, 'time of one bit of a PRBS', live=True))
     external: float = _option(0.0, Entry(
         'SI', -1e9, 1e9, 'value commanded from outside', live=True))
+    knot_times: tuple[float, ...] = _option((0.0, 1.0), Entry(
+        's', 0.0, 1e6, 'times of the points of straight lines, two alike for a jump', live=True,
+        lengths=(1, KNOTS_LIMIT)))
+    knot_values: tuple[float, ...] = _option((0.0, 1.0), Entry(
+        '1', -1.0, 1.0, 'values there, as shares of the amplitude', live=True,
+        lengths=(1, KNOTS_LIMIT)))
 
     @property
     def frequencies_count(self) -> int:
         """Return the number of sines of a multisine."""
         return len(self.frequencies)
+
+    @property
+    def knot_times_count(self) -> int:
+        """Return the number of points of straight lines."""
+        return len(self.knot_times)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -36,7 +36,7 @@ OUTPUTS = (
 )
 OUTPUT = output_rows(OUTPUTS)
 (ZERO, SQUARE, SAW_TOOTH, SAW_TOOTH_JUMP, STEP, SINE, CHIRP, MULTISINE, PRBS,
- EXTERNAL) = range(10)
+ EXTERNAL, KNOTS) = range(11)
 # A time this share of a period before a jump counts as after it: k * h is not exact.
 _ON_TIME = 1e-9
 # Length of the shift register of the pseudo-random binary sequence: it repeats after 1023 bits.
@@ -66,6 +66,21 @@ def _saw_tooth(s: float) -> tuple[float, float]:
         rise += 4.0
     falls = 0.25 - _ON_TIME <= s < 0.75 - _ON_TIME
     return abs(rise - 2.0) - 1.0, -4.0 if falls else 4.0
+
+
+@inner
+def _between_knots(t: float, p: Waveform) -> tuple[float, float]:
+    """Return value and slope on the straight line between two points; zero outside of them."""
+    last = p.knot_times_count - 1
+    soon = t + _ON_TIME
+    if soon < p.knot_times[0] or soon >= p.knot_times[last]:
+        return 0.0, 0.0
+    right = 1
+    while p.knot_times[right] <= soon:
+        right += 1
+    begin, value = p.knot_times[right - 1], p.knot_values[right - 1]
+    slope = (p.knot_values[right] - value) / (p.knot_times[right] - begin)
+    return value + slope * (t - begin), slope
 
 
 @inner
@@ -104,6 +119,8 @@ def _shape(t: float, p: Waveform, bits: FloatArray) -> tuple[float, float]:
         return value, slope
     if kind == PRBS:
         return bits[int(t / p.bit_time + _ON_TIME) % bits.size], 0.0
+    if kind == KNOTS:
+        return _between_knots(t, p)
     return 0.0, 0.0
 
 

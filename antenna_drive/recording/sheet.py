@@ -22,6 +22,7 @@ names the file, the key and what is allowed.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, is_dataclass
+from itertools import pairwise
 import math
 from pathlib import Path
 from typing import Any, ClassVar, get_args, get_type_hints
@@ -29,7 +30,7 @@ from typing import Any, ClassVar, get_args, get_type_hints
 from antenna_drive.errors import one_line
 from antenna_drive.parameters.plain_yaml import read_yaml
 from antenna_drive.parameters.schema import Entry, mapping_of, ParameterError
-from antenna_drive.parameters.sets import SINES_LIMIT
+from antenna_drive.parameters.sets import KNOTS_LIMIT, SINES_LIMIT
 import yaml
 
 FILE_NAME = 'test_sheet.yaml'
@@ -126,7 +127,16 @@ class Chirp:
     start_s: float | None = _entry('s', 'when it begins')
 
 
-Waveform = Square | Triangle | Multisine | Chirp
+@dataclass(frozen=True)
+class Knots:
+    """Straight lines between points, zero outside of them; two points of one time are a jump."""
+
+    kind: ClassVar[str] = 'knots'
+    times_s: tuple[float, ...] | None = _numbers('s', 'time of each point, ascending', 0.0)
+    rates_deg_s: tuple[float, ...] | None = _numbers('deg/s', 'rate command at each point')
+
+
+Waveform = Square | Triangle | Multisine | Chirp | Knots
 
 
 @dataclass(frozen=True)
@@ -236,9 +246,10 @@ def _parse(key: str, tree: object, classes: tuple[type, ...]) -> Any:
             if not isinstance(value, list):
                 raise ParameterError(f'{full}: {one_line(repr(value))} given, allowed is '
                                      'a list of numbers')
-            if len(value) > SINES_LIMIT:
+            most = KNOTS_LIMIT if chosen is Knots else SINES_LIMIT
+            if len(value) > most:
                 raise ParameterError(f'{full}: {len(value)} numbers given, '
-                                     f'allowed are up to {SINES_LIMIT}')
+                                     f'allowed are up to {most}')
             content[name] = tuple(metadata['each'].check(f'{full}[{i}]', plain_value(item))
                                   for i, item in enumerate(value))
         else:
@@ -247,7 +258,12 @@ def _parse(key: str, tree: object, classes: tuple[type, ...]) -> Any:
     lengths = {name: len(value) for name, value in content.items()
                if 'each' in known[name].metadata}
     if len(set(lengths.values())) > 1:
-        raise ParameterError(f'{key}: {lengths} values given, allowed is one of each per sine')
+        raise ParameterError(f'{key}: {lengths} values given, allowed is one of each for '
+                             'every sine or point')
+    times = content.get('times_s', ())
+    if any(later < earlier for earlier, later in pairwise(times)):
+        raise ParameterError(f'{key}.times_s: a time before the one that precedes it, allowed are '
+                             'times in their order')
     return chosen(**content)
 
 

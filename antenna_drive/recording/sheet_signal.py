@@ -11,17 +11,16 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The test signal that plays the waveform of a test sheet."""
+"""The drive's test signal for the waveform of a test sheet."""
 
 from __future__ import annotations
 
-from dataclasses import fields
 import math
 from pathlib import Path
-from typing import Any
 
 from antenna_drive.errors import UserError
-from antenna_drive.parameters.sets import Waveform
+from antenna_drive.parameters.schema import Value
+from antenna_drive.parameters.sets import values, Waveform
 from antenna_drive.recording import sheet as sheets
 
 _DEGREE = math.pi / 180.0
@@ -29,6 +28,12 @@ _DEGREE = math.pi / 180.0
 
 def test_signal_of(waveform: sheets.Waveform) -> Waveform:
     """Return the drive's test signal that plays the waveform of a test sheet."""
+    if isinstance(waveform, sheets.Knots):
+        rates = waveform.rates_deg_s or (0.0,)
+        greatest = max(map(abs, rates)) or 1.0
+        return Waveform(waveform='knots', amplitude=greatest * _DEGREE,
+                        knot_times=waveform.times_s or (0.0,),
+                        knot_values=tuple(rate / greatest for rate in rates))
     amplitude = float(waveform.amplitude_deg_s or 0.0) * _DEGREE
     if isinstance(waveform, (sheets.Square, sheets.Triangle)):
         kind = 'square' if isinstance(waveform, sheets.Square) else 'saw_tooth'
@@ -44,9 +49,16 @@ def test_signal_of(waveform: sheets.Waveform) -> Waveform:
                     sweep_time=waveform.duration_s or 1.0)
 
 
-def settings_of(path: Path) -> dict[str, Any]:
+def settings_for(waveform: sheets.Waveform) -> dict[str, Value]:
+    """Return the settings of the node test_signal that play the waveform of a test sheet."""
+    return {name: value for name, _, value in values(test_signal_of(waveform))
+            # it is commanded from outside
+            if name != 'external'}
+
+
+def settings_of(path: Path) -> dict[str, Value]:
     """
-    Return the parameters of the node test_signal that play the test sheet in a file.
+    Return the settings that play the waveform of the test sheet in a file.
 
     The other entries of the sheet, such as the circuit, are for other nodes or for people.
 
@@ -58,6 +70,4 @@ def settings_of(path: Path) -> dict[str, Any]:
     waveform = sheets.load_sheet(path).waveform
     if waveform is None:
         raise UserError(f'{path}: waveform: is missing, so there is nothing to play')
-    played = test_signal_of(waveform)
-    return {item.name: getattr(played, item.name) for item in fields(played)
-            if item.name != 'external'}
+    return settings_for(waveform)

@@ -95,6 +95,9 @@ class SheetCommand:
             turns = np.arange(np.floor(phase) - 1.0, end / period + phase + 1.0, 0.5) + first
             times = (turns - phase) * period
             return times[(times > 0.0) & (times < end)]
+        if isinstance(w, sheets.Knots):
+            times = np.unique(w.times_s or ())
+            return times[(times > 0.0) & (times < end)]
         edges = [w.start_s or 0.0]
         if isinstance(w, sheets.Chirp):
             edges.append(edges[0] + (w.duration_s or 0.0))

@@ -76,7 +76,7 @@ class FieldTest:
     sensors : what they add
     jitter : of the time stamps [s]
     period : between two recorded samples [s]
-    tolerances : of zeros, recorders and clocks
+    sheet : what the tester knows, and what was inferred
     known_start : False if the simulation begins in the middle of a motion, whose state is not
         known; the zero of the encoder then follows from the readings alone
     labels : what was different in this test, by its sheet
@@ -93,9 +93,14 @@ class FieldTest:
     sensors: SensorModel
     jitter: float
     period: float
-    tolerances: sheets.Tolerances
+    sheet: sheets.TestSheet
     known_start: bool = True
     labels: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def tolerances(self) -> sheets.Tolerances:
+        """Return the tolerances of zeros, recorders and clocks."""
+        return self.sheet.tolerances or sheets.Tolerances()
 
     @cached_property
     def output_times(self) -> FloatArray:
@@ -186,7 +191,7 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
         name, record_of(drive), command,
         bias.later(window.begin), time - window.begin, measured, slope,
         sensors, jitter_of(recording.command, recording.rates.time_s, recording.rates.values),
-        recording.period, recording.sheet.tolerances or sheets.Tolerances(), window.known_start,
+        recording.period, recording.sheet, window.known_start,
         dict(recording.sheet.labels or ()))
     if not window.known_start:
         off = measured[:, ENCODER] - test.simulated(_STEP_S)[:, ENCODER]

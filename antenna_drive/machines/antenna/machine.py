@@ -16,7 +16,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 import copy
 from dataclasses import dataclass, replace
@@ -26,7 +26,7 @@ from typing import Any, TypeAlias
 
 from antenna_drive.diagnosis import (
     Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Motion, Parameter,
-    Point, Regimes, TimeScales,
+    Point, Regimes, TestSpace, TimeScales,
 )
 from antenna_drive.emulator import batch
 from antenna_drive.machines.antenna import gust
@@ -34,6 +34,7 @@ from antenna_drive.machines.antenna.advice import ADVICE
 from antenna_drive.machines.antenna.catalogue import catalogue, EXTRA_MODE
 from antenna_drive.machines.antenna.diagram import DIAGRAM
 from antenna_drive.machines.antenna.disturbances import DISTURBANCES, DriveDisturbance
+from antenna_drive.machines.antenna.drive_limits import DriveLimits
 from antenna_drive.machines.antenna.excitation import (
     Bias, Longest, RecordedCommand, schedule, with_bias, with_torque,
 )
@@ -52,6 +53,7 @@ from antenna_drive.machines.antenna.waves import fastest_wave, Wave
 from antenna_drive.parameters.records import place_of
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.recording import Recording
+from antenna_drive.recording.sheet import CircuitBias, sheet_tree, TestSheet
 import numpy as np
 
 _TIME_SCALES = TimeScales(start_s=1.5, scan_s=8.0, pulse_s=0.15, response_s=1.5, block_s=1.0)
@@ -152,6 +154,9 @@ class AntennaMachine(Machine):
                                     for form in effect.forms for p in form.parameters)):
             self._register(item)
         self.experiments = self._experiments({})
+        self._drive = drive
+        self._in_common = _in_common(test.sheet for test in self._tests)
+        self.planning = {'sheet': sheet_tree(self._in_common)}
 
     @property
     def records(self) -> Sequence[np.ndarray[Any, np.dtype[Any]]]:
@@ -259,6 +264,20 @@ class AntennaMachine(Machine):
             return self._wave_at(form, form.orders[min(11, len(form.orders) - 1)])
         return form
 
+    def test_space(self, duration_s: float) -> TestSpace:
+        """Return the tests that the drive may run within its usual limits."""
+        # it makes machines of its tests
+        from antenna_drive.machines.antenna.allowed_tests import AntennaTests
+        return AntennaTests(self._in_common, self._drive, DriveLimits.of_drive(self._drive),
+                            duration_s)
+
+    def form_named(self, effect: Effect, name: str) -> Form:
+        """Return the form of an effect by its name; that of a wave says its order."""
+        form = effect.forms[0]
+        if isinstance(form, Wave):
+            return self._wave_at(form, form.order_of(name))
+        return super().form_named(effect, name)
+
     def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
         """Return the form of an effect's part that corresponds to a form of the effect."""
         if not isinstance(form, Wave):
@@ -352,8 +371,30 @@ class AntennaMachine(Machine):
                              if not self._modifiers[item[0]].on_readings
                              and self._modifiers[item[0]].experiment in (None, k)), until)
 
+    def outputs(self, point: Point, experiment: int,
+                channels: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
+        """
+        Return outputs of the drive in one experiment that no sensor reads.
+
+        Parameters
+        ----------
+        point
+            parameter values by name
+        experiment
+            its index
+        channels
+            names of c outputs, 'unit/signal'
+
+        Returns
+        -------
+        times, shape (n,) [s], and values and slopes, shape (n, c, 2)
+
+        """
+        job = self._job(experiment, point, math.inf)
+        return self._tests[experiment].output_times, self._run(job, channels=channels)
+
     def _run(self, job: _Job, disturbance: tuple[DriveDisturbance, Course] | None = None,
-             ) -> FloatArray:
+             channels: tuple[str, ...] = batch.CHANNELS) -> FloatArray:
         test = self._tests[job.experiment]
         kind = test.record.dtype
         run = RunSetup(test.record.view(np.float64).copy(), kind, float(test.time[-1]), test.bias)
@@ -379,11 +420,11 @@ class AntennaMachine(Machine):
         time = test.output_times
         samples = int(np.count_nonzero(time - time[0] < job.until))
         if samples == time.size:
-            return batch.run(record, plan)
+            return batch.run(record, plan, channels=channels)
         steps = int(np.argmax(plan.keep == samples - 1))
-        out = np.full((time.size, len(CHANNELS), 2), np.nan)
-        out[:samples] = batch.run(record, batch.Schedule(plan.steps[:steps],
-                                                         plan.keep[:steps + 1]))
+        out = np.full((time.size, len(channels), 2), np.nan)
+        out[:samples] = batch.run(record, batch.Schedule(
+            plan.steps[:steps], plan.keep[:steps + 1]), channels=channels)
         return out
 
     def _plan(self, k: int, run: RunSetup, longest: Longest) -> batch.Schedule:
@@ -441,6 +482,14 @@ class AntennaMachine(Machine):
         elif digit > 0.0:
             values[:, ENCODER] = digit * np.floor(values[:, ENCODER] / digit + 0.5)
         return values
+
+
+def _in_common(sheets: Iterable[TestSheet]) -> TestSheet:
+    """Return what a further test of the machine shares with those that were made."""
+    first, *others = sheets
+    bias = next((sheet.bias for sheet in (first, *others)
+                 if isinstance(sheet.bias, CircuitBias)), first.bias)
+    return replace(first, waveform=None, bias=bias, start='rest')
 
 
 def _together(one: float, other: float, how: str) -> float:

@@ -65,6 +65,19 @@ class SensorModel:
         noise[:, 5] = math.hypot(self.bias_noise, self.bias_step / math.sqrt(12.0))
         return np.asarray(np.sqrt(noise ** 2 + (slope * jitter) ** 2))
 
+    def read(self, clean: FloatArray, random: np.random.Generator) -> FloatArray:
+        """Return what the sensors would read of true signals, shape (n, 6)."""
+        levels = np.empty_like(clean)
+        levels[:, :2] = self.current_noise
+        levels[:, 2:4] = np.hypot(self.tach_noise, self.tach_relative * clean[:, 2:4])
+        levels[:, 4] = 0.0
+        levels[:, 5] = self.bias_noise
+        digits = np.array([self.current_step, self.current_step, self.tach_step, self.tach_step,
+                           self.encoder_step, self.bias_step])
+        noisy = clean + levels * random.normal(size=clean.shape)
+        rounded = digits * np.round(noisy / np.where(digits > 0.0, digits, 1.0))
+        return np.asarray(np.where(digits > 0.0, rounded, noisy))
+
 
 def jitter_of(command: CommandedRate, time: FloatArray, values: FloatArray) -> float:
     """

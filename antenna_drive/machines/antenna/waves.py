@@ -29,6 +29,7 @@ _PARTS = ('sine', 'cosine', 'cycles_change', 'second_sine', 'second_cosine', 'th
           'third_cosine')
 
 
+_CYCLES = ' cycles per revolution'
 # The waves of the drive that follow a motor's angle: unit, part and name.
 _OF_MOTORS = tuple((motor, part, stem) for motor in ('motor_1', 'motor_2') for part, stem in (
     ('motor', 'torque_ripple'), ('gearbox', 'transmission_error'), ('tachometer', 'ripple')))
@@ -86,6 +87,20 @@ class Wave(Form):
     shape: WaveShape = WaveShape('', (), '')
     orders: tuple[float, ...] = ()
 
+    def order_of(self, name: str) -> float:
+        """
+        Return the order in the name of a form that `at` has made.
+
+        Raises
+        ------
+        KeyError : there is none in it
+
+        """
+        try:
+            return float(name.removesuffix(_CYCLES))
+        except ValueError:
+            raise KeyError(name) from None
+
     def at(self, order: float) -> Wave:
         """Return the form for one order, with parameters of its own."""
         shape = replace(self.shape, order=order)
@@ -95,7 +110,7 @@ class Wave(Form):
             assert isinstance(part.modifier, (_WavePart, _ReadingWavePart))
             parameters.append(replace(part, name=f'{part.name}@{order:g}',
                                       modifier=replace(part.modifier, shape=shape)))
-        return replace(self, name=f'{order:g} cycles per revolution',
+        return replace(self, name=f'{order:g}{_CYCLES}',
                        parameters=tuple(parameters), shape=shape, scanned=True)
 
 

@@ -17,6 +17,7 @@ A machine of your own for the diagnosis: a simulation in, the missing effect out
 This is its public face; docs/own-machine.md leads through it step by step.
 """
 
+from antenna_drive.machines.own.allowed_tests import own_tests, OwnTests
 from antenna_drive.machines.own.checking import check_model, Checked
 from antenna_drive.machines.own.declaration import (
     effect, form, free, known, machine, Model, ModelError, push, reading, ripple, shape, size,
@@ -33,7 +34,7 @@ from antenna_drive.machines.own.unseen import Unseen, unseen
 __all__ = [
     'check_model', 'Checked', 'diagnose_logs', 'effect', 'form', 'free', 'known', 'load_model',
     'Log', 'LogError', 'machine', 'Model', 'ModelError', 'Numbers', 'OneTest', 'OwnMachine',
-    'push', 'pushes_found', 'reading', 'read_log',
+    'own_tests', 'OwnTests', 'push', 'pushes_found', 'reading', 'read_log',
     'read_logs', 'ripple', 'shape', 'size', 'summary_of', 'Unseen', 'unseen',
     'within', 'without_gaps',
 ]

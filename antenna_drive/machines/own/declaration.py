@@ -26,12 +26,16 @@ from typing import Any
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.errors import UserError
 from antenna_drive.machines.own.log import Log
+from antenna_drive.parameters.schema import nearest
 import numpy as np
 
 # From numbers and a test to readings by name, shape (n,) each.
 Simulation = Callable[[Any, Any], Mapping[str, Any]]
 # The angle that a wave follows at each sample of a log [rad], shape (n,).
 Angle = Callable[[Log], FloatArray]
+
+# Draws a test: from its length [s] and a source of randomness to a log with its commands.
+DrawTest = Callable[[float, np.random.Generator], Log]
 
 # A difference quotient steps over this share of a number's bounds.
 _STEP_SHARE = 1e-3
@@ -359,6 +363,8 @@ class Model:
     advice: Sequence[str] = ()
     parallel: bool = False
     log: Callable[[Log], Log] | None = None
+    tests: Mapping[str, DrawTest] = field(default_factory=dict)
+    limits: Mapping[str, float] = field(default_factory=dict)
 
 
 def machine(simulate: Simulation, base: Mapping[str, Number], readings: Mapping[str, Reading],
@@ -366,7 +372,9 @@ def machine(simulate: Simulation, base: Mapping[str, Number], readings: Mapping[
             push: Mapping[str, Push] | None = None, settles_s: float | None = None,
             judged_hz: float | None = None, blocks: Sequence[str] = (),
             advice: Sequence[str] = (), parallel: bool = False,
-            log: Callable[[Log], Log] | None = None) -> Model:
+            log: Callable[[Log], Log] | None = None,
+            tests: Mapping[str, DrawTest] | None = None,
+            limits: Mapping[str, float] | None = None) -> Model:
     """
     Describe a machine of your own.
 
@@ -398,6 +406,12 @@ def machine(simulate: Simulation, base: Mapping[str, Number], readings: Mapping[
         True if `simulate` may run in several threads at once, as compiled functions may
     log
         makes of a log as it was read the log that the simulation wants, e.g. with further columns
+    tests
+        what a further test may be, by kind: f(duration_s, random) -> a log with its commands and
+        without readings, drawn with `random`, a numpy Generator. `antenna-drive propose` chooses
+        among them
+    limits
+        greatest size that a reading may have in such a test, by reading
 
     Raises
     ------
@@ -406,7 +420,7 @@ def machine(simulate: Simulation, base: Mapping[str, Number], readings: Mapping[
     """
     model = Model(simulate, dict(base), dict(readings), tuple(effects), dict(per_test or {}),
                   dict(push or {}), settles_s, judged_hz, tuple(blocks), tuple(advice), parallel,
-                  log)
+                  log, dict(tests or {}), dict(limits or {}))
     _check(model)
     return model
 
@@ -438,6 +452,14 @@ def _check(model: Model) -> None:
     for name in names:
         if names.count(name) > 1:
             raise ModelError(f'effect {name}: the name is there twice')
+    for name, draw in model.tests.items():
+        if not callable(draw):
+            raise ModelError(f'tests: {name}: give a function f(duration_s, random) -> Log')
+    for name, limit in model.limits.items():
+        if name not in model.readings:
+            raise ModelError(f'limits: {name}: no such reading{nearest(name, model.readings)}')
+        if not limit > 0.0:
+            raise ModelError(f'limits: {name}: {limit!r} given, allowed is a number above 0')
     for name, place in model.push.items():
         if not isinstance(place, Push) or not place.size > 0.0:
             raise ModelError(f'push: {name}: give push(component, label, unit, size) with a size '

@@ -22,7 +22,7 @@ import traceback
 
 from antenna_drive.diagnosis import (
     Course, Diagram, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Motion,
-    Parameter, Point, Regimes, TimeScales,
+    Parameter, Point, Regimes, TestSpace, TimeScales,
 )
 from antenna_drive.errors import UserError
 from antenna_drive.machines.own.declaration import Model, ModelError, Number, OwnEffect, Reading
@@ -36,6 +36,7 @@ import numpy as np
 _SAMPLES = 3000
 # Stands between the stem of a ripple's numbers and its order.
 _ORDER_MARK = '@'
+_CYCLES = ' cycles'
 # Orders of a ripple that a fit is tried with where they are not given.
 _FOUND_ORDERS = 4
 
@@ -215,6 +216,29 @@ class OwnMachine(Machine):
                                                                    0.27 * longest)),
                           pulse_s=0.1 * settles, response_s=settles, block_s=settles)
 
+    def test_space(self, duration_s: float) -> TestSpace:
+        """
+        Return the tests that the model declares.
+
+        Raises
+        ------
+        ModelError : it declares none
+
+        """
+        # it makes machines of its tests
+        from antenna_drive.machines.own.allowed_tests import own_tests
+        return own_tests(self.model, duration_s)
+
+    def form_named(self, effect: Effect, name: str) -> Form:
+        """Return the form of an effect by its name; that of a ripple says its order."""
+        own = next(item for item in self.model.effects if item.name == effect.id)
+        if own.ripple is None:
+            return super().form_named(effect, name)
+        try:
+            return _ripple_form(own, float(name.removesuffix(_CYCLES)))
+        except ValueError:
+            raise KeyError(f'{effect.id}: {name}') from None
+
     def forms(self, effect: Effect, residuals: Sequence[FloatArray]) -> Sequence[Form]:
         """Return the forms that are worth a fit: of a ripple, orders that stand out."""
         own = next(item for item in self.model.effects if item.name == effect.id)
@@ -307,7 +331,7 @@ def _parameter(name: str, item: Number) -> Parameter:
 
 def _ripple_form(item: OwnEffect, order: float) -> Form:
     assert item.ripple is not None
-    return Form(f'{order:g} cycles', tuple(
+    return Form(f'{order:g}{_CYCLES}', tuple(
         _parameter(f'{item.name}.{item.ripple.stem}_{part}{_ORDER_MARK}{order:g}',
                    item.ripple.amplitude)
         for part in ('cosine', 'sine')), scanned=True)

@@ -1,0 +1,197 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Design the next test: the one that tells the answers of a verdict apart.
+
+The verdict of `antenna-drive diagnose --json` names several answers that its recordings cannot
+tell apart. This command searches tests of eight kinds, with their amplitudes, periods, bias and
+elevation, for the one that settles most, within the limits of the drive. It writes a test sheet
+that test_signal plays and `diagnose` reads:
+
+  antenna-drive diagnose rec_a.csv rec_b.csv --json verdict.json
+  antenna-drive propose verdict.json --out next.yaml --report next.html
+  ros2 run antenna_drive test_signal --ros-args -p sheet:=next.yaml
+
+--objective sharpen asks for the test that makes the numbers of the likeliest answer most certain.
+--objective detect needs no verdict: it asks for the first test, for the effects of --suspect or
+for the whole catalogue. limits.yaml may hold rate_deg_s, acceleration_deg_s2, travel_deg,
+current_A, voltage_V, axis_torque_N_m, hot_current_A and hot_s; what it lacks follows from the
+configuration. With --model the machine is one of your own, and --out is a table of its commands.
+
+The exit code is 1 if no test within the limits helps. docs/next-test.md has more.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+import json
+from pathlib import Path
+import time
+from typing import Any, TYPE_CHECKING
+
+from antenna_drive.cli.output import add_json_option, check_options, give, Progress, replaced
+from antenna_drive.errors import UserError
+from antenna_drive.parameters.schema import Entry
+
+if TYPE_CHECKING:
+    from antenna_drive.diagnosis import Proposal, Rival, TestSpace
+
+_OBJECTIVES = ('separate', 'sharpen', 'detect')
+_RULES = ('d-optimal', 'random')
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.add_argument('verdict', nargs='?', type=Path, metavar='VERDICT',
+                        help='JSON of a diagnosis; not needed with --objective detect')
+    parser.add_argument('--objective', choices=_OBJECTIVES, default='separate',
+                        help='tell the answers apart, make numbers more certain, or find effects '
+                             'at all (default: separate)')
+    parser.add_argument('--suspect', nargs='+', default=[], metavar='EFFECT',
+                        help='effects that --objective detect looks for (default: all)')
+    parser.add_argument('--limits', type=Path, metavar='FILE',
+                        help='limits of the drive that no test may exceed (.yaml)')
+    parser.add_argument('--duration', type=float, default=30.0, metavar='S',
+                        help='length of the test (default: 30)')
+    parser.add_argument('--rate', type=float, default=200.0, metavar='HZ',
+                        help='sample rate of the recording (default: 200)')
+    parser.add_argument('--config', action='append', default=[], metavar='FILE',
+                        help='configuration of the model; may be repeated')
+    parser.add_argument('--model', metavar='FILE.py:NAME', help='a machine of your own')
+    parser.add_argument('--sheet', type=Path, metavar='FILE',
+                        help='what is known of the next test and is not to be changed: circuit, '
+                             'bias pot, sensors (default: as in the tests so far)')
+    parser.add_argument('--out', type=Path, metavar='FILE', help='write the test sheet to FILE')
+    parser.add_argument('--report', type=Path, metavar='FILE', help='write a page to FILE')
+    add_json_option(parser)
+    parser.add_argument('--jobs', type=int, default=2, metavar='N',
+                        help='tests that are simulated at once (default: 2)')
+    parser.add_argument('--seed', type=int, default=0, metavar='N',
+                        help='of the tests that are drawn (default: 0)')
+    parser.add_argument('--rule', choices=_RULES,
+                        help='choose by another rule, to compare with it')
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Search, and write what was asked for; 1 if no test within the limits helps."""
+    check_options(arguments, jobs=Entry('', 1, whole=True), duration=Entry('s', 5.0, 600.0),
+                  rate=Entry('Hz', 20.0, 10000.0), seed=Entry('', 0, whole=True))
+    objective = arguments.rule or arguments.objective
+    planning = _planning(arguments)
+    rivals, inflated = _rivals(arguments, planning, objective)
+    space = (_tests_of_own if arguments.model else _tests_of_drive)(arguments, planning)
+    from antenna_drive.diagnosis import TestDesign
+    from antenna_drive.diagnosis.proposal import as_data, contents, lines
+    began = time.monotonic()
+    with Progress('proposal', 1.0) as progress:
+        try:
+            found = TestDesign(space, rivals, inflated, objective, arguments.suspect,
+                               arguments.jobs, seed=arguments.seed).run(
+                lambda share, doing: progress.update(share))
+        except KeyError as error:
+            raise UserError(f'{arguments.verdict}: {error.args[0]}: this configuration knows no '
+                            'such effect; give the --config and --model of the diagnosis'
+                            ) from error
+    data = {**as_data(found, space), 'duration_s': arguments.duration,
+            'sample_rate_hz': arguments.rate, 'seconds': time.monotonic() - began}
+    if arguments.out and found.tests:
+        _write(arguments.out, found, space, data)
+    if arguments.report:
+        from antenna_drive.pages import render
+        with replaced(arguments.report) as stream:
+            shown = contents(found, space)
+            stream.write(render('proposal.html', **{**vars(shown), 'data': data}).encode())
+    give(data, arguments.json, '\n'.join(lines(data)))
+    return 0 if found.tests else 1
+
+
+def _planning(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Return what a verdict says for the design of a further test."""
+    path = arguments.verdict
+    if path is None:
+        if arguments.objective != 'detect':
+            raise UserError(f'which verdict? --objective {arguments.objective} needs the JSON of '
+                            'a diagnosis; without one there is --objective detect')
+        return {}
+    try:
+        data = json.loads(path.read_text(encoding='utf-8'))
+        return dict(data['planning'])
+    except (ValueError, TypeError) as error:
+        raise UserError(f'{path}: no JSON of a diagnosis: {error}') from error
+    except KeyError as error:
+        raise UserError(f'{path}: no entry {error.args[0]}: a verdict of an earlier version; '
+                        'diagnose the recordings again') from error
+
+
+def _rivals(arguments: argparse.Namespace, planning: dict[str, Any],
+            objective: str) -> tuple[list[Rival], float]:
+    from antenna_drive.diagnosis import Rival
+    if objective == 'detect':
+        return [], 1.0
+    try:
+        return ([Rival.of_data(item) for item in planning['rivals']],
+                float(planning['inflation']))
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise UserError(f'{arguments.verdict}: planning: {error!r}: damaged; diagnose the '
+                        'recordings again') from error
+
+
+def _tests_of_drive(arguments: argparse.Namespace, planning: dict[str, Any]) -> TestSpace:
+    from antenna_drive.machines.antenna.drive_limits import DriveLimits, read_limits
+    from antenna_drive.machines.antenna.planned_tests import BUILT_IN
+    from antenna_drive.machines.antenna.allowed_tests import AntennaTests
+    from antenna_drive.parameters.loading import load
+    from antenna_drive.recording.sheet import load_sheet, parse_sheet
+    drive = load(*arguments.config)
+    limits = (read_limits(arguments.limits, drive) if arguments.limits
+              else DriveLimits.of_drive(drive))
+    if arguments.sheet:
+        base = load_sheet(arguments.sheet)
+    elif 'sheet' in planning:
+        base = parse_sheet(planning['sheet'])
+    elif planning:
+        raise UserError(f'{arguments.verdict}: its tests carry labels or are not of this drive; '
+                        'give what the next test has in common with them as --sheet')
+    else:
+        base = BUILT_IN['square']
+    # the waveform is what is looked for; a proposal is a test from rest
+    return AntennaTests(replace(base, waveform=None, start='rest'), drive, limits,
+                        arguments.duration)
+
+
+def _tests_of_own(arguments: argparse.Namespace, planning: dict[str, Any]) -> TestSpace:
+    from antenna_drive.machines.own import load_model, own_tests
+    for option in ('config', 'limits', 'sheet'):
+        if getattr(arguments, option):
+            raise UserError(f'--{option}: does not go with --model; a model declares its own '
+                            'tests and limits')
+    return own_tests(load_model(arguments.model), arguments.duration)
+
+
+def _write(path: Path, found: Proposal, space: TestSpace, data: dict[str, Any]) -> None:
+    """Write the test that was found: a test sheet, or a table of commands."""
+    from antenna_drive.diagnosis.proposal import lines
+    best = found.tests[0]
+    heading = [f'{data["duration_s"]:g} s, at least {data["sample_rate_hz"]:g} samples per second',
+               *(line.strip() for line in lines(data))]
+    if data.get('channels'):
+        shares = sorted(data['channels'].items(), key=lambda item: -item[1])
+        heading.append('what tells: ' + ', '.join(
+            f'{name} {100.0 * share:.0f} %' for name, share in shares if share > 0.005))
+    for place, text in space.files(best.test, path).items():
+        with replaced(place) as stream:
+            if place.suffix == '.yaml':
+                stream.write(''.join(f'# {line}\n' for line in heading).encode())
+            stream.write(text.encode())

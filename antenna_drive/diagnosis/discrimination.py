@@ -1,0 +1,319 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+How well a planned test would tell rivals apart.
+
+The criterion is T-optimality: a test is good if a wrong rival fits badly however its numbers
+follow (A. C. Atkinson, V. V. Fedorov, Biometrika 62, 57, 1975; for several rivals, the same
+volume, 289). It goes back to W. G. Hunter, A. M. Reiner (Technometrics 7, 307, 1965), who hold
+the numbers at their fitted values, and takes prior probabilities and prior knowledge of the
+numbers into account as A. C. Ponce de Leon, A. C. Atkinson (Biometrika 78, 601, 1991) do. The
+criterion of G. E. P. Box, W. J. Hill (Technometrics 9, 57, 1967) weighs rivals in the same way,
+and sees a wrong rival's numbers through the variance of its prediction alone. With a hundred
+tolerances, that variance is as large as the readings. How far the numbers can follow must be
+known sample by sample, which T-optimality asks.
+
+The lack of fit of every pair becomes probabilities as in a verdict. The logarithm of what the
+true rival gets, in the mean over the rivals, is the information that the test is expected to give.
+
+To first order the best that a rival can do is a projection (`separation`). That is a promise. A
+fit of each rival to the readings of the others keeps or breaks it (`refitted`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, field, replace
+
+from antenna_drive.diagnosis.least_squares import LeastSquares, proper_precision
+from antenna_drive.diagnosis.machine import FloatArray, Machine, Parameter, Point
+from antenna_drive.diagnosis.noise import with_model_error
+from antenna_drive.diagnosis.rivals import Rival
+from antenna_drive.diagnosis.settings import DEFAULT, Settings
+import numpy as np
+from scipy import linalg
+
+# A fit goes this many standard deviations away at most, and a difference quotient this far.
+_FAR, _STEP = 8.0, 0.3
+# Relative precision of a product of single-precision columns.
+_SINGLE = 1e-6
+# A rival as good as impossible is no less probable than this.
+_LEAST = 1e-12
+
+
+@dataclass(frozen=True)
+class Separation:
+    """
+    What a planned test tells of r rivals.
+
+    Attributes
+    ----------
+    prior : probability of each rival before the test, shape (r,)
+    lack : half the chi-square by which rival j fits worse than i if i is true, shape (r, r)
+    channels : share of that which each signal gives; empty where it was not asked for
+    points : where the fit of rival j to the readings of i ended, by (i, j); empty without fits
+
+    """
+
+    prior: FloatArray
+    lack: FloatArray
+    channels: Mapping[str, float] = field(default_factory=dict)
+    points: Mapping[tuple[int, int], Point] = field(default_factory=dict)
+
+    def posterior(self, temperature: float) -> FloatArray:
+        """Return the probability of rival j after the test if i is true, shape (r, r)."""
+        logits = np.log(np.maximum(self.prior, _LEAST)) - self.lack / temperature
+        weights = np.exp(logits - logits.max(axis=1, keepdims=True))
+        return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+
+    def expected(self, temperature: float) -> float:
+        """Return the probability that the true rival is expected to get, if one of them is."""
+        return float(self.prior @ np.diag(self.posterior(temperature)))
+
+    def information(self, temperature: float) -> float:
+        """Return the information on which rival is true that is expected, in nats."""
+        after = np.maximum(np.diag(self.posterior(temperature)), _LEAST)
+        return float(self.prior @ np.log(after / np.maximum(self.prior, _LEAST)))
+
+    def surely(self, temperature: float, sure: float) -> float:
+        """Return how probable it is that the true rival gets at least the probability `sure`."""
+        return float(self.prior @ (np.diag(self.posterior(temperature)) >= sure))
+
+    def least_lack(self) -> FloatArray:
+        """Return by how much two rivals are told apart at least, whichever is true, (r, r)."""
+        return np.asarray(np.minimum(self.lack, self.lack.T))
+
+
+def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
+               settings: Settings = DEFAULT, follow: bool = True) -> Separation:
+    """
+    Return how well the planned tests of a machine would tell rivals apart, to first order.
+
+    Parameters
+    ----------
+    machine
+        in the planned tests; what they measured does not count
+    rivals
+        of a verdict, r of them
+    inflated
+        by what the cost's differences are divided
+    settings
+        thresholds
+    follow
+        False to leave the numbers as they are: more than can be told, found without derivatives
+        (Hunter and Reiner's criterion)
+
+    Raises
+    ------
+    KeyError : the machine's catalogue lacks an effect or a form
+
+    """
+    points = [known_to(machine, rival) for rival in rivals]
+    problem = _problem(machine, rivals, points, settings)
+    residuals = np.array([problem.residuals(point) for point in points])
+    prior, lack = _prior(rivals), np.zeros((len(rivals), len(rivals)))
+    channels = problem.experiments[0].channels
+    power = np.zeros(len(channels))
+    for j, rival in enumerate(rivals):
+        off = residuals[j] - residuals
+        gain = np.zeros(len(rivals))
+        rest = off
+        if follow:
+            gain, rest = _followed(problem, rival, points[j], off, inflated)
+        lack[:, j] = 0.5 * np.maximum(np.sum(off ** 2, axis=1) - gain, 0.0) / inflated
+        power += prior @ np.sum(rest.reshape(len(rivals), -1, power.size) ** 2, axis=1)
+    shares = power / max(float(power.sum()), _LEAST)
+    return Separation(prior, lack, dict(zip(channels, shares.tolist(), strict=True)))
+
+
+def refitted(machine: Machine, rivals: Sequence[Rival], inflated: float,
+             settings: Settings = DEFAULT) -> Separation:
+    """
+    Return the same as `separation`, with each rival fitted to the readings of each other one.
+
+    Parameters, errors raised : as in `separation`
+    """
+    points = [known_to(machine, rival) for rival in rivals]
+    problem = _problem(machine, rivals, points, settings)
+    readings = machine.simulate(points)
+    lack = np.zeros((len(rivals), len(rivals)))
+    ends: dict[tuple[int, int], Point] = {}
+    for j, rival in enumerate(rivals):
+        own = _Continued(problem.machine, rival, inflated)
+        jacobian = None
+        for i, truth in enumerate(readings):
+            if i == j:
+                continue
+            fitted = LeastSquares(own.with_experiments([
+                replace(e, measured=values) for e, values in zip(
+                    problem.experiments, truth, strict=True) if values is not None]),
+                settings=settings)
+            state = fitted.start(own.nuisances, {}, jacobian)
+            # it does not depend on what was measured
+            jacobian = state.base_jacobian
+            state = fitted.fit(state, settings.search.iterations)
+            for _ in range(settings.planning.passes):
+                state = fitted.fit(fitted.refreshed(state, central=False),
+                                   settings.search.iterations)
+            lack[i, j] = state.cost / inflated
+            ends[i, j] = own.own(state.point())
+    return Separation(_prior(rivals), lack, points=ends)
+
+
+def deviations(machine: Machine, rival: Rival, inflated: float,
+               settings: Settings = DEFAULT) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
+    """
+    Return how well the planned tests of a machine would determine the numbers of a rival.
+
+    Parameters
+    ----------
+    machine, inflated, settings
+        as in `separation`
+    rival
+        of a verdict
+
+    Returns
+    -------
+    names of its m known numbers, and their covariances before and after, shape (m, m) each
+
+    """
+    point = known_to(machine, rival)
+    problem = _problem(machine, [rival], [point], settings)
+    numbers = _numbers(machine, rival)
+    jacobian = problem.jacobian(point, numbers, problem.residuals(point), central=False)
+    known = (jacobian.T @ jacobian).astype(float) + _precision(rival, numbers, inflated)
+    names = [p.name for p in numbers if p.name in rival.names]
+    places = [j for j, p in enumerate(numbers) if p.name in rival.names]
+    scale = np.sqrt(np.diag(known))
+    inverse = linalg.cho_solve(_factor(known, scale), np.eye(scale.size)) / np.outer(scale, scale)
+    return (tuple(names), rival.covariance_of(names),
+            np.asarray(inflated * inverse[np.ix_(places, places)]))
+
+
+class _Continued(Machine):
+    """
+    A machine whose numbers count from where the tests so far have left them.
+
+    Each of its numbers is a standard deviation along one direction that the tests have left free.
+    """
+
+    def __init__(self, machine: Machine, rival: Rival, inflated: float) -> None:
+        """Take a rival's numbers and their covariance."""
+        numbers = _numbers(machine, rival)
+        self._machine = machine
+        self._known = [p for p in numbers if p.name in rival.names]
+        self._centre = np.array([rival.point[p.name] for p in self._known])
+        values, vectors = np.linalg.eigh(rival.covariance_of([p.name for p in self._known]))
+        self._directions = vectors * np.sqrt(np.maximum(values, 0.0))
+        free = [Parameter(f'direction {k}', '1', -_FAR, _FAR, _STEP, 1.0 / np.sqrt(inflated))
+                for k in range(len(self._known))]
+        super().__init__(machine.experiments,
+                         [*free, *(p for p in numbers if p.name not in rival.names)])
+        self._free = [p.name for p in free]
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return the readings of one experiment."""
+        return self._machine.predict(self.own(point), experiment)
+
+    def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
+                 until: float = np.inf) -> list[list[FloatArray | None]]:
+        """Return the readings of several variants; see `Machine.simulate`."""
+        return self._machine.simulate([self.own(point) for point in points], only, until)
+
+    def low_fidelity(self) -> Machine:
+        """Return the same with the faster machine."""
+        other = copy(self)
+        other._machine = self._machine.low_fidelity()
+        return other
+
+    def own(self, point: Point) -> dict[str, float]:
+        """Return a point in the machine's own numbers, each within its bounds."""
+        along = np.array([point.get(name, 0.0) for name in self._free])
+        values = self._centre + self._directions @ along
+        return {**{name: value for name, value in point.items() if name not in self._free},
+                **{p.name: float(min(max(value, p.low), p.high))
+                   for p, value in zip(self._known, values, strict=True)}}
+
+
+def known_to(machine: Machine, rival: Rival) -> dict[str, float]:
+    """Return a rival's values as far as the planned tests have these numbers."""
+    own = {p.name for p in _numbers(machine, rival)}
+    return {name: value for name, value in rival.point.items() if name in own}
+
+
+def _numbers(machine: Machine, rival: Rival) -> list[Parameter]:
+    return [*machine.nuisances, *(p for form in rival.forms_of(machine) for p in form.parameters)]
+
+
+def _prior(rivals: Sequence[Rival]) -> FloatArray:
+    prior = np.array([rival.probability for rival in rivals])
+    return np.asarray(prior / prior.sum())
+
+
+def _problem(machine: Machine, rivals: Sequence[Rival], points: Sequence[Point],
+             settings: Settings) -> LeastSquares:
+    """Return the planned tests as the likeliest rival makes them, with a model's usual error."""
+    likeliest = int(np.argmax([rival.probability for rival in rivals]))
+    [readings] = machine.simulate([points[likeliest]])
+    experiments = [replace(e, measured=values) for e, values in zip(
+        machine.experiments, readings, strict=True) if values is not None]
+    return LeastSquares(machine.with_experiments(with_model_error(experiments, settings.noise)),
+                        settings=settings)
+
+
+def _followed(problem: LeastSquares, rival: Rival, point: dict[str, float], off: FloatArray,
+              inflated: float) -> tuple[FloatArray, FloatArray]:
+    """
+    Return what remains of differences after a rival's numbers have followed them.
+
+    Parameters
+    ----------
+    problem, rival, point, inflated
+        the planned tests, and the rival where it is
+    off
+        differences in standard deviations, shape (r, n)
+
+    Returns
+    -------
+    by how much each chi-square has fallen, shape (r,), and the differences then, shape (r, n)
+
+    """
+    numbers = _numbers(problem.machine, rival)
+    jacobian = problem.jacobian(point, numbers, problem.residuals(point), central=False)
+    known = (jacobian.T @ jacobian).astype(float) + _precision(rival, numbers, inflated)
+    scale = np.sqrt(np.diag(known))
+    slopes = (off.astype(np.float32) @ jacobian).astype(float) / scale
+    steps = linalg.cho_solve(_factor(known, scale), slopes.T).T
+    return (np.asarray(np.sum(slopes * steps, axis=1)),
+            np.asarray(off - (steps / scale) @ jacobian.T))
+
+
+def _factor(known: FloatArray, scale: FloatArray) -> tuple[FloatArray, bool]:
+    # products of single precision may leave nearly parallel columns indefinite
+    factor: tuple[FloatArray, bool] = linalg.cho_factor(
+        known / np.outer(scale, scale) + _SINGLE * np.eye(scale.size))
+    return factor
+
+
+def _precision(rival: Rival, numbers: Sequence[Parameter], inflated: float) -> FloatArray:
+    """Return what is known of a planned test's numbers, from tests so far or from priors."""
+    precision = np.diag(proper_precision(numbers))
+    places = [j for j, p in enumerate(numbers) if p.name in rival.names]
+    known = rival.covariance_of([numbers[j].name for j in places])
+    scale = np.sqrt(np.maximum(np.diag(known), 1e-30))
+    inverse = linalg.pinvh(known / np.outer(scale, scale)) / np.outer(scale, scale)
+    # the costs are divided by the inflation in the end, which the covariance holds already
+    precision[np.ix_(places, places)] = inverse * inflated
+    return precision

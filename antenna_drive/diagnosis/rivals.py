@@ -1,0 +1,145 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+What a verdict knows of its rivals: the next test is designed from it, see `discrimination`.
+
+Each rival is a hypothesis with its numbers as fitted and how well the tests so far determine them.
+Numbers of a single test, such as where it starts, are integrated out: the next test has its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from antenna_drive.diagnosis.intervals import covariance
+from antenna_drive.diagnosis.least_squares import LeastSquares
+from antenna_drive.diagnosis.machine import FloatArray, Form, Machine
+from antenna_drive.diagnosis.settings import PlanningSettings
+from antenna_drive.diagnosis.verdict import Answer
+import numpy as np
+
+# Digits of a covariance in a file: a number's deviation is known to a few percent at best.
+_DIGITS = 5
+
+
+@dataclass(frozen=True)
+class Rival:
+    """
+    An answer of a verdict.
+
+    Attributes
+    ----------
+    named : effects that it names; none for 'none'
+    effects, forms : what was fitted, with the name of the form of each
+    probability : of the answer, in the verdict
+    names, values : numbers of the machine and of the effects, shape (m,)
+    covariance : of the values, shape (m, m)
+
+    """
+
+    named: tuple[str, ...]
+    effects: tuple[str, ...]
+    forms: tuple[str, ...]
+    probability: float
+    names: tuple[str, ...]
+    values: FloatArray
+    covariance: FloatArray
+
+    @property
+    def point(self) -> dict[str, float]:
+        """Return the values by name."""
+        return dict(zip(self.names, self.values.tolist(), strict=True))
+
+    def forms_of(self, machine: Machine) -> list[Form]:
+        """
+        Return the forms of the effects in a machine.
+
+        Raises
+        ------
+        KeyError : the machine's catalogue lacks an effect or a form
+
+        """
+        return [machine.form_named(machine.effects[effect], form)
+                for effect, form in zip(self.effects, self.forms, strict=True)]
+
+    def covariance_of(self, names: Sequence[str]) -> FloatArray:
+        """Return the covariance of some of the values."""
+        places = [self.names.index(name) for name in names]
+        return self.covariance[np.ix_(places, places)]
+
+    def as_data(self) -> dict[str, Any]:
+        """
+        Return the rival as plain data, for the JSON.
+
+        Of the covariance it has the lower triangle, each row a text: thousands of numbers, a line
+        each, would bury the verdict.
+        """
+        rows = [' '.join(f'{x:.{_DIGITS}g}' for x in row[:i + 1])
+                for i, row in enumerate(self.covariance)]
+        return {'named': list(self.named), 'effects': list(self.effects),
+                'forms': list(self.forms), 'probability': self.probability,
+                'names': list(self.names), 'values': self.values.tolist(), 'covariance': rows}
+
+    @classmethod
+    def of_data(cls, data: Mapping[str, Any]) -> Rival:
+        """
+        Take a rival from plain data.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError, AttributeError : it is none
+
+        """
+        names = tuple(data['names'])
+        lower = np.zeros((len(names), len(names)))
+        for i, row in enumerate(data['covariance']):
+            lower[i, :i + 1] = [float(x) for x in row.split()]
+        return cls(tuple(data['named']), tuple(data['effects']), tuple(data['forms']),
+                   float(data['probability']), names, np.array(data['values'], float),
+                   lower + np.tril(lower, -1).T)
+
+
+def rivals_of(problem: LeastSquares, answers: Sequence[Answer], inflated: float,
+              settings: PlanningSettings) -> list[Rival]:
+    """
+    Return the likeliest answers of a verdict with what is known of their numbers.
+
+    Parameters
+    ----------
+    problem
+        the whole tests
+    answers
+        of the verdict, the likeliest first
+    inflated
+        variance over that with independent noise, see `intervals.inflation`
+    settings
+        thresholds
+
+    """
+    found = []
+    for answer in answers[:settings.rivals]:
+        if answer.probability < settings.least_probability:
+            continue
+        hypothesis, state = answer.hypothesis, answer.hypothesis.state
+        if state.kept_hessian is None:
+            state = hypothesis.with_jacobian(problem).state
+        shared = [j for j, p in enumerate(state.parameters) if p.experiment is None]
+        spread = covariance(state, inflated, problem.settings.interval)
+        found.append(Rival(
+            answer.effects, hypothesis.effects, tuple(form.name for form in hypothesis.forms),
+            answer.probability, tuple(state.parameters[j].name for j in shared),
+            state.x[shared], spread[np.ix_(shared, shared)]))
+    return found

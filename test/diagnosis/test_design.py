@@ -1,0 +1,173 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The search for the next test, on a machine whose best test is known beforehand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from antenna_drive.diagnosis import (
+    Effect, Effort, Experiment, FloatArray, Form, Judged, Machine, Parameter, Point, Rival,
+    TestDesign, TestSpace,
+)
+from antenna_drive.diagnosis.design import CRITERIA
+from antenna_drive.diagnosis.proposal import as_data, contents, lines
+import numpy as np
+import pytest
+
+SMALL = Effort(drawn=8, judged=6, varied=2, variants=2, confirmed=2)
+
+
+class Lever(Machine):
+    """
+    A lever that is deflected by a load: y = (compliance + hardening load^2 + copy) load.
+
+    A test is a load. Compliance and its copy are alike at any load; hardening shows at a great
+    one alone.
+    """
+
+    def __init__(self, load: float, sigma: float = 0.01) -> None:
+        self.load = load
+        super().__init__(
+            [Experiment('next', np.linspace(0.0, 1.0, 60), ('y',), ('m',), np.zeros((60, 1)),
+                        np.full((60, 1), sigma), model_error=np.zeros(1))],
+            [Parameter('zero', 'm', -1.0, 1.0, 0.01, 0.05)],
+            [Effect(f'lever.{name}', 'lever', '', '', (Form('', (
+                Parameter(f'lever.{name}', '1', -10.0, 10.0, 0.01),)),))
+             for name in ('compliance', 'hardening', 'copy')])
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        swing = self.load * np.sin(2.0 * np.pi * self.experiments[0].time)
+        y = (1.0 + point.get('lever.compliance', 0.0) + point.get('lever.copy', 0.0)
+             + point.get('lever.hardening', 0.0) * swing ** 2) * swing + point.get('zero', 0.0)
+        return np.asarray(y[:, None])
+
+
+class Loads(TestSpace):
+    """Loads up to a limit."""
+
+    families = ('weak', 'strong')
+
+    def __init__(self, limit: float) -> None:
+        self.limit = limit
+
+    def draw(self, family: str, random: np.random.Generator) -> float:
+        bounds = (0.001, 0.005) if family == 'weak' else (0.5, 2.0)
+        return float(random.uniform(*bounds))
+
+    def machine(self, test: Any) -> Lever:
+        return Lever(test)
+
+    def use(self, machine: Machine, points: Sequence[Point]) -> Mapping[str, float]:
+        assert isinstance(machine, Lever)
+        return {'load_N': machine.load / self.limit, 'other': 0.0}
+
+    def unread(self, machine: Machine, one: Point, other: Point) -> Mapping[str, float]:
+        return {'strain gauge': abs(one.get('lever.copy', 0.0) - other.get('lever.copy', 0.0)),
+                'blind gauge': 0.0}
+
+
+def rival(name: str, size: float, probability: float) -> Rival:
+    effects = (f'lever.{name}',) if name else ()
+    return Rival(effects, effects, ('',) * len(effects), probability, ('zero', *effects),
+                 np.array([0.0, size][:1 + len(effects)]),
+                 np.diag([1e-4, 0.01][:1 + len(effects)]))
+
+
+HARD = [rival('compliance', 0.2, 0.6), rival('hardening', 0.3, 0.4)]
+
+
+@pytest.mark.parametrize('objective', sorted(CRITERIA))
+def test_a_strong_load_within_the_limit_is_proposed(objective: str) -> None:
+    found = TestDesign(Loads(1.6), HARD, 1.0, objective, effort=SMALL).run()
+    assert found.criterion == CRITERIA[objective]
+    assert all(test.use['load_N'] <= SMALL.margin for test in found.tests)
+    assert found.refused['load_N'] > 0
+    if objective != 'random':
+        assert found.tests[0].family == 'strong'
+        assert found.tests[0].test > 0.75
+
+
+def test_the_promise_for_the_best_test_is_confirmed_by_fits() -> None:
+    found = TestDesign(Loads(1.6), HARD, 1.0, effort=SMALL).run()
+    best = found.tests[0]
+    assert best.confirmed is not None and best.told is not None
+    data = as_data(found, Loads(1.6))
+    assert data['expected']['confirmed']
+    assert data['expected']['right_after'] > 0.95 > data['expected']['right_before']
+    assert data['expected']['surely'] == 1.0
+    assert len(data['others']) > 1
+
+
+def test_where_no_load_within_the_limit_helps_the_limit_is_named() -> None:
+    found = TestDesign(Loads(0.2), HARD, 1.0, effort=SMALL).run()
+    assert not found.tests
+    data = as_data(found, Loads(0.2))
+    said = lines(data)
+    assert said[0] == 'no test within the limits helps'
+    assert 'load_N' in said[1] and 'strong' in said[1]
+    assert contents(found, Loads(0.2)).title == 'No test within the limits helps'
+
+
+def test_what_no_test_tells_apart_is_said_with_the_sensor_that_would() -> None:
+    alike = [rival('compliance', 0.2, 0.5), rival('copy', 0.2, 0.3), rival('hardening', 0.3, 0.2)]
+    found = TestDesign(Loads(1.6), alike, 1.0, effort=SMALL).run()
+    data = as_data(found, Loads(1.6))
+    [pair] = data['not_told_apart']
+    assert pair['rivals'] == ['lever.compliance', 'lever.copy']
+    assert [item['sensor'] for item in pair['sensors']] == ['strain gauge']
+    assert any('strain gauge would' in line for line in lines(data))
+    # hardening is split from both, and they share what they had
+    shares = {tuple(item['effects']): item['after_if_true'] for item in data['expected']['each']}
+    assert shares[('lever.hardening',)] > 0.95
+    assert shares[('lever.compliance',)] == pytest.approx(0.5 / 0.8, abs=0.02)
+
+
+def test_with_a_single_answer_there_is_nothing_to_tell_apart() -> None:
+    found = TestDesign(Loads(1.6), [rival('compliance', 0.2, 0.95)], 1.0, effort=SMALL).run()
+    assert not found.tests
+    assert 'nothing to tell apart' in lines(as_data(found, Loads(1.6)))[1]
+
+
+def test_a_sharpening_test_has_the_deviation_of_the_closed_form() -> None:
+    found = TestDesign(Loads(1.6), [rival('compliance', 0.2, 0.95)], 1.0, 'sharpen',
+                       effort=SMALL).run()
+    best = found.tests[0]
+    # y = (1 + c) load sin: the information is load^2 n / 2 / sigma^2, and the prior's; the zero is
+    # orthogonal to the sine but for the last sample
+    swing = best.test * np.sin(2.0 * np.pi * np.linspace(0.0, 1.0, 60))
+    expected = (1.0 / 0.01 + float(swing @ swing) / 0.01 ** 2) ** -0.5
+    before, after = best.deviations['lever.compliance']
+    assert before == pytest.approx(0.1)
+    assert after == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_suspicion_is_looked_for_alone() -> None:
+    found = TestDesign(Loads(1.6), objective='detect', suspected=['lever.hardening'],
+                       effort=SMALL).run()
+    assert set(found.tests[0].sizes) == {'lever.hardening'}
+    greatest = max(test.test for test in found.tests)
+    assert found.tests[0].test == greatest
+
+
+def test_the_same_seed_proposes_the_same_test() -> None:
+    one, other, third = (TestDesign(Loads(1.6), HARD, 1.0, effort=SMALL, seed=seed).run().tests[0]
+                         for seed in (3, 3, 4))
+    assert isinstance(one, Judged) and one.test == other.test != third.test
+
+
+def test_a_machine_that_does_not_say_what_a_test_may_be_says_so() -> None:
+    with pytest.raises(NotImplementedError, match='Lever does not say what a test may be'):
+        Lever(1.0).test_space(30.0)

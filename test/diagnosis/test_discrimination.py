@@ -1,0 +1,133 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Rivals in planned tests: a T-optimal design of the literature, closed forms, and fits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+
+from antenna_drive.diagnosis import (
+    Effect, Experiment, FloatArray, Form, Machine, Parameter, Point, Rival,
+)
+from antenna_drive.diagnosis.discrimination import refitted, Separation, separation
+import numpy as np
+import pytest
+
+WIDE = 1e3
+
+
+class Curves(Machine):
+    """Two curves with three numbers each, read at some places; either one alone is the truth."""
+
+    def __init__(self, x: FloatArray, sigma: float) -> None:
+        self.x = x
+        effects = [Effect(f'part.{name}', 'part', '', '', (Form('', tuple(
+            Parameter(f'{name}_{k}', '1', -WIDE, WIDE, 0.01) for k in range(3))),))
+            for name in ('waves', 'parabola')]
+        super().__init__([Experiment(
+            'one', np.arange(x.size, dtype=float), ('y',), ('1',), np.zeros((x.size, 1)),
+            np.full((x.size, 1), sigma), model_error=np.zeros(1))], (), effects)
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        curves = {'waves': (np.ones_like(self.x), np.exp(self.x), np.exp(-self.x)),
+                  'parabola': (np.ones_like(self.x), self.x, self.x ** 2)}
+        return np.asarray(sum(
+            point.get(f'{name}_{k}', 0.0) * column
+            for name, columns in curves.items() for k, column in enumerate(columns)))[:, None]
+
+
+def rival(name: str, values: Sequence[float], sigma: float, probability: float = 0.5) -> Rival:
+    """Return a curve whose numbers are known to within sigma."""
+    return Rival((f'part.{name}',), (f'part.{name}',), ('',), probability,
+                 tuple(f'{name}_{k}' for k in range(3)), np.array(values, float),
+                 sigma ** 2 * np.eye(3))
+
+
+# A. C. Atkinson, V. V. Fedorov, Biometrika 62 (1975) 57, first example: the true curve is
+# 4.5 - 1.5 exp(x) - 2 exp(-x), the rival a parabola, x from -1 to 1.
+TRUE = (4.5, -1.5, -2.0)
+POINTS, WEIGHTS, DELTA = (-1.0, -0.669, 0.144, 0.957), (0.253, 0.428, 0.247, 0.072), 1.087e-3
+READINGS = 1000
+
+
+def lack_at(x: FloatArray, sigma: float = 0.05) -> float:
+    """Return the mean square by which the best parabola misses the true curve."""
+    told = separation(Curves(x, sigma), [rival('waves', TRUE, 1e-6),
+                                         rival('parabola', (0.0, 0.0, 0.0), 100.0)], 1.0)
+    return float(told.lack[0, 1]) * 2.0 * sigma ** 2 / x.size
+
+
+def test_the_published_t_optimal_design_has_the_published_lack_of_fit() -> None:
+    x = np.repeat(POINTS, [round(READINGS * weight) for weight in WEIGHTS])
+    assert lack_at(x) == pytest.approx(DELTA, rel=3e-3)
+
+
+def test_no_other_design_has_a_greater_lack_of_fit() -> None:
+    random = np.random.default_rng(1)
+    designs = [np.linspace(-1.0, 1.0, READINGS), np.repeat([-1.0, -1 / 3, 1 / 3, 1.0], 250)]
+    designs += [np.repeat(random.uniform(-1.0, 1.0, 5), 200) for _ in range(20)]
+    best = lack_at(np.repeat(POINTS, [253, 428, 247, 72]))
+    assert all(lack_at(x) < best for x in designs)
+
+
+def test_two_constants_are_told_apart_as_the_prior_of_one_allows() -> None:
+    # n readings of noise s: a is known, b only to within v; the mean of the readings has
+    # variance v + f s^2 / n about b, if the cost is divided by f
+    a, b, v, s, n, f = 0.3, 0.1, 0.04, 0.5, 400, 2.5
+    machine = Curves(np.zeros(n), s)
+    # at x = 0 only the first number of the parabola counts
+    rivals = [rival('waves', (a, 0.0, 0.0), 1e-6), rival('parabola', (b, 0.0, 0.0), math.sqrt(v))]
+    found = separation(machine, rivals, f)
+    assert found.lack[0, 1] == pytest.approx((a - b) ** 2 / 2.0 / (v + f * s ** 2 / n), rel=1e-3)
+    assert found.lack[0, 0] == found.lack[1, 1] == 0.0
+    still = separation(machine, rivals, f, follow=False)
+    assert still.lack[0, 1] == pytest.approx((a - b) ** 2 * n / s ** 2 / 2.0 / f)
+
+
+def test_fits_of_linear_curves_end_where_the_projection_says() -> None:
+    # small differences: the robust loss of a fit is quadratic there
+    x = np.linspace(-1.0, 1.0, 200)
+    rivals = [rival('waves', TRUE, 0.02, 0.7), rival('parabola', (1.0, 0.0, -1.8), 0.2, 0.3)]
+    machine = Curves(x, 0.5)
+    promised, kept = separation(machine, rivals, 1.6), refitted(machine, rivals, 1.6)
+    assert kept.lack == pytest.approx(promised.lack, rel=2e-3, abs=1e-6)
+    assert kept.points[0, 1].keys() == {f'parabola_{k}' for k in range(3)}
+
+
+def test_probabilities_after_a_test() -> None:
+    told = Separation(np.array([0.7, 0.3]), np.array([[0.0, 8.0], [16.0, 0.0]]))
+    first = 0.7 / (0.7 + 0.3 * math.exp(-1.0))
+    second = 0.3 / (0.3 + 0.7 * math.exp(-2.0))
+    assert told.posterior(8.0)[0, 0] == pytest.approx(first)
+    assert told.expected(8.0) == pytest.approx(0.7 * first + 0.3 * second)
+    assert told.information(8.0) == pytest.approx(
+        0.7 * math.log(first / 0.7) + 0.3 * math.log(second / 0.3))
+    assert told.surely(8.0, 0.8) == pytest.approx(0.7)
+    assert told.least_lack()[0, 1] == 8.0
+
+
+def test_the_signals_that_tell_have_their_shares() -> None:
+    x = np.linspace(-1.0, 1.0, 100)
+    found = separation(Curves(x, 0.1), [rival('waves', TRUE, 0.1),
+                                        rival('parabola', (1.0, 0.0, -1.8), 0.1)], 1.0)
+    assert found.channels == {'y': 1.0}
+
+
+def test_a_rival_survives_its_file() -> None:
+    one = rival('waves', TRUE, 0.02, 0.7)
+    back = Rival.of_data(one.as_data())
+    assert back.named == one.named and back.names == one.names
+    assert back.point == one.point
+    assert back.covariance == pytest.approx(one.covariance)

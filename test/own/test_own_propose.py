@@ -1,0 +1,109 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The next test of a machine of one's own: a swing that may be pushed off anywhere."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from antenna_drive.cli import main
+from antenna_drive.diagnosis import Effort, Rival, TestDesign
+from antenna_drive.machines.own import effect, Log, Model, ModelError, own_tests, read_log, size
+import numpy as np
+from own.swing import swing
+import pytest
+
+SMALL = Effort(drawn=6, judged=4, varied=1, variants=1, confirmed=1)
+
+
+def push_off(duration_s: float, random: np.random.Generator) -> Log:
+    """Return a test in which the swing starts somewhere."""
+    time = np.arange(0.0, duration_s, 0.01)
+    return Log('push-off', time, {'turn': 0.7 * time}, {'height': float(random.uniform(0.1, 2.0))})
+
+
+def simulate(numbers: Any, test: Any) -> dict[str, Any]:
+    """Return the angle of a swing that starts where the test says, with friction of two kinds."""
+    fall = np.exp(-(numbers.decay + numbers.more) * test.time) - numbers.dry * test.time
+    angle = test.constants['height'] * np.maximum(fall, 0.0) * np.cos(2.0 * test.time)
+    return {'angle': angle, 'rate': np.gradient(angle, test.time)}
+
+
+def model(**changes: Any) -> Model:
+    """Return the model of a swing with two kinds of friction, and the tests that it may run."""
+    return swing(**{'simulate': simulate, 'effects': [
+        effect('bearing.oil', more=size(-0.1, 0.3)), effect('bearing.dry', dry=size(0.0, 0.1))],
+        'per_test': {}, 'push': {}, 'tests': {'push-off': push_off}, 'limits': {'angle': 1.5},
+        **changes})
+
+
+def rivals() -> list[Rival]:
+    return [Rival((f'bearing.{name}',), (f'bearing.{name}',), ('',), probability,
+                  ('decay', f'bearing.{name}.{number}'), np.array([0.0, value]),
+                  np.diag([1e-6, 1e-6]))
+            for name, number, probability, value in (
+                ('oil', 'more', 0.6, 0.02), ('dry', 'dry', 0.4, 0.01))]
+
+
+def test_the_limit_of_a_reading_is_kept() -> None:
+    found = TestDesign(own_tests(model(), 10.0), rivals(), 1.0, effort=SMALL).run()
+    best = found.tests[0]
+    assert best.test.constants['height'] <= SMALL.margin * 1.5
+    assert found.refused == {'angle': sum(found.refused.values())}
+    assert best.confirmed is not None and best.confirmed.expected(8.0) > 0.99
+
+
+def test_readings_of_a_planned_test_have_the_errors_of_a_model() -> None:
+    space = own_tests(model(), 10.0)
+    machine = space.machine(space.draw('push-off', np.random.default_rng(1)))
+    [experiment] = machine.experiments
+    assert experiment.model_error == pytest.approx(3e-3 * experiment.measured.std(axis=0))
+    assert experiment.measured == pytest.approx(machine.predict({}, 0))
+
+
+def test_a_model_without_tests_says_what_it_lacks() -> None:
+    with pytest.raises(ModelError, match='does not say what a test may be'):
+        own_tests(model(tests={}), 10.0)
+
+
+@pytest.mark.parametrize('changes, words', [
+    ({'limits': {'angel': 1.0}}, 'limits: angel: no such reading, did you mean angle'),
+    ({'limits': {'angle': 0.0}}, 'limits: angle: 0.0 given'),
+    ({'tests': {'push-off': 3}}, 'tests: push-off: give a function')])
+def test_wrong_declarations_are_refused(changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(ModelError, match=words):
+        model(**changes)
+
+
+def test_the_command_writes_the_commands_of_the_test(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / 'my_swing.py').write_text(
+        'from own.test_own_propose import model\nmachine = model()\n')
+    verdict = tmp_path / 'verdict.json'
+    verdict.write_text(json.dumps({'planning': {
+        'inflation': 1.0, 'rivals': [rival.as_data() for rival in rivals()]}}))
+    code = main(['propose', str(verdict), '--model', str(tmp_path / 'my_swing.py'),
+                 '--duration', '10', '--jobs', '1', '--out', str(tmp_path / 'next.csv'),
+                 '--json', str(tmp_path / 'next.json'), '--report', str(tmp_path / 'next.html')])
+    assert code == 0
+    data = json.loads((tmp_path / 'next.json').read_text())
+    assert data['expected']['right_after'] > 0.99 and data['expected']['confirmed']
+    rows = [line for line in (tmp_path / 'next.csv').read_text().splitlines() if line[0] != '#']
+    assert rows[0] == 'time_s,turn' and len(rows) == 1001
+    back = read_log(tmp_path / 'next.csv')
+    assert 0.1 < back.constants['height'] <= SMALL.margin * 1.5
+    assert 'next test: push-off' in (tmp_path / 'next.yaml').read_text()
+    assert 'bearing.oil' in (tmp_path / 'next.html').read_text()

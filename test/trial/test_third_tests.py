@@ -1,0 +1,119 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The trial of designed tests: which cases it takes, what it runs, and how it goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import json
+from pathlib import Path
+from typing import Any
+
+from antenna_drive.trial import batch, sealing, third_tests
+from antenna_drive.trial.third_tests import is_open, reached, run_trial, set_of, with_test
+from antenna_drive.trial.verdict import parse_verdict, Verdict
+import numpy as np
+import pytest
+import yaml
+
+SETTINGS = {'count': 3, 'seed': 5, 'tolerance': 0.02, 'sample_rate': 200.0, 'duration': 30.0}
+SLEW = {'type': 'knots', 'times_s': [0.1, 0.6, 1.4, 1.9], 'rates_deg_s': [0.0, 0.3, 0.3, 0.0]}
+
+
+def verdict_of(answers: dict[str, float], confusable: Sequence[Sequence[str]] = ()) -> Any:
+    return {'verdict': 'explained', 'confusable': list(confusable), 'which': [
+        {'effects': name.split(' + '), 'probability': p, 'parameters': {}}
+        for name, p in answers.items()], 'how_far': {'explained_fraction': {'value': 0.9}},
+        'seconds': 1.0}
+
+
+def parsed(*rest: Any) -> Verdict:
+    return parse_verdict(verdict_of(*rest))
+
+
+def test_a_case_is_open_if_unsure_or_if_a_set_is_named() -> None:
+    assert is_open(parsed({'motor_1.coulomb_friction': 0.6, 'unknown': 0.4}))
+    assert not is_open(parsed({'motor_1.coulomb_friction': 0.9, 'unknown': 0.1}))
+    pair = ['motor_1.coulomb_friction', 'motors.coulomb_friction']
+    sure_of_a_set = parsed({pair[0]: 0.9, 'unknown': 0.1}, [pair])
+    assert is_open(sure_of_a_set) and set_of(sure_of_a_set) == 2
+    assert set_of(parsed({pair[0]: 0.5, pair[1]: 0.3, 'none': 0.16, 'unknown': 0.04})) == 3
+
+
+class Commands:
+    """Stands for the commands that the trial runs; counts them."""
+
+    def __init__(self) -> None:
+        self.words: list[list[str]] = []
+
+    def __call__(self, words: Sequence[str], limit_s: float = 0.0) -> str:
+        self.words.append(list(words))
+        target = Path(words[words.index('--json') + 1])
+        if words[0] == 'propose':
+            sheet = {'waveform': SLEW, 'bias': {'type': 'circuit', 'bias_pot': 0.8},
+                     'elevation_deg': 30.0}
+            target.write_text(json.dumps({
+                'test': sheet, 'family': 'slews', 'expected': {'right_after': 0.95},
+                'limits': {'rate_deg_s': 0.2 if '--rule' in words else 10.0}}))
+            Path(words[words.index('--out') + 1]).write_text(yaml.safe_dump(sheet))
+            return 'exit code 0\n'
+        # two recordings leave the second case open, three settle it
+        recordings = [Path(word) for word in words if word.endswith('.csv')]
+        sure = len(recordings) == 3 or recordings[0].parent.name != 'case_0002'
+        target.write_text(json.dumps(verdict_of(
+            {'none': 0.9, 'unknown': 0.1} if sure else {'none': 0.5, 'unknown': 0.4,
+                                                        'axis.inertia': 0.1})))
+        return 'exit code 0\n'
+
+
+@pytest.fixture
+def commands(monkeypatch: pytest.MonkeyPatch) -> Commands:
+    found = Commands()
+    monkeypatch.setattr(third_tests, 'run_command', found)
+    monkeypatch.setattr(third_tests, 'DURATION_S', 2.0)
+    monkeypatch.setattr(third_tests, 'make_case', lambda folder, truth: (
+        folder / truth['case']).mkdir())
+    return found
+
+
+def test_open_cases_get_third_tests_on_the_independent_antenna_and_a_trial_goes_on(
+        tmp_path: Path, commands: Commands) -> None:
+    manifest = batch.prepare(tmp_path, **SETTINGS, wild=True)  # type: ignore[arg-type]
+    rules = ('proposed', 'random', 'square')
+    found = run_trial(tmp_path, manifest, 2, 1, 60.0, rules=rules)
+    assert found['diagnosed'] == 3 and found['open'] == 1
+    told = json.loads((tmp_path / 'case_0002/third_tests.json').read_text())
+    assert list(told) == list(rules)
+    # the slew of the sheet is what the antenna did
+    assert told['proposed']['reached']['rate_deg_s'] == pytest.approx(0.3, rel=0.2)
+    assert told['proposed']['reached']['travel_deg'] == pytest.approx(0.39, rel=0.2)
+    assert found['rules']['random']['violations'] == 1
+    assert found['rules']['proposed']['violations'] == 0
+    assert found['rules']['proposed']['median_set_before'] == 3
+    assert found['rules']['proposed']['median_set'] == 2
+    assert found['rules']['best_built_in']['cases'] == 1
+    assert (tmp_path / 'case_0002/rec_proposed.csv').exists()
+    asked = len(commands.words)
+    assert run_trial(tmp_path, manifest, 2, 1, 60.0, rules=rules) == found
+    assert len(commands.words) == asked
+
+
+def test_a_test_more_changes_nothing_else_of_a_case(tmp_path: Path, commands: Commands) -> None:
+    manifest = batch.prepare(tmp_path, **SETTINGS, wild=True)  # type: ignore[arg-type]
+    truth = sealing.open_truth(tmp_path, 'case_0001', manifest)
+    sheet = {**truth['sheets'][0], 'waveform': SLEW}
+    whole, number = with_test(truth, sheet, 2)
+    assert whole['sheets'][:4] == truth['sheets'] and whole['sheets'][number] == sheet
+    assert whole['seed'] == truth['seed'] and len(whole['durations_s']) == number + 1
+    assert np.isfinite(list(reached(whole, number).values())).all()
