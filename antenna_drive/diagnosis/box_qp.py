@@ -24,6 +24,8 @@ from scipy import linalg
 _ALL_AT_ONCE = 12
 # A gradient below this, in the metric of the scaled Hessian, gains nothing.
 _LEVEL = 1e-6
+# Rounding errors of a Hessian summed in single precision, as shares of its diagonal.
+_ROUNDING = 1e-6
 
 
 def box_constrained_step(hessian: FloatArray, gradient: FloatArray, low: FloatArray,
@@ -75,8 +77,15 @@ def box_constrained_step(hessian: FloatArray, gradient: FloatArray, low: FloatAr
 
 
 def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve for a symmetric matrix, by its Cholesky factor if it has one."""
+    """
+    Solve for a symmetric matrix with a diagonal of ones, by its Cholesky factor.
+
+    A Hessian that was summed in single precision need not be positive definite. Along a direction
+    that is flat within its rounding nothing is known, and a ridge of that size goes nowhere there.
+    """
     factor, failed = linalg.lapack.dpotrf(matrix, lower=1)
-    if failed:
-        return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-10)[0])
+    ridge = _ROUNDING
+    while failed:
+        factor, failed = linalg.lapack.dpotrf(matrix + ridge * np.eye(len(matrix)), lower=1)
+        ridge *= 10.0
     return np.asarray(linalg.lapack.dpotrs(factor, right, lower=1)[0])

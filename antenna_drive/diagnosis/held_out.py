@@ -206,7 +206,8 @@ class _Judge:
         search = self._settings.search
         if (unaided.cost < (1.0 + search.doubtful) * found.cost
                 or problem.noise_level(found.residual) > search.wanting):
-            unaided = self._settled(problem, unaided)
+            options = self._settings.held_out
+            unaided = settled(problem, unaided, search, options.passes, options.iterations)
             found = min(found, self._added(problem, part, unaided), key=lambda s: s.cost)
         return problem, unaided, found
 
@@ -279,14 +280,13 @@ class _Judge:
                 **{p.name: found.value(p.name) for p in judged}}
         # the nuisances begin where training has left them, too
         own = {p.name for p in testing.parameters(self._nuisances) if p.experiment is not None}
-        begin = with_initial_conditions(problem, {
-            **{name: value for name, value in found.point().items() if name not in own}, **held})
-        state = self._fitted(testing, self._nuisances, held, begin, self._with)
+        begin = {name: value for name, value in found.point().items() if name not in own}
+        state = self._fitted(testing, self._nuisances, held, {**begin, **held}, self._with)
         if problem.noise_level(state.residual) > self._settings.search.wanting:
             # or where the fit without effects has left them
-            begin = with_initial_conditions(problem, {**bare.point(), **held})
-            state = min(state, self._fitted(testing, self._nuisances, held, begin, self._with),
-                        key=lambda fit: fit.cost)
+            again = self._fitted(testing, self._nuisances, held, {**bare.point(), **held},
+                                 self._with)
+            state = min(state, again, key=lambda fit: fit.cost)
         # what a change of the effect leaves once the offsets have followed it
         slope = self._with.for_part(testing, judged)
         cross = weighted_product(state.jacobian, state.weight, slope)
@@ -362,11 +362,6 @@ class _Judge:
         own = testing.parameters(nuisances)
         return trained(testing.holding(held), own, begin, [slopes.for_part(testing, own)],
                        self._settings)
-
-    def _settled(self, problem: LeastSquares, state: FitState) -> FitState:
-        """Go on with a fit, with fresh derivatives, as long as that gains much."""
-        options = self._settings.held_out
-        return settled(problem, state, self._settings.search, options.passes, options.iterations)
 
 
 def _gap(part: Part, point: Mapping[str, float]) -> FloatArray:

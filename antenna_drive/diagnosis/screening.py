@@ -178,9 +178,11 @@ def scan(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
     worst = int(np.argmax([problem.loss(state.residual[problem.rows(k)])
                            for k in range(len(problem.experiments))]))
 
-    def cost(item: Sensitivity, value: float) -> float:
-        point = {**here, **item.form.start, item.form.sizes[0].name: value}
-        return least_cost(problem, [point], worst, until)[0]
+    def tried(item: Sensitivity, values: Sequence[float]) -> tuple[float, float]:
+        name = item.form.sizes[0].name
+        cost, best = least_cost(problem, [{**here, **item.form.start, name: value}
+                                          for value in values], worst, until)
+        return cost, best[name]
 
     coarse: list[tuple[float, int, list[float], Sensitivity]] = []
     for item in known:
@@ -189,9 +191,8 @@ def scan(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
                 p.name in here for p in item.form.parameters):
             continue
         values = coarse_values(sizes[0])
-        costs = [cost(item, value) for value in values]
-        least = int(np.argmin(costs))
-        coarse.append((costs[least], least, values, item))
+        cost, best = tried(item, values)
+        coarse.append((cost, values.index(best), values, item))
     coarse.sort(key=lambda entry: entry[0])
 
     def refined(entry: tuple[float, int, list[float], Sensitivity],
@@ -200,7 +201,7 @@ def scan(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
         _, least, values, item = entry
         size = item.form.sizes[0]
         grid = [size.low, *values, size.high]
-        found = minimize_scalar(lambda value: cost(item, value), method='bounded',
+        found = minimize_scalar(lambda value: tried(item, [value])[0], method='bounded',
                                 bounds=(grid[least], grid[least + 2]),
                                 options={'maxiter': _REFINEMENTS})
         value = float(found.x)

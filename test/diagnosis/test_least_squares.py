@@ -152,6 +152,24 @@ def test_box_constrained_step_agrees_with_an_independent_solver(m: Any, seed: An
     assert cost(step) <= cost(best.x) + 1e-6 * (1.0 + cost(best.x))
 
 
+@given(st.integers(2, 12), st.integers(0, 10_000))
+@settings(max_examples=60, deadline=None)
+def test_a_flat_direction_of_a_rounded_hessian_goes_nowhere(m: Any, seed: Any) -> None:
+    random = np.random.default_rng(seed)
+    matrix = random.normal(size=(200, m))
+    matrix[:, -1] = matrix[:, 0]
+    target = matrix[:, 0] + 0.1 * random.normal(size=200)
+    # in single precision the least eigenvalue may have either sign
+    hessian = matrix.T @ matrix
+    hessian -= 1e-9 * np.diag(np.diag(hessian))
+    gradient = matrix.T @ target * (1.0 + 1e-6 * random.normal(size=m))
+    step = box_constrained_step(hessian, gradient, np.full(m, -1e3), np.full(m, 1e3))
+    best = np.linalg.lstsq(matrix, target, rcond=None)[0]
+    left, least = (float(np.sum((matrix @ x - target) ** 2)) for x in (step, best))
+    assert np.abs(step).max() < 10.0
+    assert left < least * (1.0 + 1e-4)
+
+
 def test_robust_loss_is_the_square_within_and_logarithmic_beyond() -> None:
     assert robust_loss(np.array([2.0]), 3.0) == 2.0
     ten, twenty = (robust_loss(np.array([z]), 3.0) for z in (10.0, 20.0))
