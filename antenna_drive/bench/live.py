@@ -66,6 +66,7 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
     Raises
     ------
     UserError : there is no Chromium
+
     """
     if EXECUTABLE is None:
         raise UserError('chromium is not installed')

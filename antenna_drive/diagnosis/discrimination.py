@@ -165,8 +165,7 @@ def refitted(machine: Machine, rivals: Sequence[Rival], inflated: float,
             jacobian = state.base_jacobian
             state = fitted.fit(state, settings.search.iterations)
             for _ in range(settings.planning.passes):
-                state = fitted.fit(fitted.refreshed(state, central=False),
-                                   settings.search.iterations)
+                state = fitted.fit(fitted.refreshed(state), settings.search.iterations)
             lack[i, j] = state.cost / inflated
             ends[i, j] = own.own(state.point())
     return Separation(_prior(rivals), lack, points=ends)

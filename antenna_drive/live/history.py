@@ -131,6 +131,8 @@ class History:
 
         Parameters
         ----------
+        unit
+            that sent them
         frames
             rows of a `FrameLayout`: header, then value and derivative of each signal; what is
             not finite or of another run is left out

@@ -73,6 +73,7 @@ class DriveLink:
     ----------
     history : the signals of the last minute
     settings : the parameters of each unit as they are in force
+
     """
 
     def __init__(self, board: Board, namespace: str = '', domain_id: int | None = None) -> None:
@@ -213,6 +214,7 @@ class DriveLink:
         Raises
         ------
         UserError : it does not answer
+
         """
         listed = await self._ask(self._clients[unit, 'list_parameters'],
                                  ListParameters.Request(), unit)
@@ -236,6 +238,7 @@ class DriveLink:
         Raises
         ------
         UserError : there is no such unit, a value is of no kind, or the node does not answer
+
         """
         if unit not in OUTPUTS:
             raise UserError(f'{unit}: no such node')
@@ -252,6 +255,7 @@ class DriveLink:
         Raises
         ------
         UserError : it does not answer
+
         """
         answer = await self._ask(self._triggers[service], Trigger.Request(), TEST_SIGNAL)
         return bool(answer.success), str(answer.message)

@@ -67,6 +67,7 @@ class OwnDrive:
         Raises
         ------
         ParameterError : a configuration is not allowed
+
         """
         config = list(self._config)
         parameters: dict[str, dict[str, Any]] = {
@@ -130,6 +131,7 @@ class Recorder:
         Raises
         ------
         UserError : a recording is under way, the name is not allowed or taken
+
         """
         if self.running:
             raise UserError(f'{self.path}: is being recorded, stop this first')

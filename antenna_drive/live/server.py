@@ -183,6 +183,7 @@ class Server:
         Raises
         ------
         UserError : the address cannot be had
+
         """
         hosts = () if host else _LOCAL
         rest = {'hosts': hosts, 'token': token, 'session': session}

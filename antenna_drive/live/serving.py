@@ -61,6 +61,7 @@ def serve(options: Options) -> int:
     Raises
     ------
     UserError : the port is taken, a configuration or a namespace is not allowed
+
     """
     return asyncio.run(_serve(options))
 

@@ -59,6 +59,7 @@ class Session:
             the drive's processes if they are ours; None for a drive that was joined
         experiment
             the experiment that was started
+
         """
         self.link, self.board = link, board
         self._recorder, self._own = recorder, own
@@ -127,6 +128,7 @@ class Session:
         Raises
         ------
         UserError : it is refused or makes no sense; the message says why
+
         """
         act = self._acts.get(str(message.get('do')))
         if act is None:

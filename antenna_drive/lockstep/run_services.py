@@ -62,6 +62,7 @@ class RunServices:
         play
             puts the test sheet that the parameters name in force and says what it is; None for
             a conductor that plays none
+
         """
         self._state = state
         self._topic = node.create_publisher(String, f'{node.get_name()}/{TOPIC}', STATE_QOS)
