@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+import math
 from typing import Protocol
 
 from antenna_drive.diagnosis import verdict
@@ -72,12 +73,13 @@ def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings:
     tried: set[frozenset[str]] = set()
     best = verdict.best(hypotheses, settings)
     converged = fits.converged(best)
-    ratio = 1.0 + settings.search.doubtful
     while True:
         rests = {effect: frozenset(best.effects) - {effect} for effect in best.effects}
-        # a hypothesis that is no longer among those found was far behind
-        doubtful = {effect: rest for effect, rest in rests.items() if rest in found
-                    and rest not in tried and found[rest].cost < ratio * best.cost}
+        # A hypothesis that is far behind may have stopped early. Then the curvature tells that
+        # the effect gains little.
+        doubtful = {effect: rest for effect, rest in rests.items() if rest not in tried and min(
+            found[rest].cost - best.cost if rest in found else math.inf,
+            converged.loss_without(effect)) < settings.search.doubtful * best.cost}
         if not doubtful:
             return list(found.values()), converged
         for effect, rest in doubtful.items():
@@ -85,7 +87,7 @@ def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings:
             simpler = fits.without(converged, effect)
             # all other fits are taken to be as far from convergence as that of the best was
             behind = simpler.cost + best.cost - converged.cost
-            if behind < found[rest].cost:
+            if rest not in found or behind < found[rest].cost:
                 found[rest] = replace(simpler, state=replace(simpler.state, cost=behind))
         leading = verdict.best(list(found.values()), settings)
         if leading is not best:
