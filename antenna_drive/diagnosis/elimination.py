@@ -20,8 +20,9 @@ Where an effect gains little, the fit without it is therefore run until it has c
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 import math
 from typing import Protocol
 
@@ -99,20 +100,30 @@ def settled_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesi
     """
     Take fits close behind the best to their ends, too: only there can they be told apart.
 
+    A rival may be close only together with a partner that is no larger than its tolerance. It is
+    then fitted without the partner.
+
     Parameters and what is returned are those of `forward_selection`.
     """
     options, price = settings.search, settings.penalty
     found = {frozenset(h.effects): h for h in hypotheses}
     first = found[frozenset(best.effects)]
     behind = first.cost - best.cost
-    rivals = sorted((h for h in hypotheses if h is not first
-                     and len(h.effects) == len(best.effects) > 0
-                     and h.penalised(price) < first.penalised(price) + options.close),
-                    key=lambda h: h.penalised(price))
-    for rival in rivals[:options.rivals]:
-        end = fits.converged(rival)
-        if end.cost + behind < rival.cost:
-            found[frozenset(rival.effects)] = replace(
+    size = len(best.effects)
+    rivals = [h for h in hypotheses if h is not first and len(h.effects) == size > 0
+              and h.penalised(price) < first.penalised(price) + options.close]
+    # a member that is no larger than its tolerance only helped the fit of the others along
+    helped = [(h, effect) for h in hypotheses for effect in sorted(set(h.effects) - set(h.named))
+              if len(h.effects) == size + 1 > 1 and set(h.effects) - {effect} != set(best.effects)
+              and h.cost < first.cost + options.close]
+    ends: list[tuple[float, Callable[[], Hypothesis]]] = [
+        *((h.cost, partial(fits.converged, h)) for h in rivals),
+        *((h.cost, partial(fits.without, h, effect)) for h, effect in helped)]
+    for _, taken in sorted(ends, key=lambda item: item[0])[:options.rivals]:
+        end = taken()
+        rival = found.get(frozenset(end.effects))
+        if rival is None or end.cost + behind < rival.cost:
+            found[frozenset(end.effects)] = replace(
                 end, state=replace(end.state.without_jacobian(keep_hessian=True),
                                    cost=end.cost + behind))
         if end.penalised(price) < best.penalised(price):

@@ -253,6 +253,16 @@ def test_a_close_rival_is_taken_to_its_end_before_one_is_named() -> None:
     assert best(hypotheses, DEFAULT).effects == ('b',)
 
 
+def test_a_rival_is_found_behind_a_partner_within_its_tolerance() -> None:
+    fits = Ends({('a',): 15995.0, ('b',): 15960.0})
+    pair = within_tolerance(fitted(('b', 'c'), 15990.0), 'c')
+    hypotheses, end = settled_rivals(
+        fits, [fitted((), 90000.0), fitted(('a',), 16000.0), pair], fitted(('a',), 15995.0),
+        DEFAULT)
+    assert (end.effects, end.cost) == (('b',), 15960.0)
+    assert best(hypotheses, DEFAULT).effects == ('b',)
+
+
 def test_a_weak_effect_that_is_there_stays() -> None:
     fits = Ends({(): 17400.0, ('a',): 16000.0})
     hypotheses, end = backward_elimination(
