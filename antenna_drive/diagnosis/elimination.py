@@ -20,8 +20,10 @@ Where an effect gains little, the fit without it is therefore run until it has c
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+import math
 from typing import Protocol
 
 from antenna_drive.diagnosis import verdict
@@ -72,12 +74,13 @@ def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings:
     tried: set[frozenset[str]] = set()
     best = verdict.best(hypotheses, settings)
     converged = fits.converged(best)
-    ratio = 1.0 + settings.search.doubtful
     while True:
         rests = {effect: frozenset(best.effects) - {effect} for effect in best.effects}
-        # a hypothesis that is no longer among those found was far behind
-        doubtful = {effect: rest for effect, rest in rests.items() if rest in found
-                    and rest not in tried and found[rest].cost < ratio * best.cost}
+        # A hypothesis that is far behind may have stopped early. Then the curvature tells that
+        # the effect gains little.
+        doubtful = {effect: rest for effect, rest in rests.items() if rest not in tried and min(
+            found[rest].cost - best.cost if rest in found else math.inf,
+            converged.loss_without(effect)) < settings.search.doubtful * best.cost}
         if not doubtful:
             return list(found.values()), converged
         for effect, rest in doubtful.items():
@@ -85,7 +88,7 @@ def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings:
             simpler = fits.without(converged, effect)
             # all other fits are taken to be as far from convergence as that of the best was
             behind = simpler.cost + best.cost - converged.cost
-            if behind < found[rest].cost:
+            if rest not in found or behind < found[rest].cost:
                 found[rest] = replace(simpler, state=replace(simpler.state, cost=behind))
         leading = verdict.best(list(found.values()), settings)
         if leading is not best:
@@ -97,20 +100,30 @@ def settled_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesi
     """
     Take fits close behind the best to their ends, too: only there can they be told apart.
 
+    A rival may be close only together with a partner that is no larger than its tolerance. It is
+    then fitted without the partner.
+
     Parameters and what is returned are those of `forward_selection`.
     """
     options, price = settings.search, settings.penalty
     found = {frozenset(h.effects): h for h in hypotheses}
     first = found[frozenset(best.effects)]
     behind = first.cost - best.cost
-    rivals = sorted((h for h in hypotheses if h is not first
-                     and len(h.effects) == len(best.effects) > 0
-                     and h.penalised(price) < first.penalised(price) + options.close),
-                    key=lambda h: h.penalised(price))
-    for rival in rivals[:options.rivals]:
-        end = fits.converged(rival)
-        if end.cost + behind < rival.cost:
-            found[frozenset(rival.effects)] = replace(
+    size = len(best.effects)
+    rivals = [h for h in hypotheses if h is not first and len(h.effects) == size > 0
+              and h.penalised(price) < first.penalised(price) + options.close]
+    # a member that is no larger than its tolerance only helped the fit of the others along
+    helped = [(h, effect) for h in hypotheses for effect in sorted(set(h.effects) - set(h.named))
+              if len(h.effects) == size + 1 > 1 and set(h.effects) - {effect} != set(best.effects)
+              and h.cost < first.cost + options.close]
+    ends: list[tuple[float, Callable[[], Hypothesis]]] = [
+        *((h.cost, partial(fits.converged, h)) for h in rivals),
+        *((h.cost, partial(fits.without, h, effect)) for h, effect in helped)]
+    for _, taken in sorted(ends, key=lambda item: item[0])[:options.rivals]:
+        end = taken()
+        rival = found.get(frozenset(end.effects))
+        if rival is None or end.cost + behind < rival.cost:
+            found[frozenset(end.effects)] = replace(
                 end, state=replace(end.state.without_jacobian(keep_hessian=True),
                                    cost=end.cost + behind))
         if end.penalised(price) < best.penalised(price):

@@ -18,9 +18,10 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
-from antenna_drive.diagnosis.least_squares import FitState, LeastSquares
+from antenna_drive.diagnosis.least_squares import FitState, LeastSquares, proper_precision
 from antenna_drive.diagnosis.machine import Form, Parameter, Point
 from antenna_drive.diagnosis.settings import PenaltySettings
+import numpy as np
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,24 @@ class Hypothesis:
     def penalised(self, settings: PenaltySettings) -> float:
         """Return the cost with the penalty of the effects."""
         return self.state.cost + penalty(self.forms, self.state.point(), settings)
+
+    def loss_without(self, effect: str) -> float:
+        """
+        Return what the fit would lose without one of its effects, were it quadratic.
+
+        Half of Wald's statistic: the square of the effect's sizes in the metric of their own
+        precision, with the nuisances following.
+        """
+        form = self.forms[self.effects.index(effect)]
+        sizes = {p.name for p in form.sizes}
+        places = [j for j, p in enumerate(self.state.parameters) if p.name in sizes]
+        precision = self.state.hessian + np.diag(proper_precision(self.state.parameters))
+        unit = np.sqrt(np.diag(precision))
+        # what rounding leaves undetermined has no curvature of its own
+        covariance = np.linalg.pinv(precision / np.outer(unit, unit), 1e-6, hermitian=True)
+        scaled = self.state.x[places] * unit[places]
+        return 0.5 * float(scaled @ np.linalg.pinv(
+            covariance[np.ix_(places, places)], hermitian=True) @ scaled)
 
     def with_jacobian(self, problem: LeastSquares) -> Hypothesis:
         """Return the hypothesis with a Jacobian, taken where its fit ended if it has none."""

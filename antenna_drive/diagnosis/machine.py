@@ -41,6 +41,13 @@ Point = Mapping[str, float]
 # An input over time: from times [s] to values, shape (n,) each.
 Course = Callable[[FloatArray], FloatArray]
 
+# Sizes that may be tried out before a fit: of a single number as shares of its bounds; of a wave
+# the least amplitude in steps, the factor to the next one, and the phases [rad].
+_SHARES = (-0.9, -0.6, -0.4, -0.25, -0.15, -0.08, 0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 0.9)
+_LEAST_AMPLITUDE = 2.5
+_GROWTH = 2.5
+_PHASES = tuple(2.0 * math.pi * k / 6 for k in range(6))
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -91,6 +98,7 @@ class Form:
     parameters : those that are no shape parameters are zero where the effect is absent
     scanned : True if the form was chosen by a scan of many, such as the orders of a ripple
     is_course : True for a course over time that is free at every moment, such as a gust
+    is_wave : True if its two sizes are the sine and the cosine part of a wave
 
     """
 
@@ -98,6 +106,7 @@ class Form:
     parameters: tuple[Parameter, ...]
     scanned: bool = field(default=False, kw_only=True)
     is_course: bool = field(default=False, kw_only=True)
+    is_wave: bool = field(default=False, kw_only=True)
 
     @property
     def sizes(self) -> list[Parameter]:
@@ -108,6 +117,29 @@ class Form:
     def start(self) -> dict[str, float]:
         """Return the point at which a fit of this form begins."""
         return {p.name: p.start for p in self.parameters}
+
+    @property
+    def trials(self) -> list[dict[str, float]]:
+        """
+        Return sizes, far from zero, that may be tried out before a fit.
+
+        Of a single size these are shares of its bounds, denser near zero. Of a wave they are
+        amplitudes that grow from a few steps to the bound, each in several phases. Other forms
+        have none.
+        """
+        if self.is_wave and len(self.sizes) == 2:  # with labels there are more
+            sine, cosine = self.sizes
+            least = _LEAST_AMPLITUDE * sine.step
+            amplitudes = [least * _GROWTH ** k for k in range(
+                1 + int(math.log(max(sine.high / least, 1.0), _GROWTH)))]
+            return [{sine.name: amplitude * math.sin(phase),
+                     cosine.name: amplitude * math.cos(phase)}
+                    for amplitude in amplitudes for phase in _PHASES]
+        if len(self.sizes) != 1:
+            return []
+        [size] = self.sizes
+        return [{size.name: share * (size.high if share > 0.0 else -size.low)}
+                for share in _SHARES if share > 0.0 or size.low < 0.0]
 
     def implausibility(self, point: Point) -> float:
         """Return how little these values look like the effect; above 1 is implausible."""

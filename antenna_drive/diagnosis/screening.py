@@ -29,12 +29,11 @@ from antenna_drive.diagnosis.least_squares import (
     FitState, Jacobian, least_cost, LeastSquares, prior_precision, transposed_product,
     weighted_product,
 )
-from antenna_drive.diagnosis.machine import Effect, FloatArray, Form, Parameter
+from antenna_drive.diagnosis.machine import Effect, FloatArray, Form, Point
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-# The values that a scan tries first, as shares of the bounds, and how often it looks between them.
-_COARSE = (-0.9, -0.6, -0.4, -0.25, -0.15, -0.08, 0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 0.9)
+# How often a scan looks between the values of a single size that it has tried.
 _REFINEMENTS = 10
 
 
@@ -148,19 +147,14 @@ def _promised(hessian: FloatArray, gradient: FloatArray, low: FloatArray,
     return float(gradient @ step - 0.5 * step @ hessian @ step)
 
 
-def coarse_values(size: Parameter) -> list[float]:
-    """Return values between the bounds of a size, denser near zero."""
-    return [share * (size.high if share > 0.0 else -size.low)
-            for share in _COARSE if share > 0.0 or size.low < 0.0]
-
-
 def scan(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
-         besides: Sequence[str] = ()) -> list[tuple[Sensitivity, float]]:
+         besides: Sequence[str] = ()) -> list[tuple[Sensitivity, dict[str, float]]]:
     """
-    Return the forms of one size whose best value, tried out far from zero, fits best.
+    Return the forms that fit best once their sizes are tried out far from zero.
 
     A strong effect may bend the misfit so much that its derivative at zero tells nothing: a mode
-    at another frequency, a limit that was not reached. The value is sought in the worst test.
+    at another frequency, a limit that was not reached, a ripple that shakes a mode. The values are
+    sought in the worst test.
 
     Parameters
     ----------
@@ -169,7 +163,7 @@ def scan(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
 
     Returns
     -------
-    sensitivities with the value from which a fit should begin, the best first
+    sensitivities with the sizes from which a fit should begin, the best first
 
     """
     here = state.point()
@@ -178,35 +172,33 @@ def scan(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
     worst = int(np.argmax([problem.loss(state.residual[problem.rows(k)])
                            for k in range(len(problem.experiments))]))
 
-    def tried(item: Sensitivity, values: Sequence[float]) -> tuple[float, float]:
-        name = item.form.sizes[0].name
-        cost, best = least_cost(problem, [{**here, **item.form.start, name: value}
-                                          for value in values], worst, until)
-        return cost, best[name]
+    def tried(item: Sensitivity, trials: Sequence[Point]) -> tuple[float, int]:
+        """Return the least cost and the number of its trial."""
+        points = [{**here, **item.form.start, **trial} for trial in trials]
+        cost, best = least_cost(problem, points, worst, until)
+        return cost, points.index(best)
 
-    coarse: list[tuple[float, int, list[float], Sensitivity]] = []
+    coarse: list[tuple[float, int, Sensitivity]] = []
     for item in known:
-        sizes = item.form.sizes
-        if len(sizes) != 1 or same_effect(problem.machine.effects, item.effect, besides) or any(
+        trials = item.form.trials
+        if trials and not same_effect(problem.machine.effects, item.effect, besides) and not any(
                 p.name in here for p in item.form.parameters):
-            continue
-        values = coarse_values(sizes[0])
-        cost, best = tried(item, values)
-        coarse.append((cost, values.index(best), values, item))
+            coarse.append((*tried(item, trials), item))
     coarse.sort(key=lambda entry: entry[0])
 
-    def refined(entry: tuple[float, int, list[float], Sensitivity],
-                ) -> tuple[float, Sensitivity, float]:
-        """Return the best value between the neighbours of the best coarse one; all tests judge."""
-        _, least, values, item = entry
-        size = item.form.sizes[0]
-        grid = [size.low, *values, size.high]
-        found = minimize_scalar(lambda value: tried(item, [value])[0], method='bounded',
-                                bounds=(grid[least], grid[least + 2]),
-                                options={'maxiter': _REFINEMENTS})
-        value = float(found.x)
-        total = problem.loss(problem.residuals({**here, **item.form.start, size.name: value}))
-        return total, item, value
+    def refined(entry: tuple[float, int, Sensitivity],
+                ) -> tuple[float, Sensitivity, dict[str, float]]:
+        """Return the best value between the neighbours of the best trial; all tests judge."""
+        _, least, item = entry
+        found = item.form.trials[least]
+        if len(item.form.sizes) == 1:
+            [size] = item.form.sizes
+            grid = [size.low, *(trial[size.name] for trial in item.form.trials), size.high]
+            found = {size.name: float(minimize_scalar(
+                lambda value: tried(item, [{size.name: value}])[0], method='bounded',
+                bounds=(grid[least], grid[least + 2]), options={'maxiter': _REFINEMENTS}).x)}
+        total = problem.loss(problem.residuals({**here, **item.form.start, **found}))
+        return total, item, found
 
     fine = sorted(map(refined, coarse[:2 * count]), key=lambda entry: entry[0])
-    return [(item, value) for _, item, value in fine[:count]]
+    return [(item, found) for _, item, found in fine[:count]]

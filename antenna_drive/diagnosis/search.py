@@ -37,7 +37,7 @@ from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.least_squares import (
     FitState, Jacobian, LeastSquares, settled, with_initial_conditions,
 )
-from antenna_drive.diagnosis.machine import Effect, Form, Parameter
+from antenna_drive.diagnosis.machine import Effect, Form, Parameter, Point
 from antenna_drive.diagnosis.noise import same_noise, with_estimated_noise
 from antenna_drive.diagnosis.screening import (
     jacobian_of_form, rescaled, scan, screened, sensitivities, Sensitivity,
@@ -94,11 +94,8 @@ class Search:
     def run(self) -> list[Hypothesis]:
         """Return every hypothesis that was fitted to the whole tests, 'none' first."""
         self.progress(0.0, 'nuisances')
-        none = self._nuisances_alone()
-        self.progress(0.15, 'sensitivity to each effect')
-        self._take_sensitivities(none.state)
-        self.progress(0.25, 'single effects')
-        singles = self._leading_settled(self._at_lower_noise(self._singles(none)))
+        none, singles = self._none_and_singles()
+        singles = self._leading_settled(self._at_lower_noise(singles))
         if self.problem.scale > 1.0:
             singles = self._at_lower_noise(self._exchanged(singles))
         self.progress(0.5, 'pairs of effects')
@@ -111,6 +108,17 @@ class Search:
         self.progress(0.7, 'the best in full')
         return self._in_full(none, singles, pairs)
 
+    def _none_and_singles(self) -> tuple[Hypothesis, list[Hypothesis]]:
+        """Fit the nuisances alone and with single effects, again where the former got stuck."""
+        none = self._nuisances_alone()
+        singles = self._singles(none)
+        for _ in range(self.settings.fresh_starts):
+            freed = self._freed(none, singles[0])
+            if freed is None:
+                break
+            none, singles = freed, self._singles(freed)
+        return none, singles
+
     # -- the nuisances, and the noise ------------------------------------------------------------
 
     def _nuisances_alone(self) -> Hypothesis:
@@ -121,7 +129,11 @@ class Search:
         self.problem = self._at_noise(self.problem.noise_level(first.residual))
         state = self.problem.start(self.machine.nuisances, point,
                                    first.jacobian / self.problem.scale)
-        state = self.problem.fit(state, iterations)
+        return Hypothesis((), (), self._at_falling_noise(self.problem.fit(state, iterations)))
+
+    def _at_falling_noise(self, state: FitState) -> FitState:
+        """Go on with a fit of the nuisances alone, with the noise that it leaves."""
+        iterations = self.settings.iterations
         for _ in range(self.settings.first_passes):
             before, cost = self.problem.scale, state.cost
             self.problem = self._at_noise(min(before, self.problem.noise_level(state.residual)))
@@ -130,7 +142,25 @@ class Search:
             if self.problem.scale > self.settings.sharper * before and (
                     before > 1.0 or cost - state.cost < self.settings.first_gain * cost):
                 break
-        return Hypothesis((), (), state)
+        return state
+
+    def _freed(self, none: Hypothesis, best: Hypothesis) -> Hypothesis | None:
+        """
+        Return the nuisances alone from where the best single effect has ended; None if as before.
+
+        An effect of next to no size may gain much, because its fit went round what held the fit
+        of the nuisances alone. By its curvature the effect itself gains little.
+        """
+        gain = none.cost - best.cost
+        own = self.settings.stuck * gain
+        if best.has_course or best.loss_without(best.effects[0]) > own:
+            return None
+        bare = self._dropped(best, best.effects[0]).state
+        state = self.problem.fit(
+            self.problem.start(bare.parameters, bare.point()), self.settings.iterations)
+        if state.cost > best.cost + own:
+            return None
+        return Hypothesis((), (), self._at_falling_noise(state))
 
     def _at_noise(self, level: float) -> LeastSquares:
         """Return the problem with the misfit as noise, or the sensors' noise if it is small."""
@@ -168,6 +198,9 @@ class Search:
 
     def _singles(self, none: Hypothesis) -> list[Hypothesis]:
         options = self.settings
+        self.progress(0.15, 'sensitivity to each effect')
+        self._take_sensitivities(none.state)
+        self.progress(0.25, 'single effects')
         found = self._sorted(
             lambda entry: self._added(none, entry[1], entry[1].jacobian),
             screened(self.problem, none.state, self.sensitivities)[:options.singles])
@@ -190,12 +223,12 @@ class Search:
         state = self.problem.fit(state, self.settings.first_iterations)
         return Hypothesis((*base.effects, item.effect), (*base.forms, item.form), state)
 
-    def _added_at(self, base: Hypothesis, item: Sensitivity, value: float) -> Hypothesis:
-        """Fit an effect on top of a hypothesis, from a value that a scan has found."""
+    def _added_at(self, base: Hypothesis, item: Sensitivity, sizes: Point) -> Hypothesis:
+        """Fit an effect on top of a hypothesis, from sizes that a scan has found."""
         form = item.form
         state = self.problem.start_from(
             base.state.parameters, base.state.jacobian, form.parameters,
-            {**base.state.point(), **form.start, form.sizes[0].name: value})
+            {**base.state.point(), **form.start, **sizes})
         return Hypothesis((*base.effects, item.effect), (*base.forms, form),
                           self.problem.fit(state, self.settings.iterations))
 
@@ -318,7 +351,7 @@ class Search:
             far = self._priced(base) > options.base_ratio * self._priced(best) + options.reach
             if far or (base.has_course and base is not best):
                 continue
-            partners: list[tuple[Sensitivity, float | None]] = [
+            partners: list[tuple[Sensitivity, Point | None]] = [
                 (item, None) for gain, item in screened(
                     self.problem, base.state, self.sensitivities,
                     base.effects)[:options.partners] if gain > worth]
@@ -341,13 +374,13 @@ class Search:
         return found
 
     def _partnered(self, best: Hypothesis, base: Hypothesis,
-                   partner: tuple[Sensitivity, float | None]) -> Hypothesis:
-        """Give a hypothesis a partner, from a value if one is given."""
-        item, value = partner
-        if value is None:
+                   partner: tuple[Sensitivity, Point | None]) -> Hypothesis:
+        """Give a hypothesis a partner, from sizes if they are given."""
+        item, sizes = partner
+        if sizes is None:
             pair = self._added(base, item, jacobian_of_form(self.problem, base.state, item.form))
         else:
-            pair = self._added_at(base, item, value)
+            pair = self._added_at(base, item, sizes)
         if pair.cost < best.cost:
             return self._continued(pair, self.settings.pair_iterations)
         return pair

@@ -31,6 +31,7 @@ PRACTICE = 'practice cases'
 TRIAL_0 = 'trial 0'
 TRIAL_2 = 'trial 2'
 TRIAL_6 = 'trial 6'
+TRIAL_7 = 'trial 7'
 WILD = 'wild practice cases'
 
 
@@ -131,6 +132,11 @@ class SearchSettings:
     settling_iterations: int = _setting(10, '1', 'iterations of a fit with fresh derivatives')
     full_iterations: int = _setting(6, '1', 'iterations of a fit to the whole tests')
     most_effects: int = _setting(4, '1', 'greatest number of effects of a hypothesis')
+    stuck: float = _setting(
+        0.1, '1', 'share of what the best single effect gains, below which the rest of it is what '
+        'a fit without the effect missed because it got stuck', TRIAL_7)
+    fresh_starts: int = _setting(
+        1, '1', 'greatest number of times that it begins anew then', TRIAL_7)
     doubtful: float = _setting(
         0.25, '1', 'gain, as a share of the cost, below which an effect is fitted without and '
         'judged anew', TRIAL_2)

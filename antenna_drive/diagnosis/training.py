@@ -26,7 +26,6 @@ from antenna_drive.diagnosis.least_squares import (
 from antenna_drive.diagnosis.machine import (
     Experiment, FloatArray, Form, Machine, Parameter, Point, TimeScales,
 )
-from antenna_drive.diagnosis.screening import coarse_values
 from antenna_drive.diagnosis.settings import Settings
 import numpy as np
 
@@ -135,16 +134,14 @@ def begun(part: Part, forms: Sequence[Form], point: Mapping[str, float],
     Return a point with the sizes of effects at which a fit to a part of the tests may begin.
 
     A strong effect may bend the misfit so much that its derivative at zero leads nowhere. Where an
-    effect has one size, values within its bounds are tried out, and the best is taken.
+    effect's form has values to try out, the best is taken.
     """
     at = dict(point)
     problem = LeastSquares(part, settings=settings)
     problem = problem.at_scale(max(problem.noise_level(problem.residuals(at)), 1.0))
     for form in forms:
-        if len(form.sizes) == 1 and not form.is_course:
-            [size] = form.sizes
-            at = min((at, *({**at, size.name: value} for value in coarse_values(size))),
-                     key=lambda trial: problem.loss(problem.residuals(trial)))
+        at = min((at, *({**at, **trial} for trial in form.trials)),
+                 key=lambda point: problem.loss(problem.residuals(point)))
     return at
 
 

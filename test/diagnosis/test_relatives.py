@@ -15,6 +15,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from antenna_drive.diagnosis import (
     Effect, Experiment, FloatArray, Form, Hypothesis, LeastSquares, Machine, Parameter, Point,
 )
@@ -133,6 +135,22 @@ def test_an_effect_that_nothing_shows_where_a_fit_began_is_found_by_a_scan() -> 
     singles = search._exchanged([Hypothesis(('push',), (form,), problem.fit(start, 10))])
     assert singles[0].effects == ('weight',)
     assert singles[0].values[0][1] == pytest.approx(2.0, abs=0.01)
+
+
+def test_a_wave_is_tried_out_in_every_phase_up_to_its_bounds() -> None:
+    size = Parameter('sine', 'N m', -10.0, 10.0, 0.02)
+    wave = Form('', (size, replace(size, name='cosine'),
+                     replace(size, name='order', is_shape=True)), is_wave=True)
+    sines, cosines = np.array([(p['sine'], p['cosine']) for p in wave.trials]).T
+    amplitudes = np.unique(np.round(np.hypot(sines, cosines), 9))
+    assert amplitudes[0] == pytest.approx(0.05)
+    assert 4.0 < amplitudes[-1] <= 10.0
+    assert np.all(amplitudes[1:] / amplitudes[:-1] < 3.0)
+    # no wave is further from a trial than half the distance of two phases
+    for phase in np.linspace(0.0, 2.0 * np.pi, 50):
+        near = np.hypot(sines - np.sin(phase), cosines - np.cos(phase)).min()
+        assert near < 0.7
+    assert Form('', (size, replace(size, name='second'))).trials == []
 
 
 def test_training_begins_at_a_size_that_its_own_tests_ask_for() -> None:

@@ -44,13 +44,16 @@ def unknown(lack: LackOfFit) -> float:
     return unknown_probability(lack, SETTINGS)
 
 
-def fitted(effects: tuple[str, ...], cost: float) -> Hypothesis:
-    """Return a candidate of this cost."""
+def fitted(effects: tuple[str, ...], cost: float,
+           curvature: dict[str, float] | None = None) -> Hypothesis:
+    """Return a candidate of this cost; its effects are sure but those whose curvature is given."""
     parameters = tuple(replace(NUMBER, name=f'{effect}.size', tolerance=0.0) for effect in effects)
     forms = tuple(Form('', (p,)) for p in parameters)
     blank = np.zeros(0)
+    hessian = np.diag([(curvature or {}).get(effect, 1e12) for effect in effects])
     return Hypothesis(effects, forms, FitState(
-        parameters, np.ones(len(effects)), blank, np.zeros((0, 0), np.float32), blank, cost))
+        parameters, np.ones(len(effects)), blank, np.zeros((0, 0), np.float32), blank, cost,
+        kept_hessian=hessian))
 
 
 @given(st.floats(-1.0, 1.0))
@@ -212,6 +215,33 @@ def test_a_partner_that_only_helped_a_fit_along_is_let_go() -> None:
     assert [c.effects for c in hypotheses] == [(), ('a', 'b'), ('a',)]
 
 
+def test_a_partner_that_is_nearly_nothing_is_let_go_if_the_fit_without_it_got_stuck() -> None:
+    fits = Ends({('a', 'b'): 16030.0, ('a',): 16031.0})
+    fits.converged = lambda hypothesis: fitted(  # type: ignore[method-assign]
+        hypothesis.effects, fits.ends[hypothesis.effects], {'b': 100.0})
+    known = [fitted((), 106000.0), fitted(('a', 'b'), 16140.0)]
+    for others in ([fitted(('a',), 60000.0)], []):
+        hypotheses, end = backward_elimination(fits, [*known, *others], DEFAULT)
+        assert end.effects == best(hypotheses, DEFAULT).effects == ('a',)
+
+
+def test_what_a_quadratic_fit_loses_without_an_effect() -> None:
+    """Against the fit without it, whose solution is known."""
+    random = np.random.default_rng(5)
+    jacobian = random.normal(size=(50, 3))
+    jacobian[:, 2] += jacobian[:, 0]
+    target = jacobian @ [0.3, -0.2, 1.0] + 0.1 * random.normal(size=50)
+    parameters = tuple(replace(NUMBER, name=name, prior_sigma=0.0, low=-1e6, high=1e6)
+                       for name in ('first', 'second', 'a.size'))
+    x, (left,), *_ = np.linalg.lstsq(jacobian, target, rcond=None)
+    _, (without,), *_ = np.linalg.lstsq(jacobian[:, :2], target, rcond=None)
+    blank = np.zeros(0)
+    hypothesis = Hypothesis(('a',), (Form('', parameters[2:]),), FitState(
+        parameters, np.asarray(x, float), blank, np.zeros((0, 0), np.float32), blank, 0.5 * left,
+        kept_hessian=jacobian.T @ jacobian))
+    assert hypothesis.loss_without('a') == pytest.approx(0.5 * (without - left), rel=1e-6)
+
+
 def test_a_close_rival_is_taken_to_its_end_before_one_is_named() -> None:
     fits = Ends({('a',): 15995.0, ('b',): 15970.0, ('c',): 15000.0})
     found = [fitted((), 90000.0), fitted(('a',), 16000.0), fitted(('b',), 16010.0),
@@ -220,6 +250,16 @@ def test_a_close_rival_is_taken_to_its_end_before_one_is_named() -> None:
     assert (end.effects, end.cost) == (('b',), 15970.0)
     # costs stay comparable: all but the rival are as far from their ends as the first was, five
     assert [h.cost for h in hypotheses] == [90000.0, 16000.0, 15975.0, 16500.0]
+    assert best(hypotheses, DEFAULT).effects == ('b',)
+
+
+def test_a_rival_is_found_behind_a_partner_within_its_tolerance() -> None:
+    fits = Ends({('a',): 15995.0, ('b',): 15960.0})
+    pair = within_tolerance(fitted(('b', 'c'), 15990.0), 'c')
+    hypotheses, end = settled_rivals(
+        fits, [fitted((), 90000.0), fitted(('a',), 16000.0), pair], fitted(('a',), 15995.0),
+        DEFAULT)
+    assert (end.effects, end.cost) == (('b',), 15960.0)
     assert best(hypotheses, DEFAULT).effects == ('b',)
 
 

@@ -144,5 +144,5 @@ def wave(unit: str, limit: float, step: float, shape: WaveShape, orders: tuple[f
                                 modifier=made(shape, index),
                                 tolerance=healthy if index < 2 else 0.0)
 
-    return Wave('', tuple(part(index) for index in range(len(_PARTS))), shape=shape,
-                orders=orders)
+    return Wave('', tuple(part(index) for index in range(len(_PARTS))), is_wave=True,
+                shape=shape, orders=orders)

@@ -334,7 +334,7 @@ def _ripple_form(item: OwnEffect, order: float) -> Form:
     return Form(f'{order:g}{_CYCLES}', tuple(
         _parameter(f'{item.name}.{item.ripple.stem}_{part}{_ORDER_MARK}{order:g}',
                    item.ripple.amplitude)
-        for part in ('cosine', 'sine')), scanned=True)
+        for part in ('cosine', 'sine')), scanned=True, is_wave=True)
 
 
 def _diagram(model: Model) -> Diagram:
