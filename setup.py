@@ -26,7 +26,7 @@ NAMES = {'signal_generator': 'test_signal'}
 # one release fit each other alone (ros-rclpy pins its own to the patch), so each is held to
 # Kilted's series; elsewhere the extra is empty and the nodes say what is missing.
 KILTED = ('ros-rclpy[fastrtps] ~= 9.1', 'ros-std-msgs ~= 5.5', 'ros-std-srvs ~= 5.5',
-          'ros-rosgraph-msgs ~= 2.3', 'ros-diagnostic-msgs ~= 5.5')
+          'ros-rosgraph-msgs ~= 2.3', 'ros-diagnostic-msgs ~= 5.5', 'ros-sensor-msgs ~= 5.5')
 WHEELS_EXIST = "sys_platform == 'linux' and platform_machine == 'x86_64'"
 
 
