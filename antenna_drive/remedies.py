@@ -33,6 +33,7 @@ REMEDIES = {
     'distributed': "pip install 'dask[distributed]'",
     'shtab': 'pip install shtab',
     'tornado': 'pip install tornado',
+    'foxglove': 'pip install foxglove-sdk',
     'mujoco': 'pip install mujoco',
     'fmpy': 'pip install fmpy',
 }
