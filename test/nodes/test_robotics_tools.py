@@ -38,6 +38,7 @@ pytest.importorskip('foxglove', reason='foxglove-sdk is not installed')
 
 from antenna_drive.lockstep.thinning import Thinned  # noqa: E402, I100
 from antenna_drive.nodes.joint_states_node import axis_state, motor_states  # noqa: E402
+from antenna_drive.programs import BAD_INPUT  # noqa: E402
 from drive_watch import Watch  # noqa: E402
 from live_command import LiveCommand  # noqa: E402
 import numpy as np  # noqa: E402
@@ -72,6 +73,16 @@ def test_joints_are_as_another_reader_of_ros_messages_reads_them() -> None:
     assert (motors.name, motors.position.tolist()) == (['a', 'b'], [])
     assert (motors.velocity.tolist(), motors.effort.tolist()) == ([1.4, 2.4], [1.2, 2.2])
     assert list(axis_state(step, 'axis', None).effort) == [], 'the plant has not told its ratio'
+
+
+@pytest.mark.parametrize(('argument', 'said'), [
+    ('joints:=[axis, axis, motor]', '3 different names'), ('publish_rate:=0.0', 'publish_rate'),
+    ('joint:=[a]', 'did you mean joints?')])
+def test_a_wrong_parameter_is_refused_in_one_line(argument: str, said: str) -> None:
+    done = subprocess.run([sys.executable, '-m', 'antenna_drive.nodes.joint_states', '--ros-args',
+                           '-p', argument], capture_output=True, text=True, timeout=PATIENCE_S)
+    assert done.returncode == BAD_INPUT
+    assert said in done.stderr and done.stderr.count('\n') == 1
 
 
 @pytest.fixture(scope='module')
