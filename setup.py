@@ -26,7 +26,7 @@ NAMES = {'signal_generator': 'test_signal'}
 # one release fit each other alone (ros-rclpy pins its own to the patch), so each is held to
 # Kilted's series; elsewhere the extra is empty and the nodes say what is missing.
 KILTED = ('ros-rclpy[fastrtps] ~= 9.1', 'ros-std-msgs ~= 5.5', 'ros-std-srvs ~= 5.5',
-          'ros-rosgraph-msgs ~= 2.3', 'ros-diagnostic-msgs ~= 5.5')
+          'ros-rosgraph-msgs ~= 2.3', 'ros-diagnostic-msgs ~= 5.5', 'ros-sensor-msgs ~= 5.5')
 WHEELS_EXIST = "sys_platform == 'linux' and platform_machine == 'x86_64'"
 
 
@@ -96,6 +96,8 @@ setup(
         'completion': ['shtab >= 1.6'],
         # the page of `live`: a web server with WebSockets in one wheel that needs no other
         'live': ['tornado >= 6.1'],
+        # `live --foxglove`
+        'foxglove': ['foxglove-sdk >= 0.30'],
         # models that people have: `diagnose --model FILE.yaml`
         'mujoco': ['mujoco >= 3.3'],
         'fmu': ['fmpy >= 0.3.22'],
@@ -111,6 +113,9 @@ setup(
             'mypy >= 1.8',
             'types-PyYAML',
             'rosbags >= 0.10',  # reads our bags, as someone else's program would
+            # the page and the socket for Foxglove, and a client of both
+            'tornado >= 6.1',
+            'foxglove-sdk >= 0.30',
             # the linters of ament_flake8 and ament_pep257
             'flake8 >= 6',
             'flake8-builtins',

@@ -165,7 +165,7 @@ def _physics() -> Iterator[Finding]:
 
 def _ros() -> Iterator[Finding]:
     found = [_library('nodes', module) for module in (
-        'rclpy', 'std_msgs', 'std_srvs', 'rosgraph_msgs', 'diagnostic_msgs')]
+        'rclpy', 'std_msgs', 'std_srvs', 'rosgraph_msgs', 'diagnostic_msgs', 'sensor_msgs')]
     for finding in found:
         if finding.what == 'rclpy' and finding.state == BROKEN:
             finding = Finding(finding.part, finding.what, BROKEN, finding.found, ROS_REMEDY)

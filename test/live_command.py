@@ -45,6 +45,13 @@ class LiveCommand:
         self.said = self._process.stdout.readline()
         self.url = self.said.split()[0]
 
+    def line(self) -> str:
+        """Return the next line that it says."""
+        assert self._process.stdout is not None
+        said = self._process.stdout.readline()
+        self.said += said
+        return said
+
     @property
     def number(self) -> int:
         """Return the number of the process."""

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-The last minute of every signal as least and greatest value of short intervals.
+The last minute of every signal as least, greatest and last value of short intervals.
 
 A strip chart of a thousand pixels cannot show sixty thousand samples. Of each interval the least
 and the greatest value are kept, so no peak is lost. Memory does not grow. Nothing here needs ROS.
@@ -54,6 +54,8 @@ class Piece(NamedTuple):
         of one [s], the time of the last step [s], the macro-step [s]
     resume : number of the first interval that may still change: ask for it again
     lows, highs : shape (intervals, signals), NaN where nothing was received
+    ends : the value at the last step of each interval, shape (intervals, signals), NaN where that
+        step was not received
     now : the last value of each signal, shape (signals,)
 
     """
@@ -66,6 +68,7 @@ class Piece(NamedTuple):
     resume: int
     lows: FloatArray
     highs: FloatArray
+    ends: FloatArray
     now: FloatArray
 
     def packed(self) -> bytes:
@@ -107,6 +110,7 @@ class History:
         self._lock = Lock()
         self._lows = np.full((KEPT, first), np.nan)
         self._highs = self._lows.copy()
+        self._ends = self._lows.copy()
         self._now = np.full(first, np.nan)
         self._early: dict[str, FloatArray] = {}
         self.lost = 0
@@ -117,8 +121,8 @@ class History:
         self._per = max(1, round(INTERVAL_S / step_s))
         self._newest = -1
         self._last = dict.fromkeys(self._columns, -1)
-        self._lows[:] = np.nan
-        self._highs[:] = np.nan
+        for ring in (self._lows, self._highs, self._ends):
+            ring[:] = np.nan
 
     @property
     def run(self) -> int:
@@ -180,14 +184,16 @@ class History:
             found = least.reduceat(values, begins)[kept]
             ignore_nan = np.fmin if least is np.minimum else np.fmax
             ring[slots, columns] = ignore_nan(ring[slots, columns], found)
+        complete = (steps % self._per == self._per - 1) & (intervals > self._newest - KEPT)
+        self._ends[intervals[complete] % KEPT, columns] = values[complete]
 
     def _make_room(self, newest: int) -> None:
         """Forget the oldest intervals for those up to `newest`."""
         if newest <= self._newest:
             return
         forget = np.arange(max(self._newest + 1, newest - KEPT + 1), newest + 1) % KEPT
-        self._lows[forget] = np.nan
-        self._highs[forget] = np.nan
+        for ring in (self._lows, self._highs, self._ends):
+            ring[forget] = np.nan
         self._newest = newest
 
     def since(self, run: int, first: int) -> Piece:
@@ -204,7 +210,8 @@ class History:
             return Piece(self._run, first, self._per * self._step_s,
                          max(0, last_step) * self._step_s, self._step_s,
                          max(first, (last_step + 1) // self._per),
-                         self._lows[slots], self._highs[slots], self._now.copy())
+                         self._lows[slots], self._highs[slots], self._ends[slots],
+                         self._now.copy())
 
 
 def _plausible(frames: FloatArray) -> Any:

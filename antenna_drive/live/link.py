@@ -29,7 +29,6 @@ from threading import Event, Thread
 import time
 from typing import Any
 
-from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.errors import UserError
 from antenna_drive.live.board import Board
@@ -43,7 +42,6 @@ from antenna_drive.lockstep.ros_link import FrameLink
 from antenna_drive.lockstep.run_services import StateReader
 from antenna_drive.lockstep.serving import Serving
 from diagnostic_msgs.msg import DiagnosticArray
-import numpy as np
 from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterEvent, ParameterValue
 from rcl_interfaces.srv import (
     DescribeParameters, GetParameters, ListParameters, SetParametersAtomically,
@@ -51,7 +49,7 @@ from rcl_interfaces.srv import (
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from std_msgs.msg import Float64MultiArray, String
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 PERIOD_S = 0.05
@@ -84,10 +82,10 @@ class DriveLink:
         self._context = Context()
         self._context.init(args=[], domain_id=domain_id)
         self._node = Node(f'live_{os.getpid()}', namespace=self.namespace, context=self._context)
-        self._layouts = {unit: FrameLayout(signals) for unit, signals in OUTPUTS.items()}
         self.history = History({unit: len(signals) for unit, signals in OUTPUTS.items()},
                                TEST_SIGNAL)
-        self._frames = FrameLink(self._node, self._layouts)
+        self._frames = FrameLink(self._node, {
+            unit: FrameLayout(signals) for unit, signals in OUTPUTS.items()})
         self._state = StateReader(self._node, TEST_SIGNAL)
         self.settings: dict[str, dict[str, Any]] = {unit: {} for unit in _UNITS}
         self._own: dict[str, dict[str, Any]] = {unit: {} for unit in _UNITS}
@@ -174,11 +172,10 @@ class DriveLink:
                 for unit, report in dict(self._reports).items()}
 
     def _poll(self) -> None:
-        handles = self._frames.handles()[2]
         told = None
         while not self._stop.wait(PERIOD_S):
-            for unit, layout in self._layouts.items():
-                frames = _taken(handles[unit], layout)
+            for unit in _UNITS:
+                frames = self._frames.take_all(unit)
                 if frames is not None:
                     self.history.take(unit, frames)
             state = self._state.latest()
@@ -259,19 +256,6 @@ class DriveLink:
         """
         answer = await self._ask(self._triggers[service], Trigger.Request(), TEST_SIGNAL)
         return bool(answer.success), str(answer.message)
-
-
-def _taken(handle: Any, layout: FrameLayout) -> FloatArray | None:
-    """Return the frames of a unit that wait, shape (n, layout.length); None if there is none."""
-    prefix, size = layout.prefix, len(layout.prefix) + 8 * layout.length
-    numbers = []
-    while (taken := handle.take_message(Float64MultiArray, True)) is not None:
-        message = taken[0]
-        if len(message) == size and message.startswith(prefix):
-            numbers.append(message[len(prefix):])
-    if not numbers:
-        return None
-    return np.frombuffer(b''.join(numbers), '<f8').reshape(-1, layout.length)
 
 
 def _settle(answered: asyncio.Future[Any], future: Any) -> None:

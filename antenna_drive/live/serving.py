@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""The page from start to end: drive, link, server, and an orderly end at Ctrl-C."""
+"""The page from start to end: drive, link, servers, and an orderly end at Ctrl-C."""
 
 from __future__ import annotations
 
@@ -48,6 +48,7 @@ class Options:
     host: str = ''
     token: str = ''
     open_page: bool = False
+    foxglove: int | None = None
 
 
 def serve(options: Options) -> int:
@@ -60,9 +61,12 @@ def serve(options: Options) -> int:
 
     Raises
     ------
-    UserError : the port is taken, a configuration or a namespace is not allowed
+    UserError : a port is taken, a configuration or a namespace is not allowed
 
     """
+    if options.foxglove is not None:
+        # what is not installed is to be said before a drive is started
+        import antenna_drive.live.foxglove  # noqa: F401
     return asyncio.run(_serve(options))
 
 
@@ -96,9 +100,15 @@ async def _serve(options: Options) -> int:
 async def _serve_session(options: Options, session: Session, ended: asyncio.Event) -> None:
     token = (options.token or secrets.token_urlsafe(24)) if options.host else ''
     server = Server(session, options.host, options.port, token)
+    foxglove = None
+    if options.foxglove is not None:
+        from antenna_drive.live.foxglove import FoxgloveServer
+        foxglove = FoxgloveServer(session, options.foxglove)
     looking = asyncio.ensure_future(session.look_after())
     whose = 'a drive that runs' if options.join else 'a drive of its own'
     print(f'{server.url}  shows {whose}; Ctrl-C ends it', flush=True)
+    if foxglove is not None:
+        print(f'{foxglove.url}  serves the same to Foxglove', flush=True)
     if options.open_page:
         webbrowser.open(server.url)
     waiting = asyncio.ensure_future(ended.wait())
@@ -106,6 +116,8 @@ async def _serve_session(options: Options, session: Session, ended: asyncio.Even
     waiting.cancel()
     looking.cancel()
     print('ending', file=sys.stderr, flush=True)
+    if foxglove is not None:
+        await foxglove.close()
     await server.close()
     if looking.done() and not looking.cancelled():
         looking.result()  # it never returns: this raises what went wrong

@@ -69,6 +69,8 @@ def test_every_interval_has_the_least_and_the_greatest_sample(
                 samples = value(unit, signal, steps)
                 assert piece.lows[number - piece.first, column] == samples.min()
                 assert piece.highs[number - piece.first, column] == samples.max()
+                end = piece.ends[number - piece.first, column]
+                assert end == samples[-1] if len(steps) == per else np.isnan(end)
                 column += 1
     assert piece.now[0] == value('test_signal', 0, last)
 
@@ -94,6 +96,12 @@ def test_steps_that_never_came_are_counted_and_left_empty() -> None:
     lows = kept.since(0, 0).lows
     assert np.isnan(lows[[0, 3, 4, 5]]).all()
     assert np.isfinite(lows[[1, 2, 6, 7]]).all()
+    kept = History(SIGNALS, 'test_signal')
+    for unit in SIGNALS:
+        kept.take(unit, frames(unit, [*range(19), *range(20, 30)]))
+    ends = kept.since(0, 0).ends[:, 0]
+    assert np.isnan(ends[1]), 'step 19 never came'
+    assert ends[[0, 2]].tolist() == [value('test_signal', 0, 9), value('test_signal', 0, 29)]
 
 
 def test_another_run_begins_when_the_conductor_says_so() -> None:

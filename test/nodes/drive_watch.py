@@ -43,9 +43,9 @@ PATIENCE_S = 120.0
 class Watch:
     """A ROS 2 node of the test's own."""
 
-    def __init__(self, namespace: str = '') -> None:
+    def __init__(self, namespace: str = '', domain_id: int | None = None) -> None:
         self.context = Context()
-        self.context.init(args=[])
+        self.context.init(args=[], domain_id=domain_id)
         self.node = Node('watch', namespace=namespace, context=self.context)
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)

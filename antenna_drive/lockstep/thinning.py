@@ -1,0 +1,115 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Every n-th step of some units, put together from frames that are taken in bulk.
+
+This is what a reader needs that nobody waits for and that publishes at a lower rate than that of
+the steps. Nothing here needs ROS.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from antenna_drive.lockstep.frame import HEADER, LARGEST_RUN, NO_RUN
+from antenna_drive.physics.arrays import FloatArray
+import numpy as np
+
+# Units are a few steps apart. More steps than this that lack a unit are not genuine.
+_MOST_INCOMPLETE = 4096
+
+
+class Thinned(NamedTuple):
+    """
+    One step of all units that are read.
+
+    Attributes
+    ----------
+    run, step, step_s : the run, the number of the step, the macro-step [s]
+    values : by unit, the value of each of its signals, shape (signals,)
+
+    """
+
+    run: int
+    step: int
+    step_s: float
+    values: dict[str, FloatArray]
+
+    @property
+    def time_ns(self) -> int:
+        """Return the simulated time of the step [ns], rounded as on `clock`."""
+        return round(self.step * self.step_s * 1e9)
+
+
+class Thinning:
+    """Takes the frames of units in any portions; returns the steps that are due."""
+
+    def __init__(self, units: Sequence[str], rate_hz: float) -> None:
+        """
+        Begin with no step.
+
+        Parameters
+        ----------
+        units
+            whose frames make a step complete
+        rate_hz
+            how many steps for each simulated second; the nearest that the macro-step allows, and
+            at most every step
+
+        """
+        self._units = tuple(units)
+        self._rate_hz = rate_hz
+        self._incomplete: dict[tuple[int, int], dict[str, FloatArray]] = {}
+        self._last = (0, -1)
+
+    def take(self, unit: str, frames: FloatArray) -> None:
+        """
+        Take frames of a unit.
+
+        Parameters
+        ----------
+        unit
+            that sent them
+        frames
+            rows of a `FrameLayout`; rows that are no frame of a run are left out
+
+        """
+        frames = frames[np.isfinite(frames).all(axis=1)]
+        run, step, step_s = frames[:, :len(HEADER)].T
+        frames = frames[(run > NO_RUN) & (run < LARGEST_RUN) & (run % 1.0 == 0.0)
+                        & (step >= 0.0) & (step < LARGEST_RUN) & (step_s > 0.0)]
+        _, step, step_s = frames[:, :len(HEADER)].T
+        every = np.maximum(1.0, np.round(1.0 / (self._rate_hz * step_s)))
+        for frame in frames[step % every == 0.0]:
+            key = int(frame[0]), int(frame[1])
+            if key > self._last:
+                self._incomplete.setdefault(key, {}).setdefault(unit, frame)
+        for key in sorted(self._incomplete)[:-_MOST_INCOMPLETE]:
+            del self._incomplete[key]
+
+    def complete(self) -> list[Thinned]:
+        """Return the steps that are complete now, each once and in order."""
+        found = []
+        for key in sorted(self._incomplete):
+            frames = self._incomplete[key]
+            if len(frames) == len(self._units):
+                step_s = float(frames[self._units[0]][len(HEADER) - 1])
+                found.append(Thinned(*key, step_s, {
+                    unit: frame[len(HEADER)::2] for unit, frame in frames.items()}))
+                self._last = key
+        # each unit sends in order: what lacks a unit before a complete step stays so
+        self._incomplete = {key: frames for key, frames in self._incomplete.items()
+                            if key > self._last}
+        return found

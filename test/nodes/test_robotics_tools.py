@@ -1,0 +1,239 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+What robotics tools see of one running drive: joints, and the socket that Foxglove reads.
+
+The client of the socket is written from the description of the protocol, without the SDK:
+https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterator
+import json
+import os
+import signal
+import struct
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+
+pytest.importorskip('rclpy', reason='rclpy is not installed: no drive to look at')
+pytest.importorskip('tornado', reason='tornado is not installed: no client')
+pytest.importorskip('foxglove', reason='foxglove-sdk is not installed')
+
+from antenna_drive.lockstep.thinning import Thinned  # noqa: E402, I100
+from antenna_drive.nodes.joint_states_node import axis_state, motor_states  # noqa: E402
+from antenna_drive.programs import BAD_INPUT  # noqa: E402
+from drive_watch import Watch  # noqa: E402
+from live_command import LiveCommand  # noqa: E402
+import numpy as np  # noqa: E402
+from rclpy.serialization import serialize_message  # noqa: E402
+from rosbags.typesys import get_typestore, Stores  # noqa: E402
+from rosgraph_msgs.msg import Clock  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+from std_msgs.msg import Float64  # noqa: E402
+from tornado.httpclient import HTTPRequest  # noqa: E402
+from tornado.websocket import websocket_connect, WebSocketClientConnection  # noqa: E402
+
+PATIENCE_S = 120.0
+# Eq. (9): the greatest bias voltage is this times the bias pot [V].
+FULL_BIAS_V = 13.0
+READINGS = ('plant/encoder', 'plant/axis_rate', 'motor_1/tach_rate', 'motor_2/tach_rate',
+            'motor_1/gear_torque', 'motor_2/gear_torque')
+
+
+def test_joints_are_as_another_reader_of_ros_messages_reads_them() -> None:
+    step = Thinned(1795262948317196, 2_000_500, 1e-3, {
+        # the order of signals is that of README.md, Topics
+        'plant': np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6]),
+        'motor_1': np.array([1.1, 1.2, 1.3, 1.4, 1.5]),
+        'motor_2': np.array([2.1, 2.2, 2.3, 2.4, 2.5])})
+    read: Any = get_typestore(Stores.ROS2_KILTED)
+    axis, motors = (read.deserialize_cdr(serialize_message(state), 'sensor_msgs/msg/JointState')
+                    for state in (axis_state(step, 'axis', 100.0), motor_states(step, ['a', 'b'])))
+    for state in (axis, motors):
+        assert (state.header.stamp.sec, state.header.stamp.nanosec) == (2000, 500_000_000)
+    assert (axis.name, axis.position.tolist(), axis.velocity.tolist()) == (['axis'], [0.3], [0.2])
+    assert axis.effort.tolist() == pytest.approx([340.0])
+    assert (motors.name, motors.position.tolist()) == (['a', 'b'], [])
+    assert (motors.velocity.tolist(), motors.effort.tolist()) == ([1.4, 2.4], [1.2, 2.2])
+    assert list(axis_state(step, 'axis', None).effort) == [], 'the plant has not told its ratio'
+
+
+@pytest.mark.parametrize(('argument', 'said'), [
+    ('joints:=[axis, axis, motor]', '3 different names'), ('publish_rate:=0.0', 'publish_rate'),
+    ('joint:=[a]', 'did you mean joints?')])
+def test_a_wrong_parameter_is_refused_in_one_line(argument: str, said: str) -> None:
+    done = subprocess.run([sys.executable, '-m', 'antenna_drive.nodes.joint_states', '--ros-args',
+                           '-p', argument], capture_output=True, text=True, timeout=PATIENCE_S)
+    assert done.returncode == BAD_INPUT
+    assert said in done.stderr and done.stderr.count('\n') == 1
+
+
+@pytest.fixture(scope='module')
+def live(module_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[LiveCommand]:
+    """Return a page with a drive of its own, which serves Foxglove too."""
+    with LiveCommand(tmp_path_factory.mktemp('live'), module_domain, '--foxglove', '0') as live:
+        yield live
+        assert live.end() == 0
+        assert 'Traceback' not in live.said
+
+
+@pytest.fixture(scope='module')
+def watch(live: LiveCommand, module_domain: int) -> Iterator[Watch]:
+    """Return a node beside the drive."""
+    with Watch(domain_id=module_domain) as watch:
+        yield watch
+
+
+class Client:
+    """A client of the socket: the last message of each kind, and the data of each channel."""
+
+    def __init__(self, socket: WebSocketClientConnection) -> None:
+        self._socket = socket
+        self.told: dict[str, dict[str, Any]] = {}
+        self.values: dict[str, Any] = {}
+        self.data: dict[int, list[tuple[int, dict[str, Any]]]] = {}
+
+    @classmethod
+    async def to(cls, url: str) -> Client:
+        socket = await websocket_connect(HTTPRequest(url), subprotocols=['foxglove.sdk.v1'])
+        assert socket.selected_subprotocol == 'foxglove.sdk.v1'
+        return cls(socket)
+
+    async def say(self, op: str, **rest: Any) -> None:
+        await self._socket.write_message(json.dumps({'op': op, **rest}))
+
+    async def until(self, true: Callable[[], Any]) -> Any:
+        """Read until something is true."""
+        end = asyncio.get_running_loop().time() + PATIENCE_S
+        while not (value := true()):
+            assert asyncio.get_running_loop().time() < end, f'in vain; {self.told}'
+            message = await asyncio.wait_for(self._socket.read_message(), PATIENCE_S)
+            assert message is not None, 'the server has gone'
+            self._take(message)
+        return value
+
+    def _take(self, message: str | bytes) -> None:
+        if isinstance(message, bytes):
+            if message[0] == 1:  # message data: subscription, time [ns], what the channel encodes
+                number, time_ns = struct.unpack_from('<IQ', message, 1)
+                self.data.setdefault(number, []).append((time_ns, json.loads(message[13:])))
+            return
+        told = json.loads(message)
+        self.told[told['op']] = told
+        if told['op'] == 'parameterValues':
+            self.values |= {item['name']: item['value'] for item in told['parameters']}
+
+
+async def _see_and_set(url: str, watch: Watch) -> None:
+    pot = 'torque_share.bias_pot'
+    client = await Client.to(url)
+    channels = {channel['topic']: channel for channel in (
+        await client.until(lambda: client.told.get('advertise')))['channels']}
+    assert {'parameters', 'parametersSubscribe', 'time'} <= {
+        *client.told['serverInfo']['capabilities']}
+    assert {*channels} == {'/test_signal', '/motor_1', '/motor_2', '/torque_share', '/plant'}
+    said = json.loads(channels['/plant']['schema'])['properties']['encoder']['description']
+    assert said == 'elevation encoder reading [rad]'
+    assert {channel['encoding'] for channel in channels.values()} == {'json'}
+    await client.say('subscribe', subscriptions=[
+        {'id': number, 'channelId': channels[topic]['id']}
+        for number, topic in enumerate(['/plant', '/torque_share'])])
+    data = client.data
+    bias = await client.until(lambda: len(data.get(0, [])) > 100 and data.get(1))
+    times = [time_ns for time_ns, _ in data[0]]
+    assert len({message['encoder'] for _, message in data[0]}) > 50, 'it moves'
+    assert all(time_ns % 10_000_000 == 9_000_000 for time_ns in times), 'steps 9, 19, 29 ...'
+    assert times == sorted({*times})
+    # a parameter that is set is in force, in the node and in what the signal does
+    await client.until(lambda: bias[-1][1]['bias_voltage'] > 0.3 * FULL_BIAS_V)
+    await client.say('getParameters', parameterNames=[])
+    await client.until(lambda: 'parameterValues' in client.told)
+    while pot not in client.values:  # nodes that are starting have not told theirs
+        client.told.pop('parameterValues', None)
+        await client.say('getParameters', parameterNames=[pot])
+        await client.until(lambda: 'parameterValues' in client.told)
+    await client.say('subscribeParameterUpdates', parameterNames=[pot])
+    await client.say('setParameters', parameters=[{'name': pot, 'value': 0.25}], id='set')
+    await client.until(lambda: client.values[pot] == 0.25)
+    assert watch.get('torque_share', 'bias_pot') == [0.25]
+    await client.until(lambda: 0.0 < bias[-1][1]['bias_voltage'] <= 0.25 * FULL_BIAS_V)
+    # what the node refuses has its reason, and the value in force is told again
+    await client.say('setParameters', parameters=[{'name': pot, 'value': 7}], id='refused')
+    reason = await client.until(lambda: client.told.get('status'))
+    assert reason['level'] == 2 and 'bias_pot' in reason['message'] and '7' in reason['message']
+    await client.until(lambda: client.told['parameterValues'].get('id') == 'refused')
+    assert client.values[pot] == 0.25
+    # what somebody else sets is told
+    assert watch.set_together('torque_share', {'bias_pot': 0.5}).successful
+    await client.until(lambda: client.values[pot] == 0.5)
+    # a run that begins again is another session, whose time begins again
+    session = client.told['serverInfo']['sessionId']
+    assert watch.call('test_signal/reset').success
+    await client.until(lambda: client.told['serverInfo']['sessionId'] != session)
+    await client.until(lambda: data[0][-1][0] < times[-1])
+
+
+def test_foxglove_sees_and_turns_the_drive(live: LiveCommand, watch: Watch) -> None:
+    said = live.line()
+    assert said.startswith('ws://localhost:')
+    asyncio.run(_see_and_set(said.split()[0], watch))
+
+
+def test_joints_are_the_readings_of_the_same_time(live: LiveCommand, watch: Watch,
+                                                  module_domain: int) -> None:
+    states: dict[str, list[Any]] = {'joint_states': [], 'motor_states': []}
+    last: dict[str, Any] = {}
+    for topic, kept in states.items():
+        watch.node.create_subscription(JointState, topic, kept.append, 1000)
+    watch.node.create_subscription(Clock, 'clock', lambda message: last.update(
+        clock=message.clock), 100)
+    for name in READINGS:
+        watch.node.create_subscription(Float64, name, lambda message, name=name: last.update(
+            {name: message.data}), 100)
+    node = subprocess.Popen(
+        [sys.executable, '-m', 'antenna_drive.nodes.joint_states', '--ros-args',
+         '-p', 'publish_rate:=100.0', '-p', 'joints:=[elevation, m1, m2]'],
+        env={**os.environ, 'ROS_DOMAIN_ID': str(module_domain)})
+    try:
+        axis, motors = states.values()
+        watch.until(lambda: len(axis) > 100 and len(last) == 7, 'joints')
+        assert watch.call('test_signal/pause').success
+        (ratio,) = watch.get('plant', 'gear_ratio')
+
+        def same() -> bool:
+            encoder, rate, tach_1, tach_2, torque_1, torque_2 = (last[name] for name in READINGS)
+            return all(state[-1].header.stamp == last['clock'] for state in (axis, motors)) and (
+                list(axis[-1].position), list(axis[-1].velocity), list(axis[-1].effort),
+                list(motors[-1].position), list(motors[-1].velocity), list(motors[-1].effort),
+            ) == ([encoder], [rate], [ratio * (torque_1 + torque_2)],
+                  [], [tach_1, tach_2], [torque_1, torque_2])
+
+        watch.until(same, 'equal values while the drive is paused')
+        assert (list(axis[-1].name), list(motors[-1].name)) == (['elevation'], ['m1', 'm2'])
+        assert len({state.position[0] for state in axis[-100:]}) > 50, 'it moves'
+        stamps = [state.header.stamp.sec * 10**9 + state.header.stamp.nanosec for state in axis]
+        assert stamps == sorted({*stamps})
+        assert all(stamp % 10_000_000 == 0 for stamp in stamps), 'every tenth step'
+        assert watch.call('test_signal/resume').success
+        node.send_signal(signal.SIGINT)
+        assert node.wait(PATIENCE_S) == 0
+    finally:
+        node.kill()
+        node.wait()
