@@ -56,6 +56,9 @@ def pytest_collection_modifyitems(
         item.add_marker(pytest.mark.xdist_group('processes' if alone else item.path.name))
     yield
     if hasattr(config, 'workerinput'):
+        if items and config.getoption('loadgroup') and '@' not in items[0].nodeid:
+            raise pytest.UsageError('this pytest-xdist does not keep groups of tests together '
+                                    'with this pytest: install the versions that setup.py names')
         items.sort(key=lambda item: not ONE_AT_A_TIME & set(getattr(item, 'fixturenames', ())))
 
 
