@@ -157,6 +157,7 @@ def test_an_experiment_starts_the_drive_as_in_the_article(page: Page) -> None:
                '.toFixed(6) === "0.013000"')
 
 
+@pytest.mark.trial  # the recorder has tests of its own
 def test_a_recording_is_made_and_drawn_beside_the_live_curves(page: Page) -> None:
     page.click('#tab-tapes')
     page.tell('document.getElementById("record-name").value = "from_the_page"')

@@ -44,9 +44,9 @@ from drive_watch import Recorder, Watch  # noqa: E402
 NAME = 'watcher'
 # The units whose exchange is compiled.
 EXCHANGES = {'compiled': UNITS, 'mixed': ('test_signal', 'motor_2', 'torque_share'), 'python': ()}
-# In a fault each node does what it does in a drive of its own kind: mixed drives are tried by
-# command, as each of these tests takes ten seconds of both cores or more.
-IN_FAULTS = [pytest.param(exchange, marks=pytest.mark.trial if exchange == 'mixed' else ())
+# Faults are met by the protocol, which both exchanges share: the exchange in Python and mixed
+# drives are tried by command, as each of these tests takes ten seconds of both cores or more.
+IN_FAULTS = [pytest.param(exchange, marks=() if exchange == 'compiled' else pytest.mark.trial)
              for exchange in EXCHANGES]
 ENDLESS: dict[str, Any] = {'run.pace': 0.0, 'run.observers': [NAME]}
 

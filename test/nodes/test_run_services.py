@@ -69,7 +69,7 @@ def settings_of(parameters: dict[str, Any], prefix: str = 'test_signal.rate.') -
 
 
 @pytest.mark.usefixtures('fresh_domain')
-@pytest.mark.parametrize('exchange', ['auto', 'python'])
+@pytest.mark.parametrize('exchange', ['auto', pytest.param('python', marks=pytest.mark.trial)])
 def test_an_operator_controls_the_run_and_changes_no_bit(exchange: str, tmp_path: Path) -> None:
     if exchange == 'auto':
         for unit in UNITS:
