@@ -128,11 +128,11 @@ def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
     power = np.zeros(len(channels))
     for j, rival in enumerate(rivals):
         off = residuals[j] - residuals
-        gain = np.zeros(len(rivals))
+        price = np.zeros(len(rivals))
         rest = off
         if follow:
-            gain, rest = _followed(problem, rival, points[j], off, inflated)
-        lack[:, j] = 0.5 * np.maximum(np.sum(off ** 2, axis=1) - gain, 0.0) / inflated
+            price, rest = _followed(problem, rival, points[j], off, inflated)
+        lack[:, j] = 0.5 * (np.sum(rest ** 2, axis=1) + price) / inflated
         power += prior @ np.sum(rest.reshape(len(rivals), -1, power.size) ** 2, axis=1)
     shares = power / max(float(power.sum()), _LEAST)
     return Separation(prior, lack, dict(zip(channels, shares.tolist(), strict=True)))
@@ -286,17 +286,21 @@ def _followed(problem: LeastSquares, rival: Rival, point: dict[str, float], off:
 
     Returns
     -------
-    by how much each chi-square has fallen, shape (r,), and the differences then, shape (r, n)
+    what the steps away from what is known add to each chi-square, shape (r,), and the differences
+    that are left, in standard deviations, shape (r, n)
 
     """
     numbers = _numbers(problem.machine, rival)
     jacobian = problem.jacobian(point, numbers, problem.residuals(point), central=False)
-    known = (jacobian.T @ jacobian).astype(float) + _precision(rival, numbers, inflated)
+    precision = _precision(rival, numbers, inflated)
+    known = (jacobian.T @ jacobian).astype(float) + precision
     scale = np.sqrt(np.diag(known))
     slopes = (off.astype(np.float32) @ jacobian).astype(float) / scale
-    steps = linalg.cho_solve(_factor(known, scale), slopes.T).T
-    return (np.asarray(np.sum(slopes * steps, axis=1)),
-            np.asarray(off - (steps / scale) @ jacobian.T))
+    steps = linalg.cho_solve(_factor(known, scale), slopes.T).T / scale
+    # what is left is summed up itself: a difference of two large sums of single precision says
+    # nothing about a small one
+    return (np.asarray(np.sum((steps @ precision) * steps, axis=1)),
+            np.asarray(off - steps @ jacobian.T))
 
 
 def _factor(known: FloatArray, scale: FloatArray) -> tuple[FloatArray, bool]:

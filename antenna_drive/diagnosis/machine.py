@@ -27,14 +27,11 @@ from copy import copy
 from dataclasses import dataclass, field
 import math
 from types import MappingProxyType
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from antenna_drive.diagnosis.diagram import Diagram
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from antenna_drive.diagnosis.design import TestSpace
 
 FloatArray = NDArray[np.float64]
 Point = Mapping[str, float]
@@ -460,23 +457,6 @@ class Machine(ABC):
             if form.name == name:
                 return form
         raise KeyError(f'{effect.id}: {name}')
-
-    def test_space(self, duration_s: float) -> TestSpace:
-        """
-        Return the tests that the machine may run; the next one is chosen among them.
-
-        Parameters
-        ----------
-        duration_s
-            of a test [s]
-
-        Raises
-        ------
-        NotImplementedError : the machine does not say
-
-        """
-        raise NotImplementedError(f'{type(self).__name__} does not say what a test may be: '
-                                  'it lacks test_space')
 
     def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
         """Return the form of an effect's part that corresponds to a form of the effect."""

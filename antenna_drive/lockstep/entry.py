@@ -20,10 +20,12 @@ the first moment, and a machine without ROS 2 gets one line that says so.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 import os
 import signal
 import sys
+from threading import Event
 from types import FrameType
 from typing import Any, TYPE_CHECKING
 
@@ -164,7 +166,6 @@ def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None,
         _end_without(int(os.environ[PARENT]))
 
     def act(arguments: list[str]) -> int:
-        choose_transport(os.environ)
         _run_node(default_name, make, arguments, fed_by_topic, wiring, ending, read_sheet)
         # The node has left the graph. What the interpreter and the compiler would still tidy up
         # takes seconds on a busy machine, and a node must be gone within two.
@@ -206,16 +207,50 @@ def _end_without(parent: int) -> None:
         os._exit(OK)
 
 
-def init_ros(name: str, arguments: Sequence[str], example: str) -> None:
+@contextmanager
+def ros_node(name: str, arguments: Sequence[str], example: str,
+             undeclared: bool = True) -> Iterator[Node]:
     """
-    Initialise rclpy for the node of this process, which handles signals itself.
+    Give this process its node, and take it out of the graph in the end.
+
+    Signals are left to the process.
+
+    Parameters
+    ----------
+    name
+        of the node unless it is remapped
+    arguments
+        command line without the program's name
+    example
+        a right ROS 2 parameter, for the error
+    undeclared
+        whether parameters that nobody has declared reach `Overrides`, which says what was meant
 
     Raises
     ------
-    UserError : the command line has an argument that is none of ROS 2's, or a wrong one;
-        `example` shows a right one
+    UserError : the command line has an argument that is none of ROS 2's, or a wrong one
 
     """
+    import rclpy
+    from rclpy.exceptions import InvalidParameterTypeException
+    from rclpy.node import Node
+    choose_transport(os.environ)
+    _init_ros(name, arguments, example)
+    try:
+        try:
+            node = Node(name, automatically_declare_parameters_from_overrides=undeclared,
+                        allow_undeclared_parameters=undeclared)
+        except (RuntimeError, InvalidParameterTypeException) as error:
+            raise UserError(_first_line(error)) from error
+        try:
+            yield node
+        finally:
+            node.destroy_node()
+    finally:
+        rclpy.try_shutdown()
+
+
+def _init_ros(name: str, arguments: Sequence[str], example: str) -> None:
     import rclpy
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
@@ -229,30 +264,19 @@ def init_ros(name: str, arguments: Sequence[str], example: str) -> None:
         raise UserError(_first_line(error)) from error
 
 
+def stopped_by_signals() -> Event:
+    """Return an event that SIGINT and SIGTERM set from now on."""
+    stop = Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda number, frame: stop.set())
+    return stop
+
+
 def _run_node(default_name: str, make: MakeUnit, arguments: list[str],
               fed_by_topic: Sequence[str], wiring: str, ending: _Ending,
               read_sheet: ReadSheet | None) -> None:
-    import rclpy
-    init_ros(default_name, arguments, "config:=\"['old_circuit']\"")
-    try:
-        node = _bare_node(default_name)
-        try:
-            _spin(node, make, fed_by_topic, wiring, ending, read_sheet)
-        finally:
-            node.destroy_node()
-    finally:
-        rclpy.try_shutdown()
-
-
-def _bare_node(default_name: str) -> Node:
-    from rclpy.exceptions import InvalidParameterTypeException
-    from rclpy.node import Node
-    try:
-        # Undeclared ones reach our own check, which says what was meant; it lets none through.
-        return Node(default_name, automatically_declare_parameters_from_overrides=True,
-                    allow_undeclared_parameters=True)
-    except (RuntimeError, InvalidParameterTypeException) as error:
-        raise UserError(_first_line(error)) from error
+    with ros_node(default_name, arguments, "config:=\"['old_circuit']\"") as node:
+        _spin(node, make, fed_by_topic, wiring, ending, read_sheet)
 
 
 def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], wiring: str,

@@ -16,16 +16,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-import os
-import signal
 from threading import Event
-from types import FrameType
 from typing import Any
 
 from antenna_drive.emulator.wiring import MOTORS, OUTPUTS, PLANT
 from antenna_drive.errors import UserError
 from antenna_drive.lockstep.changes import read_record, SETTINGS
-from antenna_drive.lockstep.entry import choose_transport, init_ros
+from antenna_drive.lockstep.entry import ros_node, stopped_by_signals
 from antenna_drive.lockstep.frame import FrameLayout
 from antenna_drive.lockstep.readings import CHANGES_QOS, READING_OVERRIDES, READING_QOS
 from antenna_drive.lockstep.ros_link import FrameLink
@@ -34,7 +31,6 @@ from antenna_drive.lockstep.serving import Serving
 from antenna_drive.lockstep.thinning import Thinned, Thinning
 from antenna_drive.parameters.schema import Entry
 from builtin_interfaces.msg import Time
-import rclpy
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -67,18 +63,8 @@ def run(arguments: Sequence[str]) -> int:
     UserError : wrong arguments
 
     """
-    choose_transport(os.environ)
-    init_ros(NAME, arguments, 'publish_rate:=50.0')
-    stop = Event()
-
-    def end(number: int, frame: FrameType | None) -> None:
-        stop.set()
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, end)
-    node = Node(NAME, automatically_declare_parameters_from_overrides=True,
-                allow_undeclared_parameters=True)
-    try:
+    stop = stopped_by_signals()
+    with ros_node(NAME, arguments, 'publish_rate:=50.0') as node:
         overrides = Overrides(node)
         rate_hz = overrides.number('publish_rate', _RATE, 50.0)
         joints = overrides.names('joints', JOINTS)
@@ -87,9 +73,6 @@ def run(arguments: Sequence[str]) -> int:
             raise UserError(f'joints: {joints!r} given, allowed are {len(JOINTS)} different '
                             f'names, as {list(JOINTS)!r}')
         _publish(node, rate_hz, joints, stop)
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
     return OK
 
 

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from datetime import datetime
-import os
 from pathlib import Path
 import signal
 import time
@@ -27,7 +26,7 @@ from typing import Any
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.errors import UserError
 from antenna_drive.lockstep.changes import read_record
-from antenna_drive.lockstep.entry import choose_transport, init_ros
+from antenna_drive.lockstep.entry import ros_node
 from antenna_drive.lockstep.following import Follower, Step
 from antenna_drive.lockstep.frame import FrameLayout
 from antenna_drive.lockstep.readings import CHANGES_QOS
@@ -37,7 +36,6 @@ from antenna_drive.recording.recorder import RunRecorder
 from antenna_drive.recording.recording import RecordingError
 from antenna_drive.recording.sheet import load_sheet
 from rcl_interfaces.msg import ParameterDescriptor
-import rclpy
 from rclpy.node import Node
 from std_msgs.msg import String
 
@@ -67,14 +65,8 @@ def run(arguments: Sequence[str]) -> int:
     UserError : wrong arguments, an existing target, a wrong test sheet
 
     """
-    choose_transport(os.environ)
-    init_ros(NAME, arguments, 'out:=my_run')
-    node = Node(NAME)
-    try:
+    with ros_node(NAME, arguments, 'out:=my_run', undeclared=False) as node:
         return _RecorderNode(node).spin()
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
 
 
 def _sync_s(node: Node) -> float | None:

@@ -16,20 +16,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-import os
-import signal
 from threading import Event
 import time
-from types import FrameType
 
-from antenna_drive.lockstep.entry import choose_transport, init_ros
+from antenna_drive.lockstep.entry import ros_node, stopped_by_signals
 from antenna_drive.lockstep.ros_parameters import Overrides
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.recording import NANOSECONDS, Recording
 from antenna_drive.twin.intake import COMMAND, known
 import numpy as np
-import rclpy
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Float64, Float64MultiArray
@@ -61,26 +58,13 @@ def run(path: str, arguments: Sequence[str]) -> int:
 
     """
     recording = read_recording(path)
-    choose_transport(os.environ)
-    init_ros(NAME, arguments, 'pace:=1.0')
-    stop = Event()
-
-    def end(number: int, frame: FrameType | None) -> None:
-        stop.set()
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, end)
-    node = Node(NAME, automatically_declare_parameters_from_overrides=True,
-                allow_undeclared_parameters=True)
-    try:
+    stop = stopped_by_signals()
+    with ros_node(NAME, arguments, 'pace:=1.0') as node:
         overrides = Overrides(node)
         pace = overrides.number('pace', _PACE, 1.0)
         real = ''.join(overrides.names('real', ('real',)))
         overrides.check_all_known(('pace', 'real'))
         _play(node, recording, real, pace, stop)
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
     return 0
 
 
@@ -107,4 +91,4 @@ def _play(node: Node, recording: Recording, real: str, pace: float, stop: Event)
         rows.publish(Float64MultiArray(data=[stamp, *row]))
         for publisher, value in zip(single, row, strict=True):
             publisher.publish(Float64(data=value))
-    rows.wait_for_all_acked(rclpy.duration.Duration(seconds=2.0))
+    rows.wait_for_all_acked(Duration(seconds=2.0))

@@ -19,20 +19,16 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack
 import json
-import os
 from pathlib import Path
 from queue import Empty as NothingThere, SimpleQueue
-import signal
-from threading import Event
 import time
-from types import FrameType
 from typing import Any
 
 from antenna_drive.drafts import drafted
 from antenna_drive.emulator.batch import CHANNELS
 from antenna_drive.errors import one_line, UserError
 from antenna_drive.lockstep.diagnostics import diagnostics
-from antenna_drive.lockstep.entry import choose_transport, init_ros
+from antenna_drive.lockstep.entry import ros_node, stopped_by_signals
 from antenna_drive.lockstep.getting_ready import told_while_compiling
 from antenna_drive.lockstep.ros_parameters import Overrides
 from antenna_drive.lockstep.serving import Serving
@@ -49,7 +45,6 @@ from antenna_drive.twin.topics import load_topics, own_topics, Topic, TopicMap
 from antenna_drive.twin.watch import Settings, Twin
 from antenna_drive.workers import worker_processes
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-import rclpy
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Empty, Float64, Float64MultiArray, String
@@ -91,16 +86,8 @@ def run(arguments: Sequence[str]) -> int:
     UserError : wrong arguments, map, sheet, configuration or quiet record
 
     """
-    choose_transport(os.environ)
-    init_ros(NAME, arguments, 'real:=/elevation')
-    node = Node(NAME, automatically_declare_parameters_from_overrides=True,
-                allow_undeclared_parameters=True)
-    try:
-        with ExitStack() as stack:
-            return _TwinNode(node, stack).spin()
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
+    with ros_node(NAME, arguments, 'real:=/elevation') as node, ExitStack() as stack:
+        return _TwinNode(node, stack).spin()
 
 
 def _text(overrides: Overrides, name: str) -> str:
@@ -143,13 +130,11 @@ class _TwinNode:
         self._written = kept is not None
         self._arrived: SimpleQueue[tuple[Topic, tuple[float, ...], int, int]] = SimpleQueue()
         self._tests: SimpleQueue[None] = SimpleQueue()
-        self._stop = Event()
         self._state = ''
         self._growing = _growing(stack, drive) if switches['verdict'] else None
         self._since: int | None = None
         self._connect(self._map)
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._end)
+        self._stop = stopped_by_signals()
 
     def _connect(self, topics: TopicMap) -> None:
         name = self._node.get_name()
@@ -172,9 +157,6 @@ class _TwinNode:
             numbers = tuple(message.data) if topic.vector else (message.data,)
             self._arrived.put((topic, numbers, info['source_timestamp'], time.time_ns()))
         return listen
-
-    def _end(self, number: int, frame: FrameType | None) -> None:
-        self._stop.set()
 
     def spin(self) -> int:
         """Watch until told to stop; return the exit code."""

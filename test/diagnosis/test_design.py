@@ -166,8 +166,3 @@ def test_the_same_seed_proposes_the_same_test() -> None:
     one, other, third = (TestDesign(Loads(1.6), HARD, 1.0, effort=SMALL, seed=seed).run().tests[0]
                          for seed in (3, 3, 4))
     assert isinstance(one, Judged) and one.test == other.test != third.test
-
-
-def test_a_machine_that_does_not_say_what_a_test_may_be_says_so() -> None:
-    with pytest.raises(NotImplementedError, match='Lever does not say what a test may be'):
-        Lever(1.0).test_space(30.0)

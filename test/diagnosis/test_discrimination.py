@@ -71,7 +71,8 @@ def lack_at(x: FloatArray, sigma: float = 0.05) -> float:
 
 def test_the_published_t_optimal_design_has_the_published_lack_of_fit() -> None:
     x = np.repeat(POINTS, [round(READINGS * weight) for weight in WEIGHTS])
-    assert lack_at(x) == pytest.approx(DELTA, rel=3e-3)
+    # published to four digits
+    assert lack_at(x) == pytest.approx(DELTA, rel=5e-4)
 
 
 def test_no_other_design_has_a_greater_lack_of_fit() -> None:

@@ -26,7 +26,7 @@ from typing import Any, TypeAlias
 
 from antenna_drive.diagnosis import (
     Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Motion, Parameter,
-    Point, Regimes, TestSpace, TimeScales,
+    Point, Regimes, TimeScales,
 )
 from antenna_drive.emulator import batch
 from antenna_drive.machines.antenna import gust
@@ -34,7 +34,6 @@ from antenna_drive.machines.antenna.advice import ADVICE
 from antenna_drive.machines.antenna.catalogue import catalogue, EXTRA_MODE
 from antenna_drive.machines.antenna.diagram import DIAGRAM
 from antenna_drive.machines.antenna.disturbances import DISTURBANCES, DriveDisturbance
-from antenna_drive.machines.antenna.drive_limits import DriveLimits
 from antenna_drive.machines.antenna.excitation import (
     Bias, Longest, RecordedCommand, schedule, with_bias, with_torque,
 )
@@ -263,13 +262,6 @@ class AntennaMachine(Machine):
         if isinstance(form, Wave):
             return self._wave_at(form, form.orders[min(11, len(form.orders) - 1)])
         return form
-
-    def test_space(self, duration_s: float) -> TestSpace:
-        """Return the tests that the drive may run within its usual limits."""
-        # it makes machines of its tests
-        from antenna_drive.machines.antenna.allowed_tests import AntennaTests
-        return AntennaTests(self._in_common, self._drive, DriveLimits.of_drive(self._drive),
-                            duration_s)
 
     def form_named(self, effect: Effect, name: str) -> Form:
         """Return the form of an effect by its name; that of a wave says its order."""

@@ -22,7 +22,7 @@ import traceback
 
 from antenna_drive.diagnosis import (
     Course, Diagram, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Motion,
-    Parameter, Point, Regimes, TestSpace, TimeScales,
+    Parameter, Point, Regimes, TimeScales,
 )
 from antenna_drive.errors import UserError
 from antenna_drive.machines.own.declaration import Model, ModelError, Number, OwnEffect, Reading
@@ -215,19 +215,6 @@ class OwnMachine(Machine):
         return TimeScales(start_s=settles, scan_s=min(longest, max(20.0 * settles,
                                                                    0.27 * longest)),
                           pulse_s=0.1 * settles, response_s=settles, block_s=settles)
-
-    def test_space(self, duration_s: float) -> TestSpace:
-        """
-        Return the tests that the model declares.
-
-        Raises
-        ------
-        ModelError : it declares none
-
-        """
-        # it makes machines of its tests
-        from antenna_drive.machines.own.allowed_tests import own_tests
-        return own_tests(self.model, duration_s)
 
     def form_named(self, effect: Effect, name: str) -> Form:
         """Return the form of an effect by its name; that of a ripple says its order."""
