@@ -124,7 +124,7 @@ machine = own_machine(
         effect('guide.tight_end', cause='the guide is tighter at one end',
                friction_slope=size(-8.0, 8.0, '1/m')),
         effect('guide.presliding', cause='friction builds up over a distance after a reversal',
-               presliding=size(0.0, 6e-4, 'm', step=1e-6)),
+               presliding=size(0.0, 6e-4, 'm', tolerance=3e-6, step=1e-6)),
         effect('cable.spring', cause='a cable pulls to the middle',
                spring=size(-600.0, 600.0, 'N/m')),
         ripple('screw.ripple', 'ripple', size(-50.0, 50.0, 'N'), 'screw_rad',
