@@ -212,7 +212,7 @@ class ByLabel(Machine):
         """Return how fast the machine is."""
         return self.inner.time_scales
 
-    def initial_conditions(self, experiment: int) -> Sequence[Point]:
+    def initial_conditions(self, experiment: int) -> Sequence[Sequence[Point]]:
         """Return initial conditions that are tried out before a fit."""
         return self.inner.initial_conditions(experiment)
 

@@ -483,8 +483,7 @@ def with_initial_conditions(problem: LeastSquares, point: dict[str, float]) -> d
     """Return a point with the initial conditions that fit the first moments best."""
     until = problem.machine.time_scales.start_s
     for k in range(len(problem.experiments)):
-        trials = problem.machine.initial_conditions(k)
-        if trials:
+        for trials in problem.machine.initial_conditions(k):
             _, point = least_cost(
                 problem, [point, *({**point, **trial} for trial in trials)], k, until)
     return point

@@ -418,11 +418,13 @@ class Machine(ABC):
         """
         return self
 
-    def initial_conditions(self, experiment: int) -> Sequence[Point]:
+    def initial_conditions(self, experiment: int) -> Sequence[Sequence[Point]]:
         """
         Return initial conditions that are tried out before a fit, for one experiment.
 
-        Gradients do not lead from one side of a gap to the other.
+        Gradients do not lead from one side of a gap to the other. Groups are tried one after the
+        other, each from the best of those before it: conditions that hardly depend on each other
+        need not be tried in all combinations.
         """
         return ()
 

@@ -276,7 +276,7 @@ class HeldOutSettings:
         8, '1', 'iterations of a fit to the training data, or to the withheld test, between two '
         'Jacobians')
     passes: int = _setting(
-        2, '1', 'greatest number of fresh Jacobians of a fit to the training data')
+        1, '1', 'greatest number of fresh Jacobians of a fit to the training data')
     no_gap: float = _setting(
         1e-3, '1', 'gap, as a share of the energy before, below which nothing is to be explained')
     resamples: int = _setting(400, '1', 'resamples of the block bootstrap')

@@ -87,7 +87,7 @@ class Part(Machine):
         return self if faster is self._machine else Part(
             faster, self.chosen, self.experiments, self._held)
 
-    def initial_conditions(self, experiment: int) -> Sequence[Point]:
+    def initial_conditions(self, experiment: int) -> Sequence[Sequence[Point]]:
         """Return initial conditions of one experiment that are tried out before a fit."""
         return self._machine.initial_conditions(self.chosen[experiment])
 

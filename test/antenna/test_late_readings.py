@@ -20,8 +20,8 @@ from dataclasses import replace
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.machines.antenna.excitation import RecordedCommand
 from antenna_drive.machines.antenna.field_test import ENCODER
-from antenna_drive.machines.antenna.late_readings import dense, PARTS, read_at
-from antenna_drive.machines.antenna.machine import AntennaMachine
+from antenna_drive.machines.antenna.late_readings import dense, parts_of, read_at
+from antenna_drive.machines.antenna.machine import AntennaMachine, LOW_FIDELITY_STEP
 from antenna_drive.parameters import load
 from antenna_drive.recording.recording import Channel, Recording
 import numpy as np
@@ -47,19 +47,28 @@ def test_between_outputs_it_is_the_cubic_of_values_and_slopes() -> None:
 def test_a_fast_signal_is_read_late_without_loss() -> None:
     """A tenth of a turn between two samples; the first order would be off by a fifth of it."""
     samples = np.arange(0.0, 1.0, 0.01)
-    time, omega, late = dense(samples), 2.0 * np.pi * 10.0, 0.007
+    time, omega, late = dense(samples, parts_of(0.01)), 2.0 * np.pi * 10.0, 0.007
     out = np.stack([np.sin(omega * time), omega * np.cos(omega * time)], axis=-1)[:, np.newaxis]
     found = read_at(time, out, samples, np.array([late]))[2:, 0]
     exact = np.sin(omega * (samples - late))[2:]
     first_order = (np.sin(omega * samples) - late * omega * np.cos(omega * samples))[2:]
-    np.testing.assert_allclose(found, exact, atol=1e-5)
+    # the error of a cubic with right values and slopes at both ends
+    bound = (omega * (time[1] - time[0])) ** 4 / 384.0
+    np.testing.assert_allclose(found, exact, rtol=0.0, atol=bound)
+    assert bound < 5e-5
     assert np.abs(first_order - exact).max() > 0.05
 
 
 def test_dense_times_hold_the_samples() -> None:
     time = np.array([0.0, 0.1, 0.4])
-    assert (dense(time)[::PARTS] == time).all()
-    assert np.diff(dense(time)) == pytest.approx([0.1 / 3.0] * 3 + [0.1] * 3)
+    assert (dense(time, 3)[::3] == time).all()
+    assert np.diff(dense(time, 3)) == pytest.approx([0.1 / 3.0] * 3 + [0.1] * 3)
+
+
+@pytest.mark.parametrize(('period', 'parts'), [(1e-3, 1), (5e-3, 1), (0.01, 2), (0.02, 4)])
+def test_no_two_outputs_are_further_apart_than_one_long_step(period: float, parts: int) -> None:
+    assert parts_of(period) == parts
+    assert period / parts < LOW_FIDELITY_STEP
 
 
 def stepping(jump_s: float) -> tuple[AntennaMachine, FloatArray]:

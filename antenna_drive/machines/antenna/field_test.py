@@ -30,7 +30,7 @@ from antenna_drive.machines.antenna.field_recording import (
     BIAS, CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldRecording, Note, TACH_1, TACH_2, UNITS,
 )
 from antenna_drive.machines.antenna.inference import completed
-from antenna_drive.machines.antenna.late_readings import dense
+from antenna_drive.machines.antenna.late_readings import dense, parts_of
 from antenna_drive.machines.antenna.samples import slips
 from antenna_drive.machines.antenna.sensors import jitter_of, SensorModel
 from antenna_drive.machines.antenna.sheet_settings import as_the_sheet_says
@@ -105,7 +105,12 @@ class FieldTest:
     @cached_property
     def output_times(self) -> FloatArray:
         """Return the times at which a run keeps its outputs: the samples and some between [s]."""
-        return dense(self.time)
+        return dense(self.time, self.parts)
+
+    @cached_property
+    def parts(self) -> int:
+        """Return into how many parts the outputs cut the time between two samples."""
+        return parts_of(float(np.median(np.diff(self.time))))
 
     def until(self, end: float) -> FieldTest:
         """Return the first part of the test, of this length [s]."""

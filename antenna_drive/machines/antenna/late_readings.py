@@ -21,18 +21,27 @@ slopes. To first order alone, a delay of 7 ms at 5 Hz is off by 2 percent of the
 
 from __future__ import annotations
 
+import math
+
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.physics.compiling import compiled
 import numpy as np
 
-PARTS = 3
+# Outputs are kept about so often [s]: in two of the longest steps of a whole run, or one of those
+# that a search takes.
+_SPACING_S = 5.3e-3
 
 
-def dense(time: FloatArray) -> FloatArray:
-    """Return times with others between them, shape (PARTS (n - 1) + 1,) [s]."""
-    places = np.arange(PARTS * (time.size - 1) + 1) / PARTS
+def parts_of(period: float) -> int:
+    """Return into how many parts the outputs cut the time between two samples."""
+    return max(math.ceil(period / _SPACING_S), 1)
+
+
+def dense(time: FloatArray, parts: int) -> FloatArray:
+    """Return times with others between them, shape (parts (n - 1) + 1,) [s]."""
+    places = np.arange(parts * (time.size - 1) + 1) / parts
     found = np.interp(places, np.arange(time.size), time)
-    found[::PARTS] = time
+    found[::parts] = time
     return found
 
 

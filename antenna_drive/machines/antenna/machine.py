@@ -40,7 +40,7 @@ from antenna_drive.machines.antenna.excitation import (
 from antenna_drive.machines.antenna.field_test import (
     CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, prepared, TACH_1, TACH_2, UNITS,
 )
-from antenna_drive.machines.antenna.late_readings import PARTS, read_at
+from antenna_drive.machines.antenna.late_readings import read_at
 from antenna_drive.machines.antenna.modifiers import (
     ADD, AntennaParameter, change, Modifier, ReadingModifier, RunModifier, RunSetup,
     SensorReadings,
@@ -170,7 +170,7 @@ class AntennaMachine(Machine):
         """Return the tests, with the noise of readings that move as at a point."""
         found = []
         for k, test in enumerate(self._tests):
-            out = self._run(self._job(k, point, math.inf))[::PARTS]
+            out = self._run(self._job(k, point, math.inf))[::test.parts]
             # the machine may move faster than the model without effects: the readings tell
             slope = np.fmax(np.abs(out[:, :, 1]), np.abs(test.slope))
             noise = test.sensors.noise(out[:, :, 0], slope, test.jitter)
@@ -237,11 +237,11 @@ class AntennaMachine(Machine):
                       load=signal(CURRENT_1) + signal(CURRENT_2), angle=signal(ENCODER),
                       load_limit=2.0 * limit)
 
-    def initial_conditions(self, experiment: int) -> Sequence[Point]:
-        """Return starting places of both motors inside their gaps."""
+    def initial_conditions(self, experiment: int) -> Sequence[Sequence[Point]]:
+        """Return starting places of each motor inside its gap, and of the first one again."""
         first, second = (item.name for item in starting_places(
             experiment, self._tests[experiment]))
-        return [{first: float(a), second: float(b)} for a in _STARTS for b in _STARTS]
+        return [[{name: place} for place in _STARTS.tolist()] for name in (first, second, first)]
 
     # -- effects -------------------------------------------------------------------------------
 
