@@ -36,7 +36,7 @@ from antenna_drive.diagnosis.elimination import (
 from antenna_drive.diagnosis.evidence import Evidence
 from antenna_drive.diagnosis.held_out import held_out, refuted
 from antenna_drive.diagnosis.hypothesis import Hypothesis
-from antenna_drive.diagnosis.intervals import inflation, values_with_intervals
+from antenna_drive.diagnosis.intervals import inflation, jackknife, values_with_intervals
 from antenna_drive.diagnosis.interventions import (
     interventions, lines as lines_of_labels, simplified,
 )
@@ -210,6 +210,7 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         reach = held_out(problem, none, best, threads)
     inflated = dict(zip((p.name for p in best.state.parameters),
                         inflation(problem, best.state).tolist(), strict=True))
+    deviations = _deviations(reach)
     evidence = _evidence(problem, hypotheses, best, reach['explained_fraction']['ci95'][1],
                          fmean([inflated[p.name] for p, _ in best.values] or [1.0]))
     decision = evidence.decide(settings)
@@ -226,7 +227,8 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         'statements': verdict.statements(decision, best),
         'where': list(located),
         'which': verdict.which(decision, settings.verdict, lambda answer: values_with_intervals(
-            answer, lambda name: inflated.get(name, evidence.inflation), settings.interval)),
+            answer, lambda name: inflated.get(name, evidence.inflation), settings.interval,
+            deviations if answer.effects == best.effects else {})),
         'also_seen': verdict.also_seen(hypotheses, settings, evidence.inflation),
         'confusable': decision.confusable,
         'how_far': reach,
@@ -246,6 +248,15 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         result['labels'] = labels
     progress(1.0, 'done')
     return Diagnosis(result, problem.machine, none, best)
+
+
+def _deviations(reach: Mapping[str, Any]) -> dict[str, float]:
+    """Return how much the effects' numbers depend on the tests, by name."""
+    values: dict[str, list[float]] = {}
+    for fold in reach['folds']:
+        for name, value in fold['values'].items():
+            values.setdefault(name, []).append(value)
+    return {name: jackknife(found) for name, found in values.items()}
 
 
 def _evidence(problem: LeastSquares, hypotheses: Sequence[Hypothesis], best: Hypothesis,

@@ -63,6 +63,7 @@ class _Fold:
     judged : ids of these
     reasons : why the others cannot be judged, by id
     spread : change of `after` with each of the judged effects' numbers, shape (n c, m)
+    names : of these numbers
     values, low, high : of these numbers, and their bounds, shape (m,)
     covariance : of these numbers, shape (m, m)
 
@@ -77,6 +78,7 @@ class _Fold:
     judged: tuple[str, ...] = ()
     reasons: Mapping[str, str] = field(default_factory=dict)
     spread: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    names: tuple[str, ...] = ()
     values: FloatArray = field(default_factory=lambda: np.zeros(0))
     low: FloatArray = field(default_factory=lambda: np.zeros(0))
     high: FloatArray = field(default_factory=lambda: np.zeros(0))
@@ -124,6 +126,7 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads:
         'per_signal': _per_signal(problem, counted, known or not best.effects),
         'held_out': _HALVES if single else what,
         'folds': [{'withheld': fold.name, 'judged': list(fold.judged),
+                   'values': dict(zip(fold.names, fold.values.tolist(), strict=True)),
                    'cannot_be_judged': dict(fold.reasons)} for fold in folds],
         'training_began_at': [
             {'effect': effect, 'form': form.name, 'values': form.start}
@@ -353,7 +356,8 @@ class _Judge:
             fold, reasons=reasons,
             judged=tuple(e for e in self._best.effects if e not in reasons),
             spread=np.asarray(slope[:, [column[p.name] for p in judged]], np.float64),
-            values=found.x[places], low=np.array([p.low for p in judged]),
+            names=tuple(p.name for p in judged), values=found.x[places],
+            low=np.array([p.low for p in judged]),
             high=np.array([p.high for p in judged]), covariance=spread[np.ix_(places, places)])
 
     def _fitted(self, testing: Part, nuisances: Sequence[Parameter], held: Mapping[str, float],

@@ -19,6 +19,11 @@ one second. The scores of the likelihood are therefore summed over blocks of tim
 of these sums is compared with what independent noise would give (K.-Y. Liang, S. L. Zeger,
 Biometrika 73, 1986).
 
+Where the law of an effect is another one, each test asks for another value, however little noise
+there is. The jackknife over the tests sees that: the effect was fitted without each test in turn
+to judge it there (J. W. Tukey, Annals of Mathematical Statistics 29, 1958, 614). An interval is as
+wide as the wider of the two says.
+
 Difference quotients of a drive that sticks and slips are right to a tenth. A Hessian of them knows
 nothing of directions in which two columns differ by less. There the priors alone count: without
 that, a change of a number and the tolerance of the same number would be told apart by the error of
@@ -27,8 +32,9 @@ a difference quotient.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 import math
+from types import MappingProxyType
 from typing import Any
 
 from antenna_drive.diagnosis.hypothesis import Hypothesis
@@ -127,8 +133,24 @@ def _known(state: FitState, settings: IntervalSettings) -> FloatArray:
     return np.asarray(np.outer(scale, scale) * ((vectors * sure) @ vectors.T))
 
 
+def jackknife(values: Sequence[float]) -> float:
+    """
+    Return the standard deviation of an estimate, 0 from less than two values.
+
+    Parameters
+    ----------
+    values
+        of the estimate without each test in turn
+
+    """
+    count = len(values)
+    return math.sqrt((count - 1) * float(np.var(values))) if count > 1 else 0.0
+
+
 def values_with_intervals(hypothesis: Hypothesis, inflated: Callable[[str], float],
-                          settings: IntervalSettings) -> dict[str, Any]:
+                          settings: IntervalSettings,
+                          deviations: Mapping[str, float] = MappingProxyType({}),
+                          ) -> dict[str, Any]:
     """
     Return the values of a hypothesis' effects with 95 percent intervals, for the JSON.
 
@@ -140,6 +162,8 @@ def values_with_intervals(hypothesis: Hypothesis, inflated: Callable[[str], floa
         returns the variance of a parameter over that with independent noise
     settings
         thresholds
+    deviations
+        by the jackknife, of some of the values by name
 
     """
     state = hypothesis.state
@@ -149,9 +173,9 @@ def values_with_intervals(hypothesis: Hypothesis, inflated: Callable[[str], floa
     for parameter, value in hypothesis.values:
         place = names.index(parameter.name)
         variance = _covariance(state, known / inflated(parameter.name))[place, place]
+        deviation = max(float(variance) ** 0.5, deviations.get(parameter.name, 0.0))
         half_width = TWO_SIDED_95 * math.hypot(
-            float(variance) ** 0.5, same_number(parameter, value),
-            settings.model_error * value)
+            deviation, same_number(parameter, value), settings.model_error * value)
         found[parameter.name] = {
             'value': value, 'ci95': [max(value - half_width, parameter.low),
                                      min(value + half_width, parameter.high)],

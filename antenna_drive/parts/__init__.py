@@ -38,10 +38,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from antenna_drive.parts import coupling, friction, loop, sensor, shaping
-from antenna_drive.parts.ripple import wave
+from antenna_drive.parts.ripple import harmonics, wave
 from antenna_drive.physics.compiling import compiled_with, inner
 
-__all__ = ['compiled', 'coupling', 'friction', 'inner', 'loop', 'sensor', 'shaping', 'wave']
+__all__ = ['compiled', 'coupling', 'friction', 'harmonics', 'inner', 'loop', 'sensor', 'shaping',
+           'wave']
 
 _PARTS = Path(__file__).resolve().parent
 _Function = TypeVar('_Function', bound=Callable[..., Any])

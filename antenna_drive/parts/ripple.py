@@ -38,3 +38,24 @@ def wave(angle: float, order: float, cosine: float, sine: float) -> float:
     if cosine == 0.0 and sine == 0.0:
         return 0.0
     return cosine * math.cos(order * angle) + sine * math.sin(order * angle)
+
+
+@inner
+def harmonics(angle: float, order: float, amplitudes: tuple[float, ...]) -> float:
+    """
+    Return a wave with harmonics, in the unit of its amplitudes.
+
+    Parameters
+    ----------
+    angle
+        that it follows [rad]
+    order
+        of the fundamental, cycles per revolution
+    amplitudes
+        cosine and sine part of the fundamental, of the second harmonic, and so on
+
+    """
+    total = 0.0
+    for k in range(len(amplitudes) // 2):
+        total += wave(angle, (k + 1.0) * order, amplitudes[2 * k], amplitudes[2 * k + 1])
+    return total

@@ -20,7 +20,9 @@ from types import SimpleNamespace
 from typing import Any
 
 from antenna_drive.diagnosis import Form, Hypothesis, Parameter
-from antenna_drive.diagnosis.intervals import covariance, inflation, values_with_intervals
+from antenna_drive.diagnosis.intervals import (
+    covariance, inflation, jackknife, values_with_intervals,
+)
 from antenna_drive.diagnosis.least_squares import FitState
 from antenna_drive.diagnosis.settings import DEFAULT
 import numpy as np
@@ -111,6 +113,23 @@ def test_no_value_is_surer_than_the_model() -> None:
                         state([1e6 * random.normal(size=4000)], (CHANGE,)))
     low, high = values_with_intervals(fitted, lambda name: 1.0, SETTINGS)[CHANGE.name]['ci95']
     assert high - low == pytest.approx(2.0 * 1.96 * SETTINGS.model_error * 0.01, rel=0.01)
+
+
+def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:
+    """The closed form that it was made for."""
+    values = np.random.default_rng(5).normal(size=7)
+    without = [float(np.delete(values, k).mean()) for k in range(7)]
+    assert jackknife(without) == pytest.approx(values.std(ddof=1) / 7.0 ** 0.5, rel=1e-12)
+    assert jackknife(without[:1]) == jackknife([]) == 0.0
+
+
+def test_an_interval_is_as_wide_as_the_values_of_the_tests_differ() -> None:
+    random = np.random.default_rng(2)
+    fitted = Hypothesis(('part.effect',), (Form('', (CHANGE,)),),
+                        state([1e6 * random.normal(size=4000)], (CHANGE,)))
+    low, high = values_with_intervals(fitted, lambda name: 1.0, SETTINGS,
+                                      {CHANGE.name: 0.2})[CHANGE.name]['ci95']
+    assert high - low == pytest.approx(2.0 * 1.96 * 0.2, rel=0.01)
 
 
 def test_what_the_data_do_not_tell_may_be_anything_within_its_bounds() -> None:

@@ -15,12 +15,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from antenna_drive.diagnosis.page import contents
 from antenna_drive.errors import UserError
-from antenna_drive.machines.own import diagnose_logs, OwnMachine, summary_of, unseen
+from antenna_drive.machines.own import (
+    diagnose_logs, OwnMachine, ripple, size, summary_of, unseen,
+)
 from antenna_drive.pages import render
 import numpy as np
-from own.swing import log_of, logs, NOISE, swing, TIME
+from own.swing import log_of, logs, NOISE, simulate, swing, TIME
 import pytest
 
 
@@ -51,6 +55,29 @@ def test_the_order_of_a_ripple_is_found() -> None:
     assert numbers['wave_order']['value'] == 17.0
     assert numbers['wave_sine']['value'] == pytest.approx(0.01, rel=0.05)
     assert 'wave_sine@17 = ' in found.summary()
+
+
+def test_the_second_harmonic_of_a_ripple_is_no_effect_of_its_own() -> None:
+    def with_harmonic(numbers: Any, test: Any) -> dict[str, Any]:
+        found, twice = simulate(numbers, test), 2.0 * numbers.wave_order * test['turn']
+        angle = found['angle'] + numbers.wave_cosine_2 * np.cos(twice)
+        angle = angle + numbers.wave_sine_2 * np.sin(twice)
+        return {'angle': angle, 'rate': np.gradient(angle, test.time)}
+
+    measured = logs({'wave_sine': 0.01, 'wave_order': 9.0})
+    for log in measured:
+        more = 0.004 * np.cos(18.0 * log['turn'])
+        log.columns['angle'][:] += more
+        log.columns['rate'][:] += np.gradient(more, log.time)
+    model = swing(simulate=with_harmonic, effects=[
+        *swing().effects[:2],
+        ripple('sensor.wave', 'wave', size(-0.1, 0.1, 'rad'), 'turn', harmonics=2)])
+    found = diagnose_logs(model, measured)
+    assert found.result['which'][0]['effects'] == ['sensor.wave']
+    numbers = found.result['numbers']
+    assert numbers['wave_order']['value'] == 9.0
+    assert numbers['wave_sine']['value'] == pytest.approx(0.01, rel=0.05)
+    assert numbers['wave_cosine_2']['value'] == pytest.approx(0.004, rel=0.1)
 
 
 def test_what_pushes_is_told_with_its_place_its_times_and_its_size() -> None:

@@ -20,7 +20,7 @@ from pathlib import Path
 import subprocess
 import sys
 
-from antenna_drive.parts import compiled, coupling, loop, sensor, shaping, wave
+from antenna_drive.parts import compiled, coupling, harmonics, loop, sensor, shaping, wave
 from antenna_drive.parts.loop import Cascade
 import numpy as np
 from numpy.typing import NDArray
@@ -192,6 +192,17 @@ def test_a_wave_has_its_amplitudes_and_its_order() -> None:
     spectrum = np.fft.rfft(values) / 2048
     assert spectrum[6] == pytest.approx(0.3 - 0.4j)
     assert np.abs(np.delete(spectrum, 6)).max() < 1e-12
+
+
+def test_harmonics_have_their_amplitudes_at_multiples_of_the_order() -> None:
+    @compiled
+    def of(angle: float) -> float:
+        return harmonics(angle, 4.0, (0.3, 0.4, -0.1, 0.0, 0.0, 0.2))
+
+    angles = np.linspace(0.0, 2.0 * np.pi, 4097)[:-1]
+    spectrum = np.fft.rfft([of(angle) for angle in angles]) / 2048
+    assert spectrum[[4, 8, 12]] == pytest.approx([0.3 - 0.4j, -0.1, -0.2j])
+    assert np.abs(np.delete(spectrum, [4, 8, 12])).max() < 1e-12
 
 
 LOOP = Cascade(position_gain=20.0, rate_limit=3.0, velocity_gain=20.0, velocity_time=0.5,

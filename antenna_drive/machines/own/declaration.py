@@ -239,10 +239,12 @@ class Ripple:
 
     Attributes
     ----------
-    stem : its numbers are stem_cosine, stem_sine and stem_order
-    amplitude : bounds of the two amplitudes
+    stem : its numbers are stem_cosine, stem_sine and stem_order, and of harmonic k stem_cosine_k
+        and stem_sine_k
+    amplitude : bounds of each amplitude
     angle : that it follows
     orders : cycles per revolution that are tried; empty to find them
+    harmonics : how many the wave has, its fundamental counted
 
     """
 
@@ -250,6 +252,18 @@ class Ripple:
     amplitude: Number
     angle: Angle
     orders: tuple[float, ...]
+    harmonics: int = 1
+
+    @property
+    def fundamental(self) -> tuple[str, str]:
+        """Return the names of the two amplitudes that vanish with the wave."""
+        return f'{self.stem}_cosine', f'{self.stem}_sine'
+
+    @property
+    def higher(self) -> tuple[str, ...]:
+        """Return the names of the amplitudes of its other harmonics."""
+        return tuple(f'{name}_{k}' for k in range(2, self.harmonics + 1)
+                     for name in self.fundamental)
 
 
 @dataclass(frozen=True)
@@ -315,11 +329,13 @@ def effect(name: str, *forms: OwnForm, cause: str = '', look: str = '',
 
 
 def ripple(name: str, stem: str, amplitude: Number, angle: str | Angle,
-           orders: Sequence[float] = (), *, cause: str = '', look: str = '') -> OwnEffect:
+           orders: Sequence[float] = (), *, harmonics: int = 1, cause: str = '', look: str = '',
+           ) -> OwnEffect:
     """
     Return a wave by an angle that the model may lack.
 
-    The simulation reads numbers.stem_cosine, stem_sine and stem_order, for `parts.wave`.
+    The simulation reads numbers.stem_cosine, stem_sine and stem_order, for `parts.wave`; of each
+    further harmonic k stem_cosine_k and stem_sine_k, for `parts.harmonics`.
 
     Parameters
     ----------
@@ -333,6 +349,8 @@ def ripple(name: str, stem: str, amplitude: Number, angle: str | Angle,
         name of a column of the logs in rad, or a function of a log that returns the angle [rad]
     orders
         cycles per revolution that are tried; empty to find them in what is left
+    harmonics
+        how many the wave has, its fundamental counted; waves of real machines are seldom pure
     cause, look
         as for `effect`
 
@@ -340,7 +358,7 @@ def ripple(name: str, stem: str, amplitude: Number, angle: str | Angle,
     column = angle
     follow = angle if callable(angle) else (lambda log: log[column])
     return OwnEffect(name, cause or name.partition('.')[2].replace('_', ' '), look,
-                     ripple=Ripple(stem, amplitude, follow, tuple(map(float, orders))))
+                     ripple=Ripple(stem, amplitude, follow, tuple(map(float, orders)), harmonics))
 
 
 @dataclass(frozen=True)
@@ -473,8 +491,11 @@ def _check_effect(item: OwnEffect, taken: dict[str, str]) -> None:
                          'effect')
     if item.ripple is not None:
         _check_size(f'{where}: amplitude', item.ripple.amplitude)
-        for part in ('cosine', 'sine', 'order'):
-            _take(taken, f'{item.ripple.stem}_{part}', where)
+        if not isinstance(item.ripple.harmonics, int) or item.ripple.harmonics < 1:
+            raise ModelError(f'{where}: harmonics: {item.ripple.harmonics!r} given, allowed is '
+                             'a whole number from 1')
+        for name in (*item.ripple.fundamental, *item.ripple.higher, f'{item.ripple.stem}_order'):
+            _take(taken, name, where)
     for one in item.forms:
         for name, number in one.numbers.items():
             _check_size(f'{where}: {name}', number)

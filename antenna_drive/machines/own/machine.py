@@ -16,6 +16,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 import math
 from threading import RLock
 import traceback
@@ -295,8 +296,7 @@ def _absent(effect: OwnEffect) -> Iterator[tuple[str, float]]:
     """Yield the numbers of an effect as they are without it."""
     if effect.ripple is not None:
         yield f'{effect.ripple.stem}_order', 1.0
-        yield f'{effect.ripple.stem}_cosine', 0.0
-        yield f'{effect.ripple.stem}_sine', 0.0
+        yield from dict.fromkeys((*effect.ripple.fundamental, *effect.ripple.higher), 0.0).items()
     for form in effect.forms:
         yield from ((name, item.value) for name, item in form.numbers.items())
 
@@ -317,11 +317,14 @@ def _parameter(name: str, item: Number) -> Parameter:
 
 
 def _ripple_form(item: OwnEffect, order: float) -> Form:
-    assert item.ripple is not None
+    wave = item.ripple
+    assert wave is not None
+    # higher harmonics mean nothing without the fundamental, as the shape of other effects
+    numbers = {**dict.fromkeys(wave.fundamental, wave.amplitude),
+               **dict.fromkeys(wave.higher, replace(wave.amplitude, is_shape=True))}
     return Form(f'{order:g}{_CYCLES}', tuple(
-        _parameter(f'{item.name}.{item.ripple.stem}_{part}{_ORDER_MARK}{order:g}',
-                   item.ripple.amplitude)
-        for part in ('cosine', 'sine')), scanned=True, is_wave=True)
+        _parameter(f'{item.name}.{name}{_ORDER_MARK}{order:g}', number)
+        for name, number in numbers.items()), scanned=True, is_wave=True)
 
 
 def _diagram(model: Model) -> Diagram:

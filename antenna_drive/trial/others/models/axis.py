@@ -19,13 +19,15 @@ from antenna_drive.machines.own import (
     effect, free, Log, machine as own_machine, Numbers, OneTest, push, reading, ripple, shape,
     size, within, without_gaps,
 )
-from antenna_drive.parts import compiled, friction, inner, loop, shaping, wave
+from antenna_drive.parts import compiled, friction, harmonics, inner, loop, shaping
 from antenna_drive.parts.friction import Friction
 from antenna_drive.parts.loop import Cascade
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+# Order, and the amplitudes of two harmonics.
+Wave = tuple[float, tuple[float, float, float, float]]
 
 TICK = 1e-3     # of the controller [s]
 PARTS = 2       # steps of the integration in a tick
@@ -42,8 +44,8 @@ def late(past: Array, k: int, ticks: float) -> float:
 @compiled
 def run(reference: Array, ticks: int, push: Array, cascade: Cascade, rubbing: Friction,
         mass: float, slope: float, distance: float, spring: float, constant: float, lag: float,
-        delay: float, ripple: tuple[float, float, float], cyclic: tuple[float, float, float],
-        flowing: float, x: float, bent: float, out: Array) -> None:
+        delay: float, ripple: Wave, cyclic: Wave, flowing: float, x: float, bent: float,
+        out: Array) -> None:
     """Write position [m] and current [A] at each tick into `out`."""
     v, before, integral = 0.0, x, 0.0
     past = np.full(out.shape[0], flowing)
@@ -53,7 +55,7 @@ def run(reference: Array, ticks: int, push: Array, cascade: Cascade, rubbing: Fr
         if k > 0:
             asked += (reference[row] - asked) * (k - row * ticks) / ticks
         angle = 2.0 * math.pi / LEAD * x
-        read = x + wave(angle, cyclic[0], cyclic[1], cyclic[2])
+        read = x + harmonics(angle, cyclic[0], cyclic[1])
         out[k, 0], out[k, 1] = read, flowing
         rate = (read - before) / TICK if k > 0 else 0.0
         before = read
@@ -65,7 +67,7 @@ def run(reference: Array, ticks: int, push: Array, cascade: Cascade, rubbing: Fr
             x += 0.5 * h * v
             angle = 2.0 * math.pi / LEAD * x
             driving = (constant * current + push[row] - spring * x
-                       + wave(angle, ripple[0], ripple[1], ripple[2]))
+                       + harmonics(angle, ripple[0], ripple[1]))
             moving = friction.direction(v, driving)
             share = max(1.0 + slope * x, 0.05)
             level = share * friction.level(rubbing, moving, 0.0, angle)
@@ -88,9 +90,9 @@ def simulate(n: Numbers, test: OneTest) -> dict[str, Array]:
                  stribeck=n.stribeck, stribeck_rate=n.stribeck_rate, stribeck_shape=1.0),
         n.mass * (1.0 + n.mass_change), n.friction_slope, n.presliding, n.spring,
         n.constant * (1.0 + n.constant_change), n.current_lag, n.delay,
-        (n.ripple_order, n.ripple_cosine, n.ripple_sine),
-        (n.cyclic_order, n.cyclic_cosine, n.cyclic_sine), -3000.0 * n.start,
-        reference[0] + n.start, -3000.0 * n.start * n.constant / n.coulomb, out)
+        (n.ripple_order, (n.ripple_cosine, n.ripple_sine, n.ripple_cosine_2, n.ripple_sine_2)),
+        (n.cyclic_order, (n.cyclic_cosine, n.cyclic_sine, n.cyclic_cosine_2, n.cyclic_sine_2)),
+        -3000.0 * n.start, reference[0] + n.start, -3000.0 * n.start * n.constant / n.coulomb, out)
     at = np.arange(time.size) * float(ticks)
     return {'position': np.interp(at - n.position_late * ticks, np.arange(len(out)), out[:, 0]),
             'current': np.interp(at - n.current_late * ticks, np.arange(len(out)), out[:, 1])}
@@ -128,7 +130,7 @@ machine = own_machine(
         effect('cable.spring', cause='a cable pulls to the middle',
                spring=size(-600.0, 600.0, 'N/m')),
         ripple('screw.ripple', 'ripple', size(-50.0, 50.0, 'N'), 'screw_rad',
-               orders=(1.0, 2.0), cause='a bent screw pushes by angle'),
+               orders=(1.0, 2.0), harmonics=2, cause='a bent screw pushes by angle'),
         effect('drive.force_constant', cause='the magnet is weaker',
                constant_change=size(-0.7, 0.5)),
         effect('drive.delay', cause='the bus takes time',
@@ -137,7 +139,7 @@ machine = own_machine(
                limit_change=size(-0.85, 0.5)),
         effect('carriage.mass', cause='a payload', mass_change=size(-0.5, 2.0)),
         ripple('scale.cyclic_error', 'cyclic', size(-2e-4, 2e-4, 'm'), 'screw_rad',
-               orders=(1.0, 2.0), cause='the encoder sits off the axis of the screw'),
+               orders=(1.0, 2.0), harmonics=2, cause='the encoder sits off the axis of the screw'),
     ],
     push={'carriage': push('carriage', 'force on the carriage', 'N', 5.0)},
     settles_s=0.3, judged_hz=100.0, blocks=('drive', 'screw', 'guide', 'carriage', 'scale'),

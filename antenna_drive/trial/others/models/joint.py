@@ -19,13 +19,15 @@ from antenna_drive.machines.own import (
     effect, form, free, machine as own_machine, Numbers, OneTest, push, reading, ripple,
     shape, size, within, without_gaps,
 )
-from antenna_drive.parts import compiled, coupling, friction, inner, loop, shaping, wave
+from antenna_drive.parts import compiled, coupling, friction, harmonics, inner, loop, shaping, wave
 from antenna_drive.parts.friction import Friction
 from antenna_drive.parts.loop import Cascade
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+# Order, and the amplitudes of two harmonics.
+Wave = tuple[float, tuple[float, float, float, float]]
 
 TICK = 1e-3     # of the controller [s]
 PARTS = 2       # steps of the integration in a tick
@@ -43,8 +45,8 @@ def late(past: Array, k: int, ticks: float) -> float:
 def run(reference: Array, ticks: int, push: Array, cascade: Cascade, rubbing: Friction,
         bodies: tuple[float, float, float], shaft: tuple[float, float, float],
         hung: tuple[float, float], constant: float, lag: float, delay: float,
-        ripple: tuple[float, float, float], weight: tuple[float, float],
-        cyclic: tuple[float, float, float], integral: float, q: float, out: Array) -> None:
+        ripple: Wave, weight: tuple[float, float], cyclic: Wave, integral: float, q: float,
+        out: Array) -> None:
     """Write motor angle [rad] and current [A] at each tick into `out`."""
     motor, load, third = bodies
     stiffness, damping, half_gap = shaft
@@ -57,7 +59,7 @@ def run(reference: Array, ticks: int, push: Array, cascade: Cascade, rubbing: Fr
         asked = reference[max(row - 1, 0)]
         if k > 0:
             asked += (reference[row] - asked) * (k - row * ticks) / ticks
-        read = q + wave(q, cyclic[0], cyclic[1], cyclic[2]) - cyclic[1]
+        read = q + harmonics(q, cyclic[0], cyclic[1]) - cyclic[1][0] - cyclic[1][2]
         out[k, 0], out[k, 1] = read, flowing
         rate = (read - before) / TICK if k > 0 else 0.0
         before = read
@@ -69,7 +71,7 @@ def run(reference: Array, ticks: int, push: Array, cascade: Cascade, rubbing: Fr
             q, ql, qh = q + 0.5 * h * w, ql + 0.5 * h * wl, qh + 0.5 * h * wh
             twisting = coupling.tooth_torque(q - ql, w - wl, half_gap, stiffness, damping)
             holding = hung[0] * (ql - qh) + hung[1] * (wl - wh)
-            driving = constant * current + wave(q, ripple[0], ripple[1], ripple[2]) - twisting
+            driving = constant * current + harmonics(q, ripple[0], ripple[1]) - twisting
             moving = friction.direction(w, driving)
             w = friction.rate_after(h, w, driving, friction.level(rubbing, moving, 0.0, q),
                                     friction.drag(rubbing, moving), motor)
@@ -95,8 +97,10 @@ def simulate(n: Numbers, test: OneTest) -> dict[str, Array]:
         (n.stiffness / (1.0 + n.softness), n.damping, n.half_gap),
         (third * turn ** 2, 2.0 * n.hung_damping * third * turn),
         n.constant * (1.0 + n.constant_change), n.current_lag, n.delay,
-        (n.ripple_order, n.ripple_cosine, n.ripple_sine), (n.weight_cosine, n.weight_sine),
-        (n.cyclic_order, n.cyclic_cosine, n.cyclic_sine), n.integral, reference[0] + n.start, out)
+        (n.ripple_order, (n.ripple_cosine, n.ripple_sine, n.ripple_cosine_2, n.ripple_sine_2)),
+        (n.weight_cosine, n.weight_sine),
+        (n.cyclic_order, (n.cyclic_cosine, n.cyclic_sine, n.cyclic_cosine_2, n.cyclic_sine_2)),
+        n.integral, reference[0] + n.start, out)
     at = np.arange(time.size) * float(ticks)
     return {'angle': np.interp(at - n.angle_late * ticks, np.arange(len(out)), out[:, 0]),
             'current': np.interp(at - n.current_late * ticks, np.arange(len(out)), out[:, 1])}
@@ -125,7 +129,7 @@ machine = own_machine(
         effect('motor.stribeck', cause='grease carries only in motion',
                stribeck=size(0.0, 0.15, 'N m'),
                stribeck_rate=shape(0.2, 20.0, 2.0, 'rad/s', step=0.05)),
-        ripple('motor.torque_ripple', 'ripple', size(-0.1, 0.1, 'N m'), 'motor_rad',
+        ripple('motor.torque_ripple', 'ripple', size(-0.1, 0.1, 'N m'), 'motor_rad', harmonics=2,
                cause='slots and commutation push by angle'),
         effect('motor.torque_constant', cause='the magnet is weaker',
                constant_change=size(-0.7, 0.5)),
@@ -142,7 +146,7 @@ machine = own_machine(
                  hung_damping=shape(0.002, 0.2, 0.03))
             for hz in (4.0, 8.0, 16.0)), cause='a part of the link swings on its own'),
         ripple('encoder.cyclic_error', 'cyclic', size(-0.2, 0.2, 'rad'), 'motor_rad',
-               orders=(1.0, 2.0), cause='the encoder sits off its axis'),
+               orders=(1.0, 2.0), harmonics=2, cause='the encoder sits off its axis'),
     ],
     push={'load': push('load', 'torque on the load', 'N m', 0.02)},
     settles_s=0.3, judged_hz=100.0, blocks=('controller', 'motor', 'gearbox', 'load', 'link'),
