@@ -15,17 +15,15 @@
 
 from __future__ import annotations
 
+from antenna_drive.diagnosis.cholesky import factored, solved
 from antenna_drive.diagnosis.machine import FloatArray
 import numpy as np
-from scipy import linalg
 
 # For this many iterations all wrongly active bounds are released at once; after that one by one,
 # because releasing all of them may cycle.
 _ALL_AT_ONCE = 12
 # A gradient below this, in the metric of the scaled Hessian, gains nothing.
 _LEVEL = 1e-6
-# Rounding errors of a Hessian summed in single precision, as shares of its diagonal.
-_ROUNDING = 1e-6
 
 
 def box_constrained_step(hessian: FloatArray, gradient: FloatArray, low: FloatArray,
@@ -56,8 +54,8 @@ def box_constrained_step(hessian: FloatArray, gradient: FloatArray, low: FloatAr
         index = np.flatnonzero(free)
         if index.size:
             rest = gradient - hessian @ np.where(free, 0.0, step)
-            step[index] = scale[index] * _solved(scaled[np.ix_(index, index)],
-                                                 (scale * rest)[index])
+            step[index] = scale[index] * solved(
+                factored(scaled[np.ix_(index, index)]), (scale * rest)[index])
         out = free & ((step < low) | (step > high))
         if out.any():
             np.clip(step, low, high, out=step)
@@ -74,18 +72,3 @@ def box_constrained_step(hessian: FloatArray, gradient: FloatArray, low: FloatAr
         else:
             free[np.argmax(np.where(wrong, steepness, -1.0))] = True
     return np.asarray(np.clip(step, low, high))
-
-
-def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    """
-    Solve for a symmetric matrix with a diagonal of ones, by its Cholesky factor.
-
-    A Hessian that was summed in single precision need not be positive definite. Along a direction
-    that is flat within its rounding nothing is known, and a ridge of that size goes nowhere there.
-    """
-    factor, failed = linalg.lapack.dpotrf(matrix, lower=1)
-    ridge = _ROUNDING
-    while failed:
-        factor, failed = linalg.lapack.dpotrf(matrix + ridge * np.eye(len(matrix)), lower=1)
-        ridge *= 10.0
-    return np.asarray(linalg.lapack.dpotrs(factor, right, lower=1)[0])

@@ -25,17 +25,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from antenna_drive.diagnosis.cholesky import factored, ROUNDING, solved
 from antenna_drive.diagnosis.least_squares import FitState, LeastSquares, proper_precision
 from antenna_drive.diagnosis.machine import FloatArray, Machine
 from antenna_drive.diagnosis.noise import with_model_error
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
 import numpy as np
-from scipy import linalg
 
 # share of a single-precision column's power that may be rounding
-_ROUNDING = 1e-6
-# relative precision of a product of such columns
-_SINGLE = 1e-6
+_POWER_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -121,10 +119,10 @@ def visibility(problem: LeastSquares, state: FitState,
 
     """
     machine, settings = problem.machine, problem.settings
+    jacobian = state.jacobian
     known = state.hessian + np.diag(proper_precision(state.parameters))
-    # the Hessian is of single precision: nearly parallel columns may leave it indefinite
     scale = np.sqrt(np.diag(known))
-    factor = linalg.cho_factor(known / np.outer(scale, scale) + _SINGLE * np.eye(scale.size))
+    factor = factored(known / np.outer(scale, scale), ROUNDING)
     ids, units, sizes, remainders = [], [], [], []
     price = settings.penalty.effect + settings.penalty.parameter
     for i, effect in enumerate(machine.effects.values()):
@@ -133,15 +131,15 @@ def visibility(problem: LeastSquares, state: FitState,
         first = form.parameters[0]
         column = problem.jacobian({**state.point(), **form.start}, [first], state.residual,
                                   central=False)[:, 0]
-        cross = state.jacobian.T @ column
-        imitated = linalg.cho_solve(factor, cross / scale) / scale
+        cross = jacobian.T @ column
+        imitated = solved(factor, cross / scale) / scale
         power = float(column @ column - cross @ imitated)
         ids.append(effect.id)
         units.append(first.unit)
         # an effect is named if it gains more than its price, and is larger than its tolerance
         sizes.append(max(np.sqrt(2.0 * price / power), first.tolerance)
-                     if power > _ROUNDING * float(column @ column) else np.inf)
-        remainders.append(column - state.jacobian @ imitated)
+                     if power > _POWER_ROUNDING * float(column @ column) else np.inf)
+        remainders.append(column - jacobian @ imitated)
     matrix = np.array(remainders)
     gram = matrix @ matrix.T
     size = np.sqrt(np.maximum(np.diag(gram), 1e-30))

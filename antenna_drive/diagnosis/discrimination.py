@@ -37,6 +37,7 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 
+from antenna_drive.diagnosis.cholesky import factored, ROUNDING, solved
 from antenna_drive.diagnosis.least_squares import LeastSquares, proper_precision
 from antenna_drive.diagnosis.machine import FloatArray, Machine, Parameter, Point
 from antenna_drive.diagnosis.noise import with_model_error
@@ -47,8 +48,6 @@ from scipy import linalg
 
 # A fit goes this many standard deviations away at most, and a difference quotient this far.
 _FAR, _STEP = 8.0, 0.3
-# Relative precision of a product of single-precision columns.
-_SINGLE = 1e-6
 # A rival as good as impossible is no less probable than this.
 _LEAST = 1e-12
 
@@ -196,7 +195,8 @@ def deviations(machine: Machine, rival: Rival, inflated: float,
     names = [p.name for p in numbers if p.name in rival.names]
     places = [j for j, p in enumerate(numbers) if p.name in rival.names]
     scale = np.sqrt(np.diag(known))
-    inverse = linalg.cho_solve(_factor(known, scale), np.eye(scale.size)) / np.outer(scale, scale)
+    unit = np.outer(scale, scale)
+    inverse = solved(factored(known / unit, ROUNDING), np.eye(scale.size)) / unit
     return (tuple(names), rival.covariance_of(names),
             np.asarray(inflated * inverse[np.ix_(places, places)]))
 
@@ -296,18 +296,12 @@ def _followed(problem: LeastSquares, rival: Rival, point: dict[str, float], off:
     known = (jacobian.T @ jacobian).astype(float) + precision
     scale = np.sqrt(np.diag(known))
     slopes = (off.astype(np.float32) @ jacobian).astype(float) / scale
-    steps = linalg.cho_solve(_factor(known, scale), slopes.T).T / scale
+    factor = factored(known / np.outer(scale, scale), ROUNDING)
+    steps = solved(factor, slopes.T).T / scale
     # what is left is summed up itself: a difference of two large sums of single precision says
     # nothing about a small one
     return (np.asarray(np.sum((steps @ precision) * steps, axis=1)),
             np.asarray(off - steps @ jacobian.T))
-
-
-def _factor(known: FloatArray, scale: FloatArray) -> tuple[FloatArray, bool]:
-    # products of single precision may leave nearly parallel columns indefinite
-    factor: tuple[FloatArray, bool] = linalg.cho_factor(
-        known / np.outer(scale, scale) + _SINGLE * np.eye(scale.size))
-    return factor
 
 
 def _precision(rival: Rival, numbers: Sequence[Parameter], inflated: float) -> FloatArray:

@@ -93,7 +93,7 @@ class Hypothesis:
 
     def with_jacobian(self, problem: LeastSquares) -> Hypothesis:
         """Return the hypothesis with a Jacobian, taken where its fit ended if it has none."""
-        if self.state.jacobian.size:
+        if self.state.base_jacobian.size:
             return self
         return replace(self, state=problem.start(self.state.parameters, self.state.point()))
 

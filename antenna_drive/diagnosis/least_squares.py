@@ -68,9 +68,9 @@ class FitState:
     broyden_directions: tuple[FloatArray, ...] = ()
     kept_hessian: FloatArray | None = None
 
-    @cached_property
+    @property
     def jacobian(self) -> Jacobian:
-        """Return the derivative of the prediction, shape (n, m)."""
+        """Return the derivative of the prediction, shape (n, m); not kept beside its base."""
         return _updated(self.base_jacobian, self.broyden_errors, self.broyden_directions)
 
     @cached_property
@@ -282,7 +282,7 @@ class LeastSquares:
 
     def local_steps(self, state: FitState) -> dict[str, float]:
         """Return steps of difference quotients that change the prediction by little, by name."""
-        if state.kept_hessian is None and not state.jacobian.size:
+        if state.kept_hessian is None and not state.base_jacobian.size:
             return {}
         options = self.settings.fit
         visible = np.sqrt(np.maximum(np.diag(state.hessian), 1e-30))

@@ -112,7 +112,8 @@ def screened(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity
     high = np.array([p.high for p in state.parameters]) - state.x
     prior = prior_precision(state.parameters)
     hessian = state.hessian + np.diag(prior)
-    gradient = transposed_product(state.jacobian, state.weight * state.residual) - prior * state.x
+    jacobian = state.jacobian
+    gradient = transposed_product(jacobian, state.weight * state.residual) - prior * state.x
     own_gain = _promised(hessian, gradient, low, high)
     found: dict[str, list[tuple[float, Sensitivity]]] = {}
     for item in known:
@@ -124,7 +125,7 @@ def screened(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity
         if any(p.name in names for p in form.parameters):
             continue  # another effect with the same numbers
         own = item.jacobian[:, [j for j, p in enumerate(form.parameters) if not p.is_shape]]
-        cross = weighted_product(state.jacobian, state.weight, own)
+        cross = weighted_product(jacobian, state.weight, own)
         full = np.block([[hessian, cross], [cross.T, weighted_product(own, state.weight)]])
         slope = np.r_[gradient, transposed_product(own, state.weight * state.residual)]
         gain = _promised(full, slope, np.r_[low, [p.low for p in form.sizes]],

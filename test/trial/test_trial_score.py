@@ -32,8 +32,10 @@ from antenna_drive.trial.scorecard import (
     auroc, calibration_error, Case, rate, read_cases, reliability, score,
 )
 from antenna_drive.trial.sheet import CaseSheet
-from antenna_drive.trial.sizes import size_of
-from antenna_drive.trial.verdict import parse_verdict, read_verdict, Verdict, VerdictError
+from antenna_drive.trial.sizes import size_of, StatedSize
+from antenna_drive.trial.verdict import (
+    Interval, parse_verdict, read_verdict, Verdict, VerdictError,
+)
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
@@ -182,6 +184,13 @@ def test_sizes_are_compared_in_the_verdicts_own_terms() -> None:
     assert figures['sizes_compared'] == 6
     assert figures['size_error_median'] == pytest.approx(0.15)
     assert figures['size_coverage'] == pytest.approx(4 / 6)
+
+
+@pytest.mark.parametrize(('short', 'covered'), [(1e-13, True), (1e-6, False)])
+def test_an_interval_that_ends_at_the_true_size_holds_it(short: float, covered: bool) -> None:
+    """As that of an encoder's digit, which its column shows to the last place."""
+    stated = Interval(1.35e-4, 5e-5, 1.4e-4 * (1.0 - short), 'rad')
+    assert StatedSize('encoder.quantisation', 1.4e-4, stated).covered == covered
 
 
 def test_size_of_an_effect_that_is_not_named_first_is_not_compared() -> None:

@@ -1,0 +1,51 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The Cholesky factor of a Hessian that was summed in single precision."""
+
+from __future__ import annotations
+
+from antenna_drive.diagnosis.machine import FloatArray
+import numpy as np
+from scipy import linalg
+
+# Rounding errors of such a Hessian, as shares of its diagonal.
+ROUNDING = 1e-6
+
+
+def factored(matrix: FloatArray, ridge: float = 0.0) -> FloatArray:
+    """
+    Return the lower Cholesky factor of a symmetric matrix with a diagonal of ones, shape (m, m).
+
+    A Hessian that was summed in single precision need not be positive definite. Along a direction
+    that is flat within its rounding nothing is known, and a ridge of that size goes nowhere there.
+
+    Parameters
+    ----------
+    matrix
+        shape (m, m)
+    ridge
+        added to the diagonal in any case; more is added as long as the matrix is not positive
+        definite
+
+    """
+    while True:
+        factor, failed = linalg.lapack.dpotrf(matrix + ridge * np.eye(len(matrix)), lower=1)
+        if not failed:
+            return np.asarray(factor)
+        ridge = max(10.0 * ridge, ROUNDING)
+
+
+def solved(factor: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve for a matrix by its factor; the right-hand side is of shape (m,) or (m, k)."""
+    return np.asarray(linalg.lapack.dpotrs(factor, right, lower=1)[0])
