@@ -295,8 +295,9 @@ class _Judge:
         cross = weighted_product(state.jacobian, state.weight, slope)
         follow = np.linalg.lstsq(state.hessian + np.diag(prior_precision(state.parameters)),
                                  cross, rcond=None)[0]
-        after = problem.residuals_of(state, 0)
-        fold = replace(fold, gap_after=_gap(testing, {**held, **state.point()}), after=after)
+        after, point = problem.residuals_of(state, 0), {**held, **state.point()}
+        fold = replace(fold, gap_after=_gap(testing, point), after=after,
+                       reasons={**reasons, **self._unseen(problem, point, reasons)})
         return self._with_spread(fold, judged, found, spread,
                                  slope - state.jacobian @ follow.astype(np.float32))
 
@@ -324,9 +325,27 @@ class _Judge:
                     if effect in reasons for p in form.sizes}
         point = {**found.point(), **dict.fromkeys(left_out, 0.0)}
         residual = own.residuals(point)
-        fold = replace(fold, gap_after=_gap(testing, point), after=_shaped(own, residual))
+        fold = replace(fold, gap_after=_gap(testing, point), after=_shaped(own, residual),
+                       reasons={**reasons, **self._unseen(own, point, reasons)})
         return self._with_spread(fold, judged, found, spread,
                                  own.jacobian(point, judged, residual, False))
+
+    def _unseen(self, problem: LeastSquares, point: dict[str, float],
+                reasons: Mapping[str, str]) -> dict[str, str]:
+        """
+        Return the reasons why effects cannot be judged that a withheld test does not show.
+
+        A limit that a test does not reach changes nothing there, whatever its derivative says.
+        """
+        residual = problem.residuals(point)
+        unseen = {}
+        for effect, form in zip(self._best.effects, self._best.forms, strict=True):
+            if effect not in reasons:
+                without = problem.residuals({**point, **{p.name: 0.0 for p in form.sizes}})
+                if 0.5 * float(np.sum(np.square(residual - without))) < (
+                        self._settings.penalty.parameter):
+                    unseen[effect] = 'the withheld data do not show it'
+        return unseen
 
     def _judged(self, reasons: Mapping[str, str]) -> list[Parameter]:
         """Return the numbers of the effects that can be judged."""
@@ -339,14 +358,9 @@ class _Judge:
 
     def _with_spread(self, fold: _Fold, judged: Sequence[Parameter], found: FitState,
                      spread: FloatArray, slope: Jacobian) -> _Fold:
-        """Return a fold with the uncertainty of the numbers, if the test shows their effects."""
-        reasons = dict(fold.reasons)
+        """Return a fold with the uncertainty of the numbers that can be judged."""
+        reasons = fold.reasons
         column = {p.name: j for j, p in enumerate(judged)}
-        for effect, form in zip(self._best.effects, self._best.forms, strict=True):
-            if effect not in reasons:
-                shown = sum(slope[:, column[p.name]] * found.value(p.name) for p in form.sizes)
-                if 0.5 * float(np.sum(np.square(shown))) < self._settings.penalty.parameter:
-                    reasons[effect] = 'the withheld data do not show it'
         judged = self._judged(reasons)
         if not judged:
             return replace(fold, gap_after=None, after=None, reasons=reasons)

@@ -134,6 +134,30 @@ def test_a_test_that_cannot_be_judged_does_not_count() -> None:
     assert found['before'] == pytest.approx(alone['before'], rel=1e-2)
 
 
+class Limited(Ramp):
+    """A ramp that goes no further than 12 (1 + size)."""
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return the ramp as far as the limit."""
+        return np.asarray(np.minimum(self._shown[experiment], 12.0 * (
+            1.0 + point.get(SIZE.name, 0.0))) + point.get('zero', 0.0))[:, None]
+
+
+def test_a_limit_that_a_test_hardly_reaches_is_not_judged_there() -> None:
+    """It ends 0.007 beyond the limit of 6; the derivative of its last samples is as of any."""
+    machine = Limited([1.0, 1.0, 1.0], shows=(1.0, 1.0, 0.3005))
+    random = np.random.default_rng(4)
+    limited = machine.with_experiments([replace(e, measured=machine.predict(
+        {SIZE.name: -0.5}, k) + 0.1 * random.normal(size=(TIME.size, 1)))
+        for k, e in enumerate(machine.experiments)])
+    found = judged(limited)
+    assert [fold['judged'] for fold in found['folds']] == [
+        ['spring.rate'], ['spring.rate'], []]
+    assert found['folds'][2]['cannot_be_judged'] == {
+        'spring.rate': 'the withheld data do not show it'}
+    assert found['explained_fraction']['value'] == pytest.approx(1.0, abs=1e-3)
+
+
 def test_numbers_of_one_test_alone_are_not_judged() -> None:
     own = [replace(SIZE, experiment=0)]
     fraction = judged(Ramp([0.5, 0.5]), parameters=own)['explained_fraction']
