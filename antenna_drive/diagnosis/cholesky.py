@@ -38,9 +38,15 @@ def factored(matrix: FloatArray, ridge: float = 0.0) -> FloatArray:
         added to the diagonal in any case; more is added as long as the matrix is not positive
         definite
 
+    Raises
+    ------
+    ValueError : the matrix has NaN or infinity, which no ridge would mend
+
     """
+    np.asarray_chkfinite(matrix)
     while True:
-        factor, failed = linalg.lapack.dpotrf(matrix + ridge * np.eye(len(matrix)), lower=1)
+        raised = matrix + ridge * np.eye(len(matrix)) if ridge else matrix
+        factor, failed = linalg.lapack.dpotrf(raised, lower=1)
         if not failed:
             return np.asarray(factor)
         ridge = max(10.0 * ridge, ROUNDING)

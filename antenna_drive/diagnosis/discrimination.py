@@ -298,8 +298,7 @@ def _followed(problem: LeastSquares, rival: Rival, point: dict[str, float], off:
     slopes = (off.astype(np.float32) @ jacobian).astype(float) / scale
     factor = factored(known / np.outer(scale, scale), ROUNDING)
     steps = solved(factor, slopes.T).T / scale
-    # what is left is summed up itself: a difference of two large sums of single precision says
-    # nothing about a small one
+    # summed directly: the difference of two large sums in single precision cannot resolve it
     return (np.asarray(np.sum((steps @ precision) * steps, axis=1)),
             np.asarray(off - steps @ jacobian.T))
 

@@ -291,15 +291,16 @@ class _Judge:
                                  self._with)
             state = min(state, again, key=lambda fit: fit.cost)
         # what a change of the effect leaves once the offsets have followed it
-        slope = self._with.for_part(testing, judged)
-        cross = weighted_product(state.jacobian, state.weight, slope)
+        slope, jacobian = self._with.for_part(testing, judged), state.jacobian
+        cross = weighted_product(jacobian, state.weight, slope)
         follow = np.linalg.lstsq(state.hessian + np.diag(prior_precision(state.parameters)),
                                  cross, rcond=None)[0]
         after, point = problem.residuals_of(state, 0), {**held, **state.point()}
+        unseen = self._unseen(problem, point, state.residual, reasons)
         fold = replace(fold, gap_after=_gap(testing, point), after=after,
-                       reasons={**reasons, **self._unseen(problem, point, reasons)})
+                       reasons={**reasons, **unseen})
         return self._with_spread(fold, judged, found, spread,
-                                 slope - state.jacobian @ follow.astype(np.float32))
+                                 slope - jacobian @ follow.astype(np.float32))
 
     def second_half(self, k: int) -> _Fold:
         """Judge on the second half of a test what the first half has taught."""
@@ -325,19 +326,20 @@ class _Judge:
                     if effect in reasons for p in form.sizes}
         point = {**found.point(), **dict.fromkeys(left_out, 0.0)}
         residual = own.residuals(point)
+        unseen = self._unseen(own, point, residual, reasons)
         fold = replace(fold, gap_after=_gap(testing, point), after=_shaped(own, residual),
-                       reasons={**reasons, **self._unseen(own, point, reasons)})
+                       reasons={**reasons, **unseen})
         return self._with_spread(fold, judged, found, spread,
                                  own.jacobian(point, judged, residual, False))
 
-    def _unseen(self, problem: LeastSquares, point: dict[str, float],
+    def _unseen(self, problem: LeastSquares, point: dict[str, float], residual: FloatArray,
                 reasons: Mapping[str, str]) -> dict[str, str]:
         """
         Return the reasons why effects cannot be judged that a withheld test does not show.
 
         A limit that a test does not reach changes nothing there, whatever its derivative says.
+        `residual` is that at the point.
         """
-        residual = problem.residuals(point)
         unseen = {}
         for effect, form in zip(self._best.effects, self._best.forms, strict=True):
             if effect not in reasons:
@@ -359,16 +361,14 @@ class _Judge:
     def _with_spread(self, fold: _Fold, judged: Sequence[Parameter], found: FitState,
                      spread: FloatArray, slope: Jacobian) -> _Fold:
         """Return a fold with the uncertainty of the numbers that can be judged."""
-        reasons = fold.reasons
         column = {p.name: j for j, p in enumerate(judged)}
-        judged = self._judged(reasons)
+        judged = self._judged(fold.reasons)
         if not judged:
-            return replace(fold, gap_after=None, after=None, reasons=reasons)
+            return replace(fold, gap_after=None, after=None)
         names = [p.name for p in found.parameters]
         places = [names.index(p.name) for p in judged]
         return replace(
-            fold, reasons=reasons,
-            judged=tuple(e for e in self._best.effects if e not in reasons),
+            fold, judged=tuple(e for e in self._best.effects if e not in fold.reasons),
             spread=np.asarray(slope[:, [column[p.name] for p in judged]], np.float64),
             names=tuple(p.name for p in judged), values=found.x[places],
             low=np.array([p.low for p in judged]),

@@ -21,8 +21,8 @@ Biometrika 73, 1986).
 
 Where the law of an effect is another one, each test asks for another value, however little noise
 there is. The jackknife over the tests sees that: the effect was fitted without each test in turn
-to judge it there (J. W. Tukey, Annals of Mathematical Statistics 29, 1958, 614). An interval is as
-wide as the wider of the two says.
+to judge it there (J. W. Tukey, Annals of Mathematical Statistics 29, 1958, 614). The larger of the
+two deviations sets the interval.
 
 Difference quotients of a drive that sticks and slips are right to a tenth. A Hessian of them knows
 nothing of directions in which two columns differ by less. There the priors alone count: without

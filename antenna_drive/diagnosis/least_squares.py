@@ -70,7 +70,7 @@ class FitState:
 
     @property
     def jacobian(self) -> Jacobian:
-        """Return the derivative of the prediction, shape (n, m); not kept beside its base."""
+        """Return the derivative of the prediction, shape (n, m); not kept, to save memory."""
         return _updated(self.base_jacobian, self.broyden_errors, self.broyden_directions)
 
     @cached_property
@@ -351,7 +351,7 @@ class LeastSquares:
             else:
                 damping = min(max(damping, options.damping_after_failure) * options.damping_growth,
                               options.greatest_damping)
-        return FitState(state.parameters, x, residual, state.jacobian, weight, cost,
+        return FitState(state.parameters, x, residual, model.jacobian, weight, cost,
                         tuple(model.errors), tuple(model.directions))
 
     def weights(self, residual: FloatArray) -> FloatArray:

@@ -29,6 +29,12 @@ def test_of_a_positive_definite_matrix_it_is_the_usual_factor() -> None:
     assert solved(factor, right) == pytest.approx(np.linalg.solve(matrix, right), rel=1e-10)
 
 
+@pytest.mark.parametrize('wrong', [np.nan, np.inf])
+def test_what_is_no_number_is_refused_and_not_raised_for_ever(wrong: float) -> None:
+    with pytest.raises(ValueError, match='infs or NaNs'):
+        factored(np.array([[1.0, wrong], [wrong, 1.0]]))
+
+
 @pytest.mark.parametrize('ridge', [0.0, 1e-6])
 def test_a_direction_that_rounding_has_turned_down_is_not_gone_along(ridge: float) -> None:
     """Its eigenvalue is -1e-4 instead of 0: a step along it would be 1e4 long, and wrong."""

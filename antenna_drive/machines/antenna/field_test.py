@@ -110,7 +110,7 @@ class FieldTest:
     @cached_property
     def parts(self) -> int:
         """Return into how many parts the outputs cut the time between two samples."""
-        return parts_of(float(np.median(np.diff(self.time))))
+        return parts_of(float(np.median(np.diff(self.time))) if self.time.size > 1 else 0.0)
 
     def until(self, end: float) -> FieldTest:
         """Return the first part of the test, of this length [s]."""

@@ -27,8 +27,8 @@ from antenna_drive.diagnosis import FloatArray
 from antenna_drive.physics.compiling import compiled
 import numpy as np
 
-# Outputs are kept about so often [s]: in two of the longest steps of a whole run, or one of those
-# that a search takes.
+# Greatest time between two outputs [s]: two of the longest steps of a whole run, and less than one
+# of a search.
 _SPACING_S = 5.3e-3
 
 
