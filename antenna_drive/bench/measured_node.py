@@ -19,6 +19,7 @@ python -m antenna_drive.bench.measured_node UNIT FILE LAST --ros-args ...
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 import importlib
 import sys
 
@@ -43,11 +44,9 @@ def main() -> int:
             stamps.note(step)
             super()._publish(outputs)
 
-        def _make_exchange(self) -> Exchange | None:
-            exchange = super()._make_exchange()
-            if exchange is not None:
-                exchange.pauses = [WARM_STEPS, int(last)]
-            return exchange
+        def _pauses(self) -> Iterator[int]:
+            yield from super()._pauses()
+            yield from (WARM_STEPS, int(last))
 
         def _stamps(self) -> int:
             return int(last) + 1

@@ -43,7 +43,7 @@ class Stamps:
         self._path = Path(path)
         self._last = last
         self._times = np.zeros(last + 1, np.int64)
-        self._cpu_s = 0.0
+        self._cpu_s = math.nan  # until the warm-up is noted
         self.due_s = math.nan
 
     def note(self, step: int) -> None:

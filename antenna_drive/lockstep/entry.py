@@ -308,8 +308,8 @@ def choose_transport(environment: dict[str, str] | os._Environ[str]) -> None:
     Keep to this machine, with few acknowledgements, unless the user has said otherwise.
 
     Discovery: whoever wants other machines sets ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET, or any
-    other of ROS 2's own variables, and nothing is touched. Acknowledgements: config/fastdds.xml
-    says why; a profiles file of the user's own takes its place.
+    other of ROS 2's own variables, and nothing is touched. Acknowledgements and announcements:
+    config/fastdds.xml says why; a profiles file of the user's own takes its place.
     """
     if not any(name in environment for name in (
             'ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_LOCALHOST_ONLY', 'ROS_STATIC_PEERS')):

@@ -115,3 +115,19 @@ def test_discovery_and_transport_are_the_users_to_choose() -> None:
     assert environment.pop('ROS_AUTOMATIC_DISCOVERY_RANGE') == 'LOCALHOST'
     (profiles,) = environment.values()
     assert 'heartbeat_response_delay' in Path(profiles).read_text()
+
+
+def test_a_node_asks_nobody_for_types() -> None:
+    rclpy = pytest.importorskip('rclpy')
+    if rclpy.get_rmw_implementation_identifier() != 'rmw_fastrtps_cpp':
+        pytest.skip('the middleware is not Fast DDS')
+    program = ('import os\nfrom pathlib import Path\n'
+               'from antenna_drive.lockstep.entry import choose_transport\n'
+               'choose_transport(os.environ)\n'
+               'import rclpy\nrclpy.init()\nnode = rclpy.create_node("any")\n'
+               'print(*(p.read_text().strip() for p in Path("/proc/self/task").glob("*/comm")))')
+    done = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True,
+                          timeout=120.0)
+    threads = done.stdout.split()
+    assert any(name.startswith('dds.udp') for name in threads), done.stderr
+    assert not [name for name in threads if name.startswith('dds.tls')]

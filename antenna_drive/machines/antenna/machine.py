@@ -170,7 +170,7 @@ class AntennaMachine(Machine):
         """Return the tests, with the noise of readings that move as at a point."""
         found = []
         for k, test in enumerate(self._tests):
-            out = self._run(self._job(k, point, math.inf))[::test.parts]
+            out = self._run(self._job(k, self._acting(point), math.inf))[::test.parts]
             # the machine may move faster than the model without effects: the readings tell
             slope = np.fmax(np.abs(out[:, :, 1]), np.abs(test.slope))
             noise = test.sensors.noise(out[:, :, 0], slope, test.jitter)
@@ -323,28 +323,28 @@ class AntennaMachine(Machine):
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
                  until: float = math.inf) -> list[list[FloatArray | None]]:
         """Return the readings of several variants; see `Machine.simulate`."""
-        jobs: list[tuple[int, _Job, Point]] = []
-        known: dict[_Job, FloatArray] = {}
-        wanted: dict[_Job, None] = {}
-        for i, (point, one) in enumerate(zip(points, only or [None] * len(points), strict=True)):
-            for k in range(len(self._tests)) if one is None else (one,):
-                job = self._job(k, point, until)
-                # another thread may drop a run from the cache at any moment
-                out = self._runs.get(job)
-                if out is None:
-                    wanted[job] = None
-                else:
-                    known[job] = out
-                jobs.append((i, job, point))
-        fresh = dict(zip(wanted, self._executor.map(self._run, wanted), strict=True))
         results: list[list[FloatArray | None]] = [[None] * len(self._tests) for _ in points]
-        for i, job, point in jobs:
-            out = known[job] if job in known else fresh[job]
-            results[i][job.experiment] = self._read(job.experiment, out, point)
-        with self._lock:
-            self._runs.update(fresh)
-            while len(self._runs) > _KEPT_RUNS:
-                self._runs.popitem(last=False)
+        # what acts on readings alone shares a run
+        uses: dict[_Job, list[int]] = {}
+        for i, (point, one) in enumerate(zip(points, only or [None] * len(points), strict=True)):
+            items = self._acting(point)
+            for k in range(len(self._tests)) if one is None else (one,):
+                uses.setdefault(self._job(k, items, until), []).append(i)
+
+        def read(job: _Job) -> FloatArray | None:
+            """Read what needs a run, and return the run if it is a new one."""
+            known = self._runs.get(job)
+            out = self._run(job) if known is None else known
+            for i in uses[job]:
+                results[i][job.experiment] = self._read(job.experiment, out, points[i])
+            return out if known is None else None
+
+        for job, fresh in zip(uses, self._executor.map(read, uses), strict=True):
+            if fresh is not None:
+                with self._lock:
+                    self._runs[job] = fresh
+                    while len(self._runs) > _KEPT_RUNS:
+                        self._runs.popitem(last=False)
         return results
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
@@ -353,15 +353,21 @@ class AntennaMachine(Machine):
         assert isinstance(place, DriveDisturbance)
 
         def run(k: int) -> FloatArray:
-            return self._read(k, self._run(self._job(k, point, math.inf), (place, course)), point)
+            job = self._job(k, self._acting(point), math.inf)
+            return self._read(k, self._run(job, (place, course)), point)
 
         return list(self._executor.map(run, range(len(self._tests))))
 
-    def _job(self, k: int, point: Point, until: float) -> _Job:
-        """Return the run of one test at a point: what acts on readings alone is no part of it."""
-        return _Job(k, tuple(item for item in sorted(point.items())
-                             if not self._modifiers[item[0]].on_readings
-                             and self._modifiers[item[0]].experiment in (None, k)), until)
+    def _acting(self, point: Point) -> list[tuple[str, float, int | None]]:
+        """Return what acts on runs, and not on readings alone: name, value, and in which test."""
+        modifiers = self._modifiers
+        return [(name, value, modifiers[name].experiment) for name, value in sorted(point.items())
+                if not modifiers[name].on_readings]
+
+    def _job(self, k: int, items: Sequence[tuple[str, float, int | None]], until: float) -> _Job:
+        """Return the run of one test with what acts on runs."""
+        return _Job(k, tuple((name, value) for name, value, test in items if test in (None, k)),
+                    until)
 
     def outputs(self, point: Point, experiment: int,
                 channels: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
@@ -382,7 +388,7 @@ class AntennaMachine(Machine):
         times, shape (n,) [s], and values and slopes, shape (n, c, 2)
 
         """
-        job = self._job(experiment, point, math.inf)
+        job = self._job(experiment, self._acting(point), math.inf)
         return self._tests[experiment].output_times, self._run(job, channels=channels)
 
     def _run(self, job: _Job, disturbance: tuple[DriveDisturbance, Course] | None = None,
