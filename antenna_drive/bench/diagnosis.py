@@ -31,14 +31,15 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
 
     Returns
     -------
-    wall_s, peak_memory_MB and processor time over wall time
+    wall time, processor time and peak memory on two cores; two_core_speedup, the wall time on one
+    core over that on two
 
     Raises
     ------
     UserError : the command fails
 
     """
-    took = []
+    took: dict[int, list[tuple[float, float, float]]] = {1: [], 2: []}
     with tempfile.TemporaryDirectory() as folder:
         progress('recordings')
         measuring.process('antenna_drive', 'trial', '--cases', '1', '--seed', str(_SEED),
@@ -46,9 +47,13 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
         case = Path(folder, 'case_0001')
         recordings = [str(path) for path in sorted(case.glob('rec_*.csv'))]
         for turn in range(1 if quick else repetitions):
-            progress(f'turn {turn + 1}')
-            took.append(measuring.process('antenna_drive', 'diagnose', *recordings, '--json',
-                                          str(Path(folder, 'verdict.json'))))
-    return {'took_s': measuring.figure([item[0] for item in took], 's'),
-            'processor_s': measuring.figure([item[1] for item in took], 's'),
-            'peak_memory_MB': measuring.figure([item[2] for item in took], 'MB')}
+            for cores, found in took.items():
+                progress(f'turn {turn + 1}, {cores} of 2 cores')
+                found.append(measuring.process(
+                    'antenna_drive', 'diagnose', *recordings, '--jobs', str(cores),
+                    '--json', str(Path(folder, 'verdict.json'))))
+    wall_s, processor_s, memory_mb = zip(*took[2], strict=True)
+    return {'took_s': measuring.figure(wall_s, 's'),
+            'processor_s': measuring.figure(processor_s, 's'),
+            'peak_memory_MB': measuring.figure(memory_mb, 'MB'),
+            'two_core_speedup': measuring.ratio([item[0] for item in took[1]], wall_s)}

@@ -42,6 +42,7 @@ from typing import TYPE_CHECKING
 from antenna_drive.cli.output import add_json_option, check_options, give, Progress, replaced
 from antenna_drive.cli.reading import warnings_in_one_line
 from antenna_drive.errors import UserError
+from antenna_drive.large_arrays import give_back_large_arrays
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.import_map import import_file, load_map
@@ -81,6 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose, and write what was asked for; 0 whatever the verdict."""
     check_options(arguments, jobs=Entry('', 1, whole=True))
+    give_back_large_arrays()
     if arguments.model:
         return _own_machine(arguments)
     # the compiled physics takes a while to load: not before it is needed

@@ -188,10 +188,15 @@ class Search:
     def _take_sensitivities(self, state: FitState) -> None:
         self.sensitivities = sensitivities(self.problem, state, self._pool.map)
 
-    def _sorted(self, fitted: Callable[[Any], Hypothesis],
-                of: Iterable[Any]) -> list[Hypothesis]:
-        """Fit several hypotheses at once; return the best first."""
-        return sorted(self._pool.map(fitted, of), key=self._priced)
+    def _sorted(self, fitted: Callable[[Any], Hypothesis], of: Iterable[Any],
+                full: int | None = None) -> list[Hypothesis]:
+        """Fit several hypotheses at once; return the best first, `full` with their Jacobians."""
+        found: list[Hypothesis] = []
+        for hypothesis in self._pool.map(fitted, of):
+            found = sorted((*found, hypothesis), key=self._priced)
+            if full is not None:
+                found[full:] = [h.without_jacobian() for h in found[full:]]
+        return found
 
     def _priced(self, hypothesis: Hypothesis) -> float:
         return hypothesis.penalised(self.problem.settings.penalty)
@@ -203,11 +208,12 @@ class Search:
         self.progress(0.25, 'single effects')
         found = self._sorted(
             lambda entry: self._added(none, entry[1], entry[1].jacobian),
-            screened(self.problem, none.state, self.sensitivities)[:options.singles])
+            screened(self.problem, none.state, self.sensitivities)[:options.singles],
+            options.finalists)
         if self.problem.scale > 1.0:
             found += self._sorted(
                 lambda entry: self._added_at(none, *entry),
-                scan(self.problem, none.state, self.sensitivities))
+                scan(self.problem, none.state, self.sensitivities), options.finalists)
             found.sort(key=self._priced)
         self.progress(0.35, 'single effects')
         leading = self._sorted(lambda h: self._continued(h, options.iterations),
@@ -355,15 +361,15 @@ class Search:
                 (item, None) for gain, item in screened(
                     self.problem, base.state, self.sensitivities,
                     base.effects)[:options.partners] if gain > worth]
-            pairs = self._sorted(partial(self._partnered, best, base), partners)
+            pairs = self._sorted(partial(self._partnered, best, base), partners, 0)
             if self.problem.scale > 1.0 and base is best:
                 pairs += self._sorted(partial(self._partnered, best, base), scan(
-                    self.problem, base.state, self.sensitivities, base.effects))
-            pairs += self._split(base)
+                    self.problem, base.state, self.sensitivities, base.effects), 0)
+            pairs += [pair.without_jacobian() for pair in self._split(base)]
             for pair in pairs:
                 key = tuple(sorted(pair.effects))
                 if key not in found or self._priced(pair) < self._priced(found[key]):
-                    found[key] = pair.without_jacobian()
+                    found[key] = pair
         return sorted(found.values(), key=self._priced)
 
     def _improved(self, pairs: Sequence[Hypothesis]) -> list[Hypothesis]:

@@ -74,7 +74,7 @@ _STIFF = ('hysteresis', 'hysteresis_share')
 # Places inside the gap, as shares of half the gap, at which each motor may start.
 _STARTS = np.linspace(-0.95, 0.95, 13)
 # Runs that are kept, and tables of steps: a test has one for each bias voltage and each wave.
-_KEPT_RUNS = 60
+_KEPT_RUNS = 24
 _KEPT_PLANS = 24
 # By number: late jumps of the command [s], or other means in its holes [rad/s].
 _Numbered: TypeAlias = tuple[tuple[int, float], ...]
@@ -145,8 +145,9 @@ class AntennaMachine(Machine):
         self._tolerance_of = {(item.modifier.fields[0], item.modifier.how): item
                               for item in tolerances
                               if item.experiment is None and item.modifier.fields}
-        # parameters are looked up by name: a point is plain numbers
-        self._modifiers: dict[str, AntennaParameter] = {}
+        # a point is plain numbers: what they do, and in which test alone, is looked up by name
+        self._run_modifiers: dict[str, tuple[RunModifier, int | None]] = {}
+        self._reading_modifiers: dict[str, tuple[ReadingModifier, int | None]] = {}
         super().__init__((), tolerances, [
             _tolerated(effect, tolerances) for effect in effects.values()])
         for item in (*tolerances, *(p for effect in effects.values()
@@ -164,7 +165,11 @@ class AntennaMachine(Machine):
 
     def _register(self, item: Parameter) -> None:
         assert isinstance(item, AntennaParameter)
-        self._modifiers[item.name] = item
+        if isinstance(item.modifier, RunModifier):
+            self._run_modifiers[item.name] = item.modifier, item.experiment
+        else:
+            assert isinstance(item.modifier, ReadingModifier)
+            self._reading_modifiers[item.name] = item.modifier, item.experiment
 
     def _experiments(self, point: Point) -> tuple[Experiment, ...]:
         """Return the tests, with the noise of readings that move as at a point."""
@@ -288,7 +293,7 @@ class AntennaMachine(Machine):
         """Return the tolerances that take over what they can of an effect that is removed."""
         result = dict(point)
         for name, value in removed.items():
-            modifier = self._modifiers[name].modifier
+            modifier, _ = self._run_modifiers.get(name) or self._reading_modifiers[name]
             for path in modifier.fields:
                 tolerance = self._tolerance_of.get((path, modifier.how))
                 if tolerance is None or tolerance.name not in result:
@@ -360,9 +365,8 @@ class AntennaMachine(Machine):
 
     def _acting(self, point: Point) -> list[tuple[str, float, int | None]]:
         """Return what acts on runs, and not on readings alone: name, value, and in which test."""
-        modifiers = self._modifiers
-        return [(name, value, modifiers[name].experiment) for name, value in sorted(point.items())
-                if not modifiers[name].on_readings]
+        return [(name, value, self._run_modifiers[name][1])
+                for name, value in sorted(point.items()) if name not in self._reading_modifiers]
 
     def _job(self, k: int, items: Sequence[tuple[str, float, int | None]], until: float) -> _Job:
         """Return the run of one test with what acts on runs."""
@@ -397,9 +401,7 @@ class AntennaMachine(Machine):
         kind = test.record.dtype
         run = RunSetup(test.record.view(np.float64).copy(), kind, float(test.time[-1]), test.bias)
         for name, value in job.items:
-            modifier = self._modifiers[name].modifier
-            assert isinstance(modifier, RunModifier)
-            modifier.apply(run, value)
+            self._run_modifiers[name][0].apply(run, value)
         record = run.numbers.view(kind)
         run.write_waves()
         turns = fastest_wave(test.record)
@@ -459,10 +461,9 @@ class AntennaMachine(Machine):
         time = self._tests[k].time
         readings = SensorReadings()
         for name, value in point.items():
-            item = self._modifiers[name]
-            if item.on_readings and item.experiment in (None, k) and value:
-                assert isinstance(item.modifier, ReadingModifier)
-                item.modifier.apply_to_readings(readings, value)
+            modifier, test = self._reading_modifiers.get(name, (None, None))
+            if modifier is not None and test in (None, k) and value:
+                modifier.apply_to_readings(readings, value)
         digit = readings.digit
         wanted = time + readings.clock_rate * (time - time[0])
         for begin, end, late in readings.responses:
