@@ -39,10 +39,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from antenna_drive.cli.large_arrays import give_back_large_arrays
 from antenna_drive.cli.output import add_json_option, check_options, give, Progress, replaced
 from antenna_drive.cli.reading import warnings_in_one_line
 from antenna_drive.errors import UserError
-from antenna_drive.large_arrays import give_back_large_arrays
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.import_map import import_file, load_map

@@ -59,7 +59,6 @@ class Parameter:
     step : of the difference quotient, in the unit of the value
     prior_sigma : standard deviation of a Gaussian prior about zero; 0 for no prior
     experiment : index of the one experiment that it acts on; None for all
-    on_readings : True if it changes the readings alone, so that no new simulation is needed
     start : where a fit begins
     is_shape : True for a shape parameter, which has no meaning while its effect is absent
     tolerance : size up to which the model's number may be off without being wrong
@@ -76,7 +75,6 @@ class Parameter:
     step: float
     prior_sigma: float = 0.0
     experiment: int | None = None
-    on_readings: bool = False
     start: float = 0.0
     is_shape: bool = False
     tolerance: float = 0.0

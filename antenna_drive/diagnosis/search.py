@@ -27,6 +27,7 @@ The search for effects: from the nuisances alone over single effects to pairs.
 
 from __future__ import annotations
 
+from bisect import insort
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -190,10 +191,14 @@ class Search:
 
     def _sorted(self, fitted: Callable[[Any], Hypothesis], of: Iterable[Any],
                 full: int | None = None) -> list[Hypothesis]:
-        """Fit several hypotheses at once; return the best first, `full` with their Jacobians."""
+        """
+        Fit several hypotheses at once; return the best first.
+
+        Only the first `full` keep their Jacobians, which take most of the memory; None for all.
+        """
         found: list[Hypothesis] = []
         for hypothesis in self._pool.map(fitted, of):
-            found = sorted((*found, hypothesis), key=self._priced)
+            insort(found, hypothesis, key=self._priced)
             if full is not None:
                 found[full:] = [h.without_jacobian() for h in found[full:]]
         return found

@@ -25,7 +25,7 @@ import pytest
 # lies something small, so that its room cannot be given back when it goes.
 PROGRAM = """
 from pathlib import Path
-from antenna_drive.large_arrays import give_back_large_arrays
+from antenna_drive.cli.large_arrays import give_back_large_arrays
 import numpy as np
 
 def used_MB():

@@ -127,6 +127,7 @@ def test_the_keyboard_pauses_steps_and_goes_on(page: Page) -> None:
     page.until(f'{STATE} === "paused" && antennaDrive.run.at > {before} '
                f'&& antennaDrive.run.at === {step}')
     assert page.tell(step) == before + 7
+    assert page.tell(STATE) == 'paused'
     page.key(' ')
     page.until(f'{STATE} === "playing" && {step} > {before + 100}')
 

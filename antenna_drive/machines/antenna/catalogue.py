@@ -30,7 +30,7 @@ from antenna_drive.diagnosis import Effect, Form
 from antenna_drive.machines.antenna import gust
 from antenna_drive.machines.antenna.field_test import BIAS, CURRENT_1, ENCODER
 from antenna_drive.machines.antenna.modifiers import (
-    add, AntennaParameter, Digit, DigitTurn, Modifier, ReadingGain, ReadingModifier, ReadingZero,
+    add, AntennaParameter, Digit, DigitTurn, Modifier, ReadingGain, ReadingZero,
     scale, set_to,
 )
 from antenna_drive.machines.antenna.wave_shape import WaveShape
@@ -75,8 +75,7 @@ def _form(*parameters: AntennaParameter, name: str = '') -> Form:
 def _number(name: str, unit: str, low: float, high: float, step: float, modifier: Modifier,
             start: float = 0.0, healthy: float = 0.0) -> AntennaParameter:
     return AntennaParameter(name, unit, low, high, step, start=start, is_shape=start != 0.0,
-                            on_readings=isinstance(modifier, ReadingModifier), modifier=modifier,
-                            tolerance=healthy)
+                            modifier=modifier, tolerance=healthy)
 
 
 def _stribeck(unit_rates: Iterable[float], torque: tuple[float, float], rate: tuple[float, float],
@@ -318,8 +317,7 @@ def _quantisation(digit: float) -> Form:
     """
     if not digit:
         return _form(_number('step', 'rad', 0.0, 1e-2, 1e-5, Digit()))
-    turn = AntennaParameter('turn', '1', -1.0, 1.0, 0.02, on_readings=True, is_shape=True,
-                            modifier=DigitTurn())
+    turn = AntennaParameter('turn', '1', -1.0, 1.0, 0.02, is_shape=True, modifier=DigitTurn())
     return _form(_number('step', 'rad', 0.0, digit, digit, Digit()), turn, name='digits seen')
 
 

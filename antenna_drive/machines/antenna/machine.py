@@ -175,7 +175,7 @@ class AntennaMachine(Machine):
         """Return the tests, with the noise of readings that move as at a point."""
         found = []
         for k, test in enumerate(self._tests):
-            out = self._run(self._job(k, self._acting(point), math.inf))[::test.parts]
+            out = self._run(self._job(k, point, math.inf))[::test.parts]
             # the machine may move faster than the model without effects: the readings tell
             slope = np.fmax(np.abs(out[:, :, 1]), np.abs(test.slope))
             noise = test.sensors.noise(out[:, :, 0], slope, test.jitter)
@@ -332,9 +332,8 @@ class AntennaMachine(Machine):
         # what acts on readings alone shares a run
         uses: dict[_Job, list[int]] = {}
         for i, (point, one) in enumerate(zip(points, only or [None] * len(points), strict=True)):
-            items = self._acting(point)
             for k in range(len(self._tests)) if one is None else (one,):
-                uses.setdefault(self._job(k, items, until), []).append(i)
+                uses.setdefault(self._job(k, point, until), []).append(i)
 
         def read(job: _Job) -> FloatArray | None:
             """Read what needs a run, and return the run if it is a new one."""
@@ -358,20 +357,15 @@ class AntennaMachine(Machine):
         assert isinstance(place, DriveDisturbance)
 
         def run(k: int) -> FloatArray:
-            job = self._job(k, self._acting(point), math.inf)
-            return self._read(k, self._run(job, (place, course)), point)
+            return self._read(k, self._run(self._job(k, point, math.inf), (place, course)), point)
 
         return list(self._executor.map(run, range(len(self._tests))))
 
-    def _acting(self, point: Point) -> list[tuple[str, float, int | None]]:
-        """Return what acts on runs, and not on readings alone: name, value, and in which test."""
-        return [(name, value, self._run_modifiers[name][1])
-                for name, value in sorted(point.items()) if name not in self._reading_modifiers]
-
-    def _job(self, k: int, items: Sequence[tuple[str, float, int | None]], until: float) -> _Job:
-        """Return the run of one test with what acts on runs."""
-        return _Job(k, tuple((name, value) for name, value, test in items if test in (None, k)),
-                    until)
+    def _job(self, k: int, point: Point, until: float) -> _Job:
+        """Return the run of one test at a point: what acts on readings alone is no part of it."""
+        return _Job(k, tuple(item for item in sorted(point.items())
+                             if item[0] not in self._reading_modifiers
+                             and self._run_modifiers[item[0]][1] in (None, k)), until)
 
     def outputs(self, point: Point, experiment: int,
                 channels: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
@@ -392,7 +386,7 @@ class AntennaMachine(Machine):
         times, shape (n,) [s], and values and slopes, shape (n, c, 2)
 
         """
-        job = self._job(experiment, self._acting(point), math.inf)
+        job = self._job(experiment, point, math.inf)
         return self._tests[experiment].output_times, self._run(job, channels=channels)
 
     def _run(self, job: _Job, disturbance: tuple[DriveDisturbance, Course] | None = None,

@@ -26,7 +26,7 @@ from antenna_drive.machines.antenna.field_test import (
 )
 from antenna_drive.machines.antenna.modifiers import (
     add, AntennaParameter, ChannelDelay, ClockRate, ClockShift, JumpTime, Modifier, ReadingGain,
-    ReadingModifier, ReadingZero, scale, SupplyGain, UnrecordedJump, UnrecordedMean,
+    ReadingZero, scale, SupplyGain, UnrecordedJump, UnrecordedMean,
 )
 from antenna_drive.recording.sheet import Tolerances
 
@@ -86,7 +86,7 @@ def _within(name: str, unit: str, half_width: float, modifier: Modifier,
     """Return a number that is spread evenly within a tolerance."""
     return AntennaParameter(name, unit, -half_width, half_width, 0.3 * half_width,
                             half_width / math.sqrt(3.0), experiment=experiment,
-                            on_readings=isinstance(modifier, ReadingModifier), modifier=modifier)
+                            modifier=modifier)
 
 
 def _of_the_machine(test: FieldTest, tolerance: float) -> Iterator[AntennaParameter]:
@@ -149,7 +149,7 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
     if test.record['torque_share']['circuit']['bias_source'][0] == 1:
         yield _within(f'supply:{test.name}', '1', tolerance, SupplyGain(), k)
     yield AntennaParameter(f'clock:{test.name}', 's', -0.01, 0.01, 1e-4, 1e-3, experiment=k,
-                           on_readings=True, modifier=ClockShift())
+                           modifier=ClockShift())
 
     if isinstance(test.command, RecordedCommand):
         half = 0.5 * test.period
@@ -173,8 +173,7 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
     def zero(channel: int, name: str, unit: str, half_width: float, step: float,
              sigma: float) -> AntennaParameter:
         return AntennaParameter(f'zero:{name}:{test.name}', unit, -half_width, half_width, step,
-                                sigma, experiment=k, on_readings=True,
-                                modifier=ReadingZero(channel))
+                                sigma, experiment=k, modifier=ReadingZero(channel))
 
     # an encoder counts on from an angle that is not known where the start is not
     wide = 1.0 if test.known_start else 50.0

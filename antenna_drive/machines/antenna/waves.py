@@ -140,8 +140,7 @@ def wave(unit: str, limit: float, step: float, shape: WaveShape, orders: tuple[f
         bound, unit_, step_ = ((0.05, '1', 2e-4) if name == 'cycles_change' else
                                (limit, unit, step))
         return AntennaParameter(name, unit_, -bound, bound, step_,
-                                on_readings=on_readings, is_shape=index > 1,
-                                modifier=made(shape, index),
+                                is_shape=index > 1, modifier=made(shape, index),
                                 tolerance=healthy if index < 2 else 0.0)
 
     return Wave('', tuple(part(index) for index in range(len(_PARTS))), is_wave=True,

@@ -289,7 +289,7 @@ def _offset(name: str, item: Number, experiment: int | None, full: str = '') -> 
 
 
 def _error_of_reading(name: str, unit: str, by: float, experiment: int | None) -> Parameter:
-    return Parameter(name, unit, -by, by, 0.01 * by, 0.5 * by, experiment, on_readings=True)
+    return Parameter(name, unit, -by, by, 0.01 * by, 0.5 * by, experiment)
 
 
 def _absent(effect: OwnEffect) -> Iterator[tuple[str, float]]:

@@ -15,8 +15,8 @@
 Memory of large arrays, given back to the system as soon as they are gone.
 
 The C library of Linux (glibc) takes large arrays from the system one by one at first, and gives
-them back. Once some have come and gone it keeps their memory for later ones, and threads keep
-theirs apart. A diagnosis makes and drops Jacobians of 15 MB by the hundred, and a third of its
+them back. Once some have come and gone, it keeps their memory for later ones, for each thread
+separately. A diagnosis makes and drops Jacobians of 15 MB by the hundred, and a third of its
 memory was such leftovers.
 """
 
