@@ -405,9 +405,9 @@ class Conductor(Member):
         if known < LATEST_BIRTH:
             self._heard[peer] = max(self._heard[peer], known)
 
-    def _left(self, at: Mapping[str, int]) -> bool:
-        """Tell whether one of these is missed since: whoever goes on was spoken for."""
-        return any(peer in at and self.step - at[peer] <= DEPTH for peer in self.inbox.missing())
+    def _left(self, at: Mapping[str, int], peers: Collection[str]) -> bool:
+        """Tell whether one of the peers has gone since: whoever goes on was spoken for."""
+        return any(peer in at and self.step - at[peer] <= DEPTH for peer in peers)
 
     def unheard(self) -> tuple[str, ...]:
         """Return the members that have not been heard of yet."""
@@ -417,7 +417,10 @@ class Conductor(Member):
         """Return the members from whom a frame would be of use now."""
         if self.run == NO_RUN or self.ended:
             return self.peers
-        return self.missing()
+        missing = self.missing()
+        # one whose frame of this step is here may say hello: it was killed after it
+        return *missing, *(peer for peer in self.peers
+                           if peer not in missing and self.inbox.has_room(peer))
 
     def missing(self) -> tuple[str, ...]:
         """Return the members without whom the next step cannot be made."""
@@ -450,15 +453,21 @@ class Conductor(Member):
             wall time [us]; the run's id, unless somebody was born later by his own clock
         stands_still
             whether the run in progress has made no step for a while: only then is a member
-            that speaks of another run believed to be in it
+            that speaks of another run believed to be in it, and one that said hello believed
+            to be gone although its frame of this step is here
 
         Returns
         -------
         array of shape (len(outputs), 2), to be published as frame 0; None if no run is due
 
         """
-        if self.run != NO_RUN and not self.ended:
-            if self._left(self._hello_at) or stands_still and self._left(self._elsewhere_at):
+        missing = self.inbox.missing()
+        if missing and self.run != NO_RUN and not self.ended:
+            # The last frame of a killed member may have reached us and not those who now wait
+            # for it: then they are missing, and it is not.
+            gone = self.peers if stands_still else missing
+            if (self._left(self._hello_at, gone)
+                    or stands_still and self._left(self._elsewhere_at, missing)):
                 self._begin_again = True
         if not self._begin_again or self.unheard():
             return None
