@@ -36,6 +36,8 @@ from antenna_drive.recording.import_map import import_file, load_map
 from antenna_drive.recording.mcap_format import read_bag, write_bag
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import load_sheet, parse_sheet
+from antenna_drive.trial.scorecard import score
+from antenna_drive.trial.scored_cases import read_scored
 from antenna_drive.trial.sealing import read_manifest
 from antenna_drive.trial.verdict import read_verdict
 import numpy as np
@@ -66,6 +68,13 @@ VERDICT = {
     'confusable': [['tooth_wave', 'backlash']],
     'how_far': {'explained_fraction': {'value': 0.9, 'ci95': [0.0, 1.0]}}}
 MANIFEST = {'format': 1, 'seals': {'case_0001': 'ab' * 32}, 'settings': {'cases': 1, 'seed': 1}}
+SCORED = {
+    'truth': {'case': 'case_0001', 'seed': [1, 1], 'kind': 'single', 'effects': [
+        {'id': 'tach_1.gain', 'size': 0.4, 'parameters': {'error': 0.02}}]},
+    'verdict': {**VERDICT, 'which': [{'effects': ['tach_1.gain'], 'probability': 1.0,
+                                      'parameters': {'tach_1.gain.change': {
+                                          'value': 0.02, 'ci95': [0.0, 0.1], 'unit': '1'}}}]},
+    'closed': 0.9}
 FIT_LOG = (b'{"problem": "0123", "settings": {}}\n'
            b'{"shares": [0.1, 0.2], "cost": 1.5, "figures": {"a": 1.0}, "complete": true}\n')
 SERVO_LOG = {
@@ -186,6 +195,9 @@ def reader(name: str, folder: Path) -> Reader:
                             lambda path: read_verdict(path / 'verdict.json'))
     if name == 'manifest':
         return _json_reader('manifest.json', MANIFEST, read_manifest)
+    if name == 'scored_cases':
+        return _json_reader('cases.jsonl', SCORED, lambda path: score(
+            read_scored(path / 'cases.jsonl')))
     if name == 'fit_log':
         return Reader('fit.log', FIT_LOG, lambda path: read_log(path / 'fit.log'))
     if name == 'servo_log':

@@ -18,23 +18,31 @@ Reads DIR/case_*/verdict.json, which `antenna-drive diagnose --json` writes, and
 trial, and checks each truth against its seal. A case whose diagnosis failed counts as wrong. A
 case that was not diagnosed yet is pending and not scored.
 
+--cases writes the cases with their answers into one small file. Such a file can be published and
+scored again, alone or together with others and with folders.
+
 docs/trial.md defines every figure. The exit code is 1 if there is no verdict to score.
 
 For example:
   antenna-drive score trial7
   antenna-drive score trial7 --json score.json --picture score.png
+  antenna-drive score trial7 --cases trial7.jsonl
+  antenna-drive score trial7.jsonl trial8
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+import json
 import math
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.cli.output import add_json_option, give
+from antenna_drive.cli.output import add_json_option, give, replaced
 from antenna_drive.errors import UserError
-from antenna_drive.trial.scorecard import read_cases, score
+from antenna_drive.trial.scorecard import Case, read_cases, score
+from antenna_drive.trial.scored_cases import case_lines, identity, read_scored, SUFFIX
 
 # The figures in the order of the table, with their targets.
 TARGETS = {
@@ -53,16 +61,24 @@ OTHER_TARGETS = {**dict.fromkeys(TARGETS, ''), 'failures': '0', 'pending': '0',
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `antenna-drive score`."""
-    parser.add_argument('folder', type=Path, metavar='DIR', help='folder of the trial')
+    parser.add_argument('trials', type=Path, nargs='+', metavar='TRIAL',
+                        help='folder of a trial, or a file that --cases wrote (.jsonl)')
     add_json_option(parser)
+    parser.add_argument('--cases', type=Path, metavar='FILE',
+                        help='write the cases with their answers, one line of JSON each (.jsonl)')
     parser.add_argument('--picture', type=Path, metavar='FILE',
                         help='draw confusion matrix and reliability diagram (.png, .pdf, .svg)')
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the scorecard; 1 if there is no verdict to score."""
-    cases, pending = read_cases(arguments.folder)
+    if arguments.cases is not None and arguments.cases.suffix != SUFFIX:
+        raise UserError(f'--cases {arguments.cases}: the name must end in {SUFFIX}')
+    cases, pending = _all_cases(arguments.trials)
     figures = score(cases, pending)
+    if arguments.cases is not None:
+        with replaced(arguments.cases) as stream:
+            stream.writelines(line.encode() for line in case_lines(cases))
     if arguments.picture is not None:
         from antenna_drive.trial import pictures  # only a picture needs matplotlib
         try:
@@ -71,6 +87,24 @@ def run(arguments: argparse.Namespace) -> int:
             raise UserError(f'{arguments.picture}: cannot be drawn, {error}') from error
     give(figures, arguments.json, '\n'.join(_lines(figures)))
     return 0 if cases else 1
+
+
+def _all_cases(trials: Sequence[Path]) -> tuple[list[Case], int]:
+    """Return the cases of all trials, and how many are pending; refuses what is there twice."""
+    cases: list[Case] = []
+    pending = 0
+    seen: dict[str, Path] = {}  # which trial a case is in
+    for trial in trials:
+        found, waiting = (read_scored(trial), 0) if trial.suffix == SUFFIX else read_cases(trial)
+        pending += waiting
+        cases += found
+        for case in found:
+            key = json.dumps(identity(case), sort_keys=True)
+            if key in seen:
+                raise UserError(f'{trial}: {case.truth.get("case")} is in {seen[key]}, too; give '
+                                'each trial once')
+            seen[key] = trial
+    return cases, pending
 
 
 def _lines(figures: dict[str, Any]) -> list[str]:

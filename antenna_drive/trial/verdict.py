@@ -163,6 +163,20 @@ def parse_verdict(content: Any) -> Verdict:
                    _held_back(content.get('held_back')))
 
 
+def content_of(verdict: Verdict) -> dict[str, Any]:
+    """Return a verdict as `parse_verdict` takes it, but for the predictions that it brings."""
+    fraction, seconds = (value if math.isfinite(value) else None
+                         for value in (verdict.explained_fraction, verdict.seconds))
+    return {'verdict': verdict.verdict,
+            'which': [{'effects': sorted(line.effects), 'probability': line.probability,
+                       'parameters': {name: {'value': item.value, 'ci95': [item.low, item.high],
+                                             'unit': item.unit}
+                                      for name, item in line.parameters.items()}}
+                      for line in verdict.which],
+            'confusable': [sorted(group) for group in verdict.confusable],
+            'how_far': {'explained_fraction': fraction}, 'seconds': seconds}
+
+
 def _held_back(content: Any) -> dict[str, str]:
     if content is None:
         return {}

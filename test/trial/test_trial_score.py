@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from antenna_drive.cli import main
+from antenna_drive.errors import UserError
 from antenna_drive.machines.antenna.catalogue import catalogue
 from antenna_drive.trial import sealing
 from antenna_drive.trial.cases import draw_truths
@@ -31,6 +32,7 @@ from antenna_drive.trial.machine import reference_machine
 from antenna_drive.trial.scorecard import (
     auroc, calibration_error, Case, rate, read_cases, reliability, score,
 )
+from antenna_drive.trial.scored_cases import read_scored
 from antenna_drive.trial.sheet import CaseSheet
 from antenna_drive.trial.sizes import size_of, StatedSize
 from antenna_drive.trial.verdict import (
@@ -417,6 +419,49 @@ def test_command_scores_a_folder(scored_trial: Path, tmp_path: Path,
     told = capsys.readouterr().out
     assert 'top1' in told
     assert '0.333' in told
+
+
+def test_published_cases_score_as_their_folder(scored_trial: Path, tmp_path: Path,
+                                               capsys: pytest.CaptureFixture[str]) -> None:
+    stated = {'a.x.offset': {'value': 1.0, 'ci95': [0.5, 1.5], 'unit': 'V'}}
+    full = verdict(('a.x', 0.6), ('b.x+a.x', 0.4), confusable=[['a.x', 'c.x']])
+    full['which'][0]['parameters'] = stated
+    (scored_trial / 'case_0001' / 'verdict.json').write_text(json.dumps(full))
+    published = tmp_path / 'trial.jsonl'
+
+    def figures(*arguments: str) -> Any:
+        assert main(['score', *arguments, '--json', '-']) == 0
+        return json.loads(capsys.readouterr().out)
+
+    of_folder = figures(str(scored_trial), '--cases', str(published))
+    assert figures(str(published)) == {**of_folder, 'pending': 0}
+    assert len(published.read_text().splitlines()) == 3
+    [first, *_] = read_scored(published)
+    assert first.verdict == parse_verdict(full)
+    assert first.verdict.which[0].parameters['a.x.offset'] == Interval(1.0, 0.5, 1.5, 'V')
+    other = tmp_path / 'other.jsonl'
+    other.write_text(published.read_text().replace('case_', 'case_1'))
+    assert figures(str(published), str(other))['cases'] == 6
+    assert main(['score', str(published), str(scored_trial)]) == 2
+    assert 'case_0001 is in' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('line', [
+    '{', '[]', '{"truth": {"kind": "odd"}}', '[' * 100_000,
+    '{"truth": {"kind": "single", "effects": [{"id": "a.x"}]}, "verdict": null}',
+    '{"truth": {"kind": "none", "effects": []}, "verdict": {}}',
+    '{"truth": {"kind": "none", "effects": []}, "verdict": null, "closed": NaN}',
+    json.dumps({'truth': {'kind': 'single', 'effects': [
+        {'id': 'tach_1.gain', 'size': 0.5, 'parameters': {'error': 0.0}}]},
+        'verdict': {**verdict(('tach_1.gain', 1.0)), 'which': [
+            {'effects': ['tach_1.gain'], 'probability': 1.0, 'parameters': {
+                'tach_1.gain.change': {'value': 1.0, 'ci95': [0.0, 2.0], 'unit': '1'}}}]}})])
+def test_line_that_is_no_case_is_refused(line: str, tmp_path: Path) -> None:
+    path = tmp_path / 'cases.jsonl'
+    path.write_text('{"truth": {"kind": "none", "effects": []}, "verdict": null}\n' + line)
+    with pytest.raises(UserError, match='cases.jsonl: line 2: no case') as caught:
+        read_scored(path)
+    assert len(str(caught.value)) < 600
 
 
 def test_command_refuses_a_changed_truth(scored_trial: Path,

@@ -1,0 +1,105 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Cases with their answers in one small file: what the scorecard needs, and who answered what.
+
+A wild trial takes gigabytes. This file of JSON lines takes a few kilobytes a case, can be
+published, and scored again by anybody. Everything else about a case follows from its seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from antenna_drive.errors import one_line, UserError
+from antenna_drive.trial.cases import Truth
+from antenna_drive.trial.scorecard import Case
+from antenna_drive.trial.verdict import content_of, parse_verdict
+
+SUFFIX = '.jsonl'
+KINDS = ('single', 'pair', 'none', 'outside')
+_KEPT = ('case', 'seed', 'kind', 'effects', 'machine', 'family', 'tolerance', 'sample_rate_hz',
+         'durations_s')
+
+
+def identity(case: Case) -> Truth:
+    """Return a truth without what follows from its seed: no two cases have the same."""
+    return {key: case.truth[key] for key in _KEPT if key in case.truth}
+
+
+def case_lines(cases: Iterable[Case]) -> Iterator[str]:
+    """Yield one line of JSON for each case: whose it is, and the answer."""
+    for case in cases:
+        yield json.dumps({
+            'truth': identity(case), 'verdict': case.verdict and content_of(case.verdict),
+            'closed': case.closed if math.isfinite(case.closed) else None}, allow_nan=False) + '\n'
+
+
+def read_scored(path: Path) -> list[Case]:
+    """
+    Read the cases of a file that `case_lines` filled.
+
+    Raises
+    ------
+    UserError : the file cannot be read, or a line is no case; the message names file and line
+
+    """
+    cases = []
+    try:
+        with path.open(encoding='utf-8') as stream:
+            for number, line in enumerate(stream, 1):
+                try:
+                    cases.append(_case(json.loads(line)))
+                except (ValueError, RecursionError) as error:
+                    raise UserError(f'{path}: line {number}: no case of a trial, '
+                                    f'{one_line(error, 200)}; antenna-drive score DIR --cases '
+                                    'FILE writes such a file') from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise UserError(f'{path}: cannot be read, {one_line(error, 200)}') from error
+    return cases
+
+
+def _case(content: Any) -> Case:
+    """Return the case of a line; raises ValueError where it is none."""
+    truth = content.get('truth') if isinstance(content, dict) else None
+    if not isinstance(truth, dict) or truth.get('kind') not in KINDS:
+        raise ValueError(f'truth: kind: not one of {", ".join(KINDS)}')
+    effects = truth.get('effects')
+    if not isinstance(effects, list) or not all(
+            isinstance(entry, dict) and isinstance(entry.get('id'), str)
+            and _is_share(entry.get('size'))
+            and isinstance(entry.get('parameters'), dict) for entry in effects):
+        raise ValueError('truth: effects: not a list of effects with id, size and parameters')
+    closed, verdict = content.get('closed'), content.get('verdict')
+    if closed is not None and not _is_share(abs(closed) if _is_number(closed) else None):
+        raise ValueError(f'closed: {closed!r}, not a number from -1 to 1')
+    case = Case(truth, None if verdict is None else parse_verdict(verdict),
+                math.nan if closed is None else float(closed))
+    try:
+        all(size.relative_error for size in case.sizes)
+    except (LookupError, TypeError, ArithmeticError) as error:
+        raise ValueError(f'truth: effects: {error!r}') from None
+    return case
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _is_share(value: Any) -> bool:
+    return _is_number(value) and 0.0 <= value <= 1.0
