@@ -42,6 +42,7 @@ from antenna_drive.emulator.batch import CHANNELS
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.recording.recording import unit_of
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
@@ -58,8 +59,8 @@ _STANDS = 0.3
 WASH_OUT_S = 3.0
 ENCODER = CHANNELS.index('plant/encoder')
 _RATE = CHANNELS.index('motor_1/tach_rate')
-# The column of the regressors that is the direction.
-_WAY = 1 + 2 * len(CHANNELS)
+# Columns of the regressors: the first slope, and the direction.
+_SLOPES, _WAY = 1 + len(CHANNELS), 1 + 2 * len(CHANNELS)
 # Residuals beyond so many robust standard deviations are cut: one spike is no gap.
 _CUT = 8.0
 # A ridge that keeps coefficients of columns that are alike from growing, as a share of a sample.
@@ -311,9 +312,7 @@ def _learned(track: Track, name: str, table: FloatArray,
     times, residual = times[late], residual[late]
     rows = interpolated(times, track.time, table)
     centre, spread = rows.mean(axis=0), rows.std(axis=0)
-    # a signal that only its rounding moves has nothing to say
-    usable = spread > 1e-9 * np.maximum(np.abs(rows).max(axis=0), 1e-9)
-    spread = np.where(usable, spread, 0.0)
+    spread = np.where(_moves(rows, spread), spread, 0.0)
     least = _LEAST[unit_of(name) or '']
     coefficients = _fitted(standardised(rows, centre, spread), residual, least)
     sigma = _robust(residual - standardised(rows, centre, spread) @ coefficients, least)
@@ -324,6 +323,15 @@ def _learned(track: Track, name: str, table: FloatArray,
     for k in range(len(SCORES)):
         mean[k], deviation[k], allowance[k] = _standard(table_of_scores[:, k])
     return SignalBaseline(lag, centre, spread, coefficients, sigma, mean, deviation, allowance)
+
+
+def _moves(rows: FloatArray, spread: FloatArray) -> NDArray[np.bool_]:
+    """Return which regressors more than rounding moves; the others have nothing to say."""
+    size = np.abs(rows).max(axis=0)
+    # the slope of a constant is what rounding makes of it, in a second
+    of_signals, slopes = size[1:_SLOPES], size[_SLOPES:_WAY]
+    np.maximum(slopes, of_signals, out=slopes)
+    return np.asarray(spread > 1e-9 * np.maximum(size, 1e-9))
 
 
 def interpolated(times: FloatArray, grid: FloatArray, table: FloatArray) -> FloatArray:
@@ -411,7 +419,7 @@ def block_scores(baseline: SignalBaseline, column: int, residual: FloatArray,
     own = standardised(rows, baseline.centre, baseline.spread)
     left = residual - own @ baseline.coefficients
     return scores(left / baseline.sigma, own[:, 1 + column],
-                  own[:, 1 + len(CHANNELS) + column], rows[:, _WAY]), left
+                  own[:, _SLOPES + column], rows[:, _WAY]), left
 
 
 def standard_scores(baseline: SignalBaseline, found: FloatArray) -> FloatArray:
