@@ -86,7 +86,7 @@ class Settings:
     again_s: float = 30.0
     stale_s: float = 2.0
     reference: float = 1.0
-    clip: float = 2.5
+    clip: float = 5.0
     keep_s: float = 300.0
 
 
