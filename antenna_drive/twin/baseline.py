@@ -20,13 +20,16 @@ variance one, in which a change shows:
 
 1. What a linear combination of the twin's own signals explains is taken out: errors of gains,
    zeros, delays and levels of friction. The coefficients are those of the quiet record.
+   A jump of the command lies somewhere between two of its samples, so the whole twin may be early
+   or late by up to that. In each block the shift that all signals have in common is taken out.
 2. What is left is summed over blocks of a second: its mean, its products with the signal, with
    the signal's slope and with the direction of motion, and the logarithm of its size. These are
    the scores of the local approach (A. Benveniste, M. Basseville, G. Moustakides, IEEE Trans.
    Automatic Control 32 (1987) 583): a change of any number of the machine moves some of them.
 3. Scores are standardised by their mean and scatter in the quiet record. Where neighbouring
-   blocks are alike, the scatter is that of the long run (R. A. Johnson, M. Bagshaw,
-   Technometrics 16 (1974) 103). Both are known from n blocks only. The scatter is therefore taken
+   blocks are alike, the scatter is that of the long run of a first-order autoregression
+   (R. A. Johnson, M. Bagshaw, Technometrics 16 (1974) 103; its bias after M. G. Kendall,
+   Biometrika 41 (1954) 403). Both are known from n blocks only. The scatter is therefore taken
    at the upper end of its 95 percent interval, and the reference value of the chart is raised by
    two standard errors of the mean.
 """
@@ -34,7 +37,7 @@ variance one, in which a change shows:
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from typing import Any
 
@@ -72,6 +75,10 @@ _LEAST = {'A': 0.003, 'rad/s': 0.001, 'rad': 3e-6, 'V': 0.003}
 # A score that moves by less than this share of the residual's size is no gap, however steady it
 # was in the quiet record; and the quiet record's worst block is no gap either.
 _LEAST_DEVIATION, _WORST = 0.1, 3.0
+# The greatest correlation of neighbouring blocks that is reckoned with.
+_MOST_ALIKE = 0.95
+# Rounds in which the shift of a block is found.
+_SHIFT_ROUNDS = 5
 # Lags that are tried [s].
 _MOST_LAG_S, _LAG_STEP_S = 0.3, 0.005
 
@@ -87,6 +94,7 @@ class Track:
     course : the twin's readings, shape (n, 6), in the order of `CHANNELS`
     washed : the same with the encoder behind its high-pass
     command : axis rate command, shape (n,) [rad/s]
+    spacing : of the samples of the command that the twin was driven with [s]
     samples : times [s] and values of each measured signal
 
     """
@@ -95,6 +103,7 @@ class Track:
     course: FloatArray
     washed: FloatArray
     command: FloatArray
+    spacing: float
     samples: Mapping[str, tuple[FloatArray, FloatArray]]
 
 
@@ -133,12 +142,14 @@ class Baseline:
     ----------
     signals : by name
     envelope : greatest rate command [rad/s] and greatest rms slope of it in a block [rad/s^2]
+    spacing : of the samples of the command: how far a block may be shifted [s]
     blocks : of the quiet record
 
     """
 
     signals: Mapping[str, SignalBaseline]
     envelope: tuple[float, float]
+    spacing: float
     blocks: int
 
     def judged(self, motion: tuple[float, float]) -> bool:
@@ -147,9 +158,11 @@ class Baseline:
 
     def plain(self) -> dict[str, Any]:
         """Return plain data for a file."""
-        return {'envelope': list(self.envelope), 'blocks': self.blocks, 'signals': {
-            name: {key: value.tolist() if isinstance(value, np.ndarray) else value
-                   for key, value in vars(item).items()} for name, item in self.signals.items()}}
+        return {'envelope': list(self.envelope), 'spacing': self.spacing, 'blocks': self.blocks,
+                'signals': {
+                    name: {key: value.tolist() if isinstance(value, np.ndarray) else value
+                           for key, value in vars(item).items()}
+                    for name, item in self.signals.items()}}
 
     @classmethod
     def of_plain(cls, data: Mapping[str, Any]) -> Baseline:
@@ -161,7 +174,7 @@ class Baseline:
                 for key, value in item.items()}
             signals[name] = SignalBaseline(**plain)
         command, slope = map(float, data['envelope'])
-        return cls(signals, (command, slope), int(data['blocks']))
+        return cls(signals, (command, slope), float(data['spacing']), int(data['blocks']))
 
 
 def motion_of(time: FloatArray, command: FloatArray) -> tuple[float, float]:
@@ -282,12 +295,17 @@ def learn(track: Track, begin: float) -> Baseline:
     motions = [motion_of(track.time[part], track.command[part])
                for part in _parts(track.time, edges)]
     envelope = (max(m[0] for m in motions), max(m[1] for m in motions))
-    signals = {}
-    for name in track.samples:
-        found = _learned(track, name, table, edges)
-        if found is not None:
-            signals[name] = found
-    return Baseline(signals, envelope, len(edges))
+    prepared = {name: found for name in track.samples
+                if (found := _prepared(track, name, table, edges)) is not None}
+    signals = {name: _fitted_to(item, [part.residual for part in item.parts])
+               for name, item in prepared.items()}
+    # once more, each block shifted as the first fit says
+    shifts = _shifts(prepared, signals, track.spacing)
+    signals = {name: _fitted_to(item, [part.shifted(shift).residual for part, shift in zip(
+        item.parts, shifts, strict=True)]) for name, item in prepared.items()}
+    shifts = _shifts(prepared, signals, track.spacing)
+    return Baseline({name: _with_scores(signals[name], item.parts, shifts)
+                     for name, item in prepared.items()}, envelope, track.spacing, len(edges))
 
 
 def _parts(time: FloatArray, edges: FloatArray) -> list[slice]:
@@ -295,9 +313,50 @@ def _parts(time: FloatArray, edges: FloatArray) -> list[slice]:
     return [slice(a, b) for a, b in zip(places[:-1], places[1:])]
 
 
-def _learned(track: Track, name: str, table: FloatArray,
-             edges: FloatArray) -> SignalBaseline | None:
-    """Return the baseline of one signal; None if it has too few samples."""
+@dataclass(frozen=True)
+class Part:
+    """
+    One signal in one block.
+
+    Attributes
+    ----------
+    column : of the signal in `CHANNELS`
+    residual : measured minus twin, shape (n,)
+    rows : regressors at the same times, shape (n, 16)
+
+    """
+
+    column: int
+    residual: FloatArray
+    rows: FloatArray
+
+    @property
+    def slope(self) -> FloatArray:
+        """Return the slope of the twin's signal, shape (n,)."""
+        return np.asarray(self.rows[:, _SLOPES + self.column])
+
+    def shifted(self, shift_s: float) -> Part:
+        """Return the part beside a twin that is earlier by a time [s]."""
+        return replace(self, residual=self.residual - shift_s * self.slope)
+
+    def left(self, baseline: SignalBaseline) -> FloatArray:
+        """Return what the regressors of a baseline leave of the residual, shape (n,)."""
+        own = standardised(self.rows, baseline.centre, baseline.spread)
+        return np.asarray(self.residual - own @ baseline.coefficients)
+
+
+@dataclass(frozen=True)
+class _Prepared:
+    """One signal of a quiet record: its name, by how much it is late [s], and its blocks."""
+
+    name: str
+    lag: float
+    parts: Sequence[Part]
+
+
+def _prepared(track: Track, name: str, table: FloatArray,
+              edges: FloatArray) -> _Prepared | None:
+    """Return one signal beside the twin; None if it has too few samples."""
     column = CHANNELS.index(name)
     lag = lag_of(track, name)
     times, values = track.samples[name]
@@ -308,21 +367,61 @@ def _learned(track: Track, name: str, table: FloatArray,
         return None
     residual = residual_of(column, values, interpolated(times, track.time, track.course)[
         :, column], times, WashOut())
-    late = times >= float(edges[0])
-    times, residual = times[late], residual[late]
     rows = interpolated(times, track.time, table)
+    return _Prepared(name, lag, [Part(column, residual[part], rows[part])
+                                 for part in _parts(times, edges)])
+
+
+def _fitted_to(item: _Prepared, residuals: Sequence[FloatArray]) -> SignalBaseline:
+    """Return the baseline of one signal without its scores, fitted to residuals of its blocks."""
+    residual = np.concatenate(residuals)
+    rows = np.concatenate([part.rows for part in item.parts])
     centre, spread = rows.mean(axis=0), rows.std(axis=0)
     spread = np.where(_moves(rows, spread), spread, 0.0)
-    least = _LEAST[unit_of(name) or '']
-    coefficients = _fitted(standardised(rows, centre, spread), residual, least)
-    sigma = _robust(residual - standardised(rows, centre, spread) @ coefficients, least)
-    bare = SignalBaseline(lag, centre, spread, coefficients, sigma, *np.zeros((3, len(SCORES))))
-    table_of_scores = np.array([block_scores(bare, column, residual[part], rows[part])[0]
-                                for part in _parts(times, edges)])
-    mean, deviation, allowance = (np.zeros(len(SCORES)) for _ in range(3))
-    for k in range(len(SCORES)):
-        mean[k], deviation[k], allowance[k] = _standard(table_of_scores[:, k])
-    return SignalBaseline(lag, centre, spread, coefficients, sigma, mean, deviation, allowance)
+    least = _LEAST[unit_of(item.name) or '']
+    own = standardised(rows, centre, spread)
+    coefficients = _fitted(own, residual, least)
+    sigma = _robust(residual - own @ coefficients, least)
+    return SignalBaseline(item.lag, centre, spread, coefficients, sigma,
+                          *np.zeros((3, len(SCORES))))
+
+
+def _shifts(prepared: Mapping[str, _Prepared], signals: Mapping[str, SignalBaseline],
+            most: float) -> list[float]:
+    """Return the shift of each block [s]."""
+    return [shift_of([(signals[name], part) for name, part in zip(prepared, parts)], most)
+            for parts in zip(*(item.parts for item in prepared.values()))]
+
+
+def shift_of(block: Sequence[tuple[SignalBaseline, Part]], most: float) -> float:
+    """
+    Return by how much the twin is late in one block [s], as all signals have it in common.
+
+    Parameters
+    ----------
+    block
+        each signal's baseline and its part of the block
+    most
+        the greatest shift [s]
+
+    """
+    left = np.concatenate([part.left(item) / item.sigma for item, part in block])
+    slope = np.concatenate([part.slope / item.sigma for item, part in block])
+    square = float(slope @ slope)
+    found = 0.0
+    for _ in range(_SHIFT_ROUNDS if square > 0.0 else 0):
+        # Huber's way: a spike counts as much as the cut
+        found += float(np.clip(left - found * slope, -_CUT, _CUT) @ slope) / square
+    return min(max(found, -most), most)
+
+
+def _with_scores(bare: SignalBaseline, parts: Sequence[Part],
+                 shifts: Sequence[float]) -> SignalBaseline:
+    """Return a baseline with mean and scatter of its scores."""
+    table = np.array([block_scores(bare, part.shifted(shift))[0]
+                      for part, shift in zip(parts, shifts, strict=True)])
+    mean, deviation, allowance = np.array([_standard(column) for column in table.T]).T
+    return replace(bare, mean=mean, deviation=deviation, allowance=allowance)
 
 
 def _moves(rows: FloatArray, spread: FloatArray) -> NDArray[np.bool_]:
@@ -386,12 +485,10 @@ def _standard(values: FloatArray) -> tuple[float, float, float]:
         return 0.0, 0.0, 0.0
     centred = there - there.mean()
     variance = float((centred**2).mean()) * n / (n - 1)
-    # of the long run, from what neighbours have in common (Bartlett's weights); never less
-    lags = min(int(round(n**(1.0 / 3.0))), n // 4)
-    long_run = variance + 2.0 * sum(
-        (1.0 - k / (lags + 1.0)) * float((centred[k:] * centred[:-k]).sum()) / n
-        for k in range(1, lags + 1))
-    inflation = max(long_run / variance, 1.0)
+    # of the long run, of a first-order autoregression; the estimate is low by so much (Kendall)
+    alike = float((centred[1:] * centred[:-1]).sum() / (centred**2).sum())
+    alike = min(max(alike + (1.0 + 3.0 * alike) / n, 0.0), _MOST_ALIKE)
+    inflation = (1.0 + alike) / (1.0 - alike)
     upper = math.sqrt((n - 1) / chi2.ppf(0.025, n - 1))
     deviation = max(math.sqrt(variance * inflation) * upper, _LEAST_DEVIATION,
                     float(np.abs(centred).max()) / _WORST)
@@ -399,27 +496,12 @@ def _standard(values: FloatArray) -> tuple[float, float, float]:
     return float(there.mean()), deviation, allowance
 
 
-def block_scores(baseline: SignalBaseline, column: int, residual: FloatArray,
-                 rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """
-    Return the scores of one signal in one block, and what is left of its residual.
-
-    Parameters
-    ----------
-    baseline
-        of the signal
-    column
-        of the signal in `CHANNELS`
-    residual
-        measured minus twin, shape (n,)
-    rows
-        regressors at the same times, shape (n, 16)
-
-    """
-    own = standardised(rows, baseline.centre, baseline.spread)
-    left = residual - own @ baseline.coefficients
-    return scores(left / baseline.sigma, own[:, 1 + column],
-                  own[:, _SLOPES + column], rows[:, _WAY]), left
+def block_scores(baseline: SignalBaseline, part: Part) -> tuple[FloatArray, FloatArray]:
+    """Return the scores of one signal in one block, and what is left of its residual."""
+    own = standardised(part.rows, baseline.centre, baseline.spread)
+    left = part.left(baseline)
+    return scores(left / baseline.sigma, own[:, 1 + part.column],
+                  own[:, _SLOPES + part.column], part.rows[:, _WAY]), left
 
 
 def standard_scores(baseline: SignalBaseline, found: FloatArray) -> FloatArray:

@@ -110,6 +110,12 @@ class Shadow:
         """Return the time stamp of the last macro-step [ns]."""
         return (self._start_ns or 0) + int(nanoseconds(self._emulator.k * self._step_s))
 
+    @property
+    def spacing_s(self) -> float:
+        """Return the time between the last samples of the command, 0 before there are two [s]."""
+        return float(np.median(np.diff(self._stamps))) / NANOSECONDS if (
+            self._stamps.size > 1) else 0.0
+
     def advance(self, stamps: IntArray, values: FloatArray) -> tuple[IntArray, FloatArray]:
         """
         Take samples of the command and go on as far as they lead.

@@ -36,7 +36,8 @@ from antenna_drive.recording.recording import NANOSECONDS, Recording, unit_of
 from antenna_drive.recording.sheet import TestSheet
 from antenna_drive.twin.baseline import (
     Baseline, BLOCK_S, block_scores, ENCODER, interpolated, learn, motion_of, names_of_charts,
-    regressors, residual_of, SCORES, SignalBaseline, standard_scores, Track, TWO_SIDED, WashOut,
+    Part, regressors, residual_of, SCORES, shift_of, SignalBaseline, standard_scores, Track,
+    TWO_SIDED, WashOut,
 )
 from antenna_drive.twin.cusum import Charts, limit_of_rate
 from antenna_drive.twin.intake import COMMAND, Intake
@@ -374,7 +375,8 @@ class Twin:
         samples = {name: (times[times <= end], values[times <= end])
                    for name, (times, values) in self._pending.items() if times.size}
         self._use(learn(Track(course.time[quiet], course.raw[quiet], course.washed[quiet],
-                              course.command[quiet], samples), self._run_in))
+                              course.command[quiet], self._shadow.spacing_s, samples),
+                        self._run_in))
         assert self.baseline is not None
         for name, item in self.baseline.signals.items():
             self._residual(name, item, end, course.time, course.raw)
@@ -418,16 +420,24 @@ class Twin:
         table = regressors(time, course.washed[part])
         own = (time >= begin) & (time < end)
         judged = self.baseline.judged(motion_of(time[own], course.command[part][own]))
-        z, sizes = [], {}
+        there = {}
         for name, item in self.baseline.signals.items():
             times, residual = self._residual(name, item, end, time, course.raw[part])
-            if not times.size:
+            if times.size:
+                self._missing.pop(name, None)
+                there[name] = Part(CHANNELS.index(name), residual,
+                                   interpolated(times, time, table))
+            else:
                 self._missing.setdefault(name, begin)
+        signals = self.baseline.signals
+        shift = shift_of([(signals[name], own_part) for name, own_part in there.items()],
+                         self.baseline.spacing) if there else 0.0
+        z, sizes = [], {}
+        for name, item in signals.items():
+            if name not in there:
                 z.append(np.full(len(SCORES), np.nan))
                 continue
-            self._missing.pop(name, None)
-            found, left = block_scores(item, CHANNELS.index(name), residual,
-                                       interpolated(times, time, table))
+            found, left = block_scores(item, there[name].shifted(shift))
             sizes[name] = float(np.sqrt(np.mean(left**2)))
             z.append(standard_scores(item, found))
         if begin < self._run_in:

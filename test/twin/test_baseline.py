@@ -17,8 +17,11 @@ from __future__ import annotations
 
 from antenna_drive.emulator.batch import CHANNELS
 from antenna_drive.emulator.unit import FloatArray
-from antenna_drive.twin.baseline import Baseline, learn, SCORES, Track
+from antenna_drive.twin.baseline import (
+    Baseline, learn, Part, regressors, SCORES, shift_of, SignalBaseline, Track,
+)
 import numpy as np
+import pytest
 
 BIAS = 'torque_share/bias_voltage'
 
@@ -29,13 +32,51 @@ def quiet_record(course: FloatArray, seed: int = 5) -> Baseline:
     time = np.arange(len(course)) / 200.0
     samples = {name: (time, course[:, k] + 0.01 * random.standard_normal(time.size))
                for k, name in enumerate(CHANNELS)}
-    return learn(Track(time, course, course, np.sin(time), samples), 5.0)
+    return learn(Track(time, course, course, np.sin(time), 0.01, samples), 5.0)
 
 
 def sines(count: int = 22000) -> FloatArray:
     """Return a course in which every signal moves."""
     time = np.arange(count) / 200.0
     return np.stack([np.sin((k + 1.3) * time) for k in range(len(CHANNELS))], axis=1)
+
+
+def test_jumps_between_samples_are_no_gap() -> None:
+    """Each second the drive is ahead of the twin by another time, up to a sample."""
+    course, random = sines(), np.random.default_rng(3)
+    time = np.arange(len(course)) / 200.0
+    ahead = random.uniform(-0.008, 0.008, 120)
+    samples = {name: (time, np.sin((k + 1.3) * (time + ahead[time.astype(int)]))
+                      + 0.01 * random.standard_normal(time.size))
+               for k, name in enumerate(CHANNELS)}
+
+    def learned(spacing: float) -> Baseline:
+        return learn(Track(time, course, course, np.sin(time), spacing, samples), 5.0)
+
+    names = ['motor_1/tach_rate', 'motor_2/tach_rate']  # the fastest but for encoder and bias
+    assert all(learned(0.0).signals[name].sigma > 0.013 for name in names)
+    assert all(learned(0.01).signals[name].sigma < 0.0105 for name in names)
+
+
+def test_shift_is_that_of_all_signals_and_bounded() -> None:
+    course, random = sines(200), np.random.default_rng(4)
+    time = np.arange(len(course)) / 200.0
+    rows = regressors(time, course)
+    item = SignalBaseline(0.0, rows.mean(axis=0), rows.std(axis=0), np.zeros(rows.shape[1]), 0.01,
+                          *np.zeros((3, len(SCORES))))
+
+    def found(shift: float, most: float) -> float:
+        parts = []
+        for k in range(4):
+            late = np.sin((k + 1.3) * (time + shift)) - course[:, k]
+            late += 0.01 * random.standard_normal(time.size)
+            late[17] += 5.0  # a spike
+            parts.append((item, Part(k, late, rows)))
+        return shift_of(parts, most)
+
+    assert found(0.004, 0.01) == pytest.approx(0.004, abs=4e-4)
+    assert found(-0.007, 0.01) == pytest.approx(-0.007, abs=4e-4)
+    assert found(0.03, 0.01) == 0.01
 
 
 def test_rounding_of_a_constant_signal_has_nothing_to_say() -> None:

@@ -15,6 +15,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -168,7 +169,7 @@ def test_drive_that_stops_is_stale_and_comes_back(learned: Twin) -> None:
 def test_motion_beyond_the_quiet_record_is_not_judged(learned: Twin) -> None:
     columns, sheet = case('axis.wind_steady')
     assert learned.baseline is not None
-    narrow = Baseline(learned.baseline.signals, (1e-6, 1e-6), learned.baseline.blocks)
+    narrow = replace(learned.baseline, envelope=(1e-6, 1e-6))
     twin = Twin(learned.drive, parse_sheet(sheet), BRIEF, narrow)
     assert watch.GAP not in [word for _, word in states(twin, columns)]
     assert twin.unjudged == twin.blocks > 60
