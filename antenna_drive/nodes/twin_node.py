@@ -112,7 +112,7 @@ class _TwinNode:
         self._log = node.get_logger()
         overrides = Overrides(node)
         numbers = {name: overrides.number(name, entry, default) for (name, entry), default in zip(
-            _ENTRIES.items(), (1.0, 120.0), strict=True)}
+            _ENTRIES.items(), (Settings.alarms_per_day, Settings.quiet_s), strict=True)}
         texts = {name: _text(overrides, name) for name in _TEXTS}
         config = [name for name in overrides.names('config', ()) if name != 'reference']
         switches = {name: _switch(overrides.rest(), name) for name in _SWITCHES}

@@ -46,7 +46,7 @@ from numpy.typing import NDArray
 
 RATE_HZ = 100.0
 # The effect is switched on in this part of the test, which ends so much later [s].
-ONSET_S, AFTER_S = (150.0, 170.0), 30.0
+ONSET_S, AFTER_S = (330.0, 350.0), 30.0
 # Of the range of sizes: middle and large ones.
 SIZES = (1.0 / 3.0, 1.0)
 

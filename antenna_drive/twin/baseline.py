@@ -70,8 +70,9 @@ _CUT = 8.0
 _RIDGE = 1e-3
 # Motion that leaves the quiet record by more than this factor is not judged.
 _BEYOND = 1.25
-# What the sensors of such a drive tell, by unit: a residual is never taken for quieter.
-_LEAST = {'A': 0.003, 'rad/s': 0.001, 'rad': 3e-6, 'V': 0.003}
+# What the sensors of such a drive tell, by unit: a residual is never taken for quieter. Of angles
+# it is two digits of an encoder with 21 bits.
+_LEAST = {'A': 0.003, 'rad/s': 0.001, 'rad': 6e-6, 'V': 0.003}
 # A score that moves by less than this share of the residual's size is no gap, however steady it
 # was in the quiet record; and the quiet record's worst block is no gap either.
 _LEAST_DEVIATION, _WORST = 0.1, 3.0

@@ -82,7 +82,7 @@ class Settings:
     """
 
     alarms_per_day: float = 1.0
-    quiet_s: float = 120.0
+    quiet_s: float = 300.0
     run_in_s: float = 15.0
     again_s: float = 30.0
     stale_s: float = 2.0
