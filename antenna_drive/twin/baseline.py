@@ -22,6 +22,7 @@ variance one, in which a change shows:
    zeros, delays and levels of friction. The coefficients are those of the quiet record.
    A jump of the command lies somewhere between two of its samples, so the whole twin may be early
    or late by up to that. In each block the shift that all signals have in common is taken out.
+   What it is over many blocks, the clocks of command and readings have drifted apart by.
 2. What is left is summed over blocks of a second: its mean, its products with the signal, with
    the signal's slope and with the direction of motion, and the logarithm of its size. These are
    the scores of the local approach (A. Benveniste, M. Basseville, G. Moustakides, IEEE Trans.
@@ -78,8 +79,11 @@ _LEAST = {'A': 0.003, 'rad/s': 0.001, 'rad': 6e-6, 'V': 0.003}
 _LEAST_DEVIATION, _WORST = 0.1, 3.0
 # The greatest correlation of neighbouring blocks that is reckoned with.
 _MOST_ALIKE = 0.95
-# Rounds in which the shift of a block is found.
-_SHIFT_ROUNDS = 5
+# Rounds in which the shift of a block is found; how often the quiet record is fitted with those
+# that the last fit found, and before that with their course over time.
+_SHIFT_ROUNDS, _SHIFT_PASSES, _DRIFT_PASSES = 5, 3, 2
+# Shifts that have lasted for this time are a drift of clocks [s].
+DRIFT_S = 10.0
 # Lags that are tried [s].
 _MOST_LAG_S, _LAG_STEP_S = 0.3, 0.005
 
@@ -296,17 +300,32 @@ def learn(track: Track, begin: float) -> Baseline:
     motions = [motion_of(track.time[part], track.command[part])
                for part in _parts(track.time, edges)]
     envelope = (max(m[0] for m in motions), max(m[1] for m in motions))
-    prepared = {name: found for name in track.samples
-                if (found := _prepared(track, name, table, edges)) is not None}
-    signals = {name: _fitted_to(item, [part.residual for part in item.parts])
-               for name, item in prepared.items()}
-    # once more, each block shifted as the first fit says
-    shifts = _shifts(prepared, signals, track.spacing)
-    signals = {name: _fitted_to(item, [part.shifted(shift).residual for part, shift in zip(
-        item.parts, shifts, strict=True)]) for name, item in prepared.items()}
-    shifts = _shifts(prepared, signals, track.spacing)
+    lags = {name: lag_of(track, name) for name in track.samples}
+    late = np.zeros(len(edges))
+    for _ in range(_DRIFT_PASSES):
+        prepared = _all_prepared(track, table, edges, lags, late)
+        signals = {name: _fitted_to(item, [0.0] * len(edges)) for name, item in prepared.items()}
+        late = late - _smooth(*_shifts(prepared, signals))
+    prepared = _all_prepared(track, table, edges, lags, late)
+    shifts = [0.0] * len(edges)
+    for _ in range(_SHIFT_PASSES):
+        signals = {name: _fitted_to(item, shifts) for name, item in prepared.items()}
+        shifts = np.clip(_shifts(prepared, signals)[0], -track.spacing, track.spacing).tolist()
     return Baseline({name: _with_scores(signals[name], item.parts, shifts)
                      for name, item in prepared.items()}, envelope, track.spacing, len(edges))
+
+
+def _all_prepared(track: Track, table: FloatArray, edges: FloatArray, lags: Mapping[str, float],
+                  late: FloatArray) -> dict[str, _Prepared]:
+    return {name: found for name, lag in lags.items() if (
+        found := _prepared(track, name, table, edges, lag + late)) is not None}
+
+
+def _smooth(shifts: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return the shifts of blocks as a course over time [s]."""
+    blocks = np.arange(shifts.size)
+    kernel = np.exp(-np.abs(blocks[:, np.newaxis] - blocks) * BLOCK_S / DRIFT_S)
+    return np.asarray(kernel @ (weights * shifts) / np.maximum(kernel @ weights, 1e-30))
 
 
 def _parts(time: FloatArray, edges: FloatArray) -> list[slice]:
@@ -348,20 +367,19 @@ class Part:
 
 @dataclass(frozen=True)
 class _Prepared:
-    """One signal of a quiet record: its name, by how much it is late [s], and its blocks."""
+    """One signal of a quiet record: its name, by how much it is late at its end [s], its blocks."""
 
     name: str
     lag: float
     parts: Sequence[Part]
 
 
-def _prepared(track: Track, name: str, table: FloatArray,
-              edges: FloatArray) -> _Prepared | None:
-    """Return one signal beside the twin; None if it has too few samples."""
+def _prepared(track: Track, name: str, table: FloatArray, edges: FloatArray,
+              lag: FloatArray) -> _Prepared | None:
+    """Return one signal beside the twin, late by so much in each block; None if too few samples."""
     column = CHANNELS.index(name)
-    lag = lag_of(track, name)
     times, values = track.samples[name]
-    times = times - lag
+    times = times - np.interp(times, edges + 0.5 * BLOCK_S, lag)
     inside = (times >= track.time[0]) & (times <= track.time[-1])
     times, values = times[inside], values[inside]
     if times.size < 10 * table.shape[1]:
@@ -369,13 +387,14 @@ def _prepared(track: Track, name: str, table: FloatArray,
     residual = residual_of(column, values, interpolated(times, track.time, track.course)[
         :, column], times, WashOut())
     rows = interpolated(times, track.time, table)
-    return _Prepared(name, lag, [Part(column, residual[part], rows[part])
+    return _Prepared(name, float(lag[-1]), [Part(column, residual[part], rows[part])
                                  for part in _parts(times, edges)])
 
 
-def _fitted_to(item: _Prepared, residuals: Sequence[FloatArray]) -> SignalBaseline:
-    """Return the baseline of one signal without its scores, fitted to residuals of its blocks."""
-    residual = np.concatenate(residuals)
+def _fitted_to(item: _Prepared, shifts: Sequence[float]) -> SignalBaseline:
+    """Return the baseline of one signal without its scores, fitted to its shifted blocks."""
+    residual = np.concatenate([part.shifted(shift).residual
+                               for part, shift in zip(item.parts, shifts, strict=True)])
     rows = np.concatenate([part.rows for part in item.parts])
     centre, spread = rows.mean(axis=0), rows.std(axis=0)
     spread = np.where(_moves(rows, spread), spread, 0.0)
@@ -387,23 +406,23 @@ def _fitted_to(item: _Prepared, residuals: Sequence[FloatArray]) -> SignalBaseli
                           *np.zeros((3, len(SCORES))))
 
 
-def _shifts(prepared: Mapping[str, _Prepared], signals: Mapping[str, SignalBaseline],
-            most: float) -> list[float]:
-    """Return the shift of each block [s]."""
-    return [shift_of([(signals[name], part) for name, part in zip(prepared, parts)], most)
-            for parts in zip(*(item.parts for item in prepared.values()))]
+def _shifts(prepared: Mapping[str, _Prepared],
+            signals: Mapping[str, SignalBaseline]) -> tuple[FloatArray, FloatArray]:
+    """Return the shift of each block [s] and its weight, shape (n,)."""
+    found = [shift_of([(signals[name], part) for name, part in zip(prepared, parts)])
+             for parts in zip(*(item.parts for item in prepared.values()))]
+    shifts, weights = np.array(found).reshape(-1, 2).T
+    return shifts, weights
 
 
-def shift_of(block: Sequence[tuple[SignalBaseline, Part]], most: float) -> float:
+def shift_of(block: Sequence[tuple[SignalBaseline, Part]]) -> tuple[float, float]:
     """
-    Return by how much the twin is late in one block [s], as all signals have it in common.
+    Return by how much the twin is late in one block [s], and what that weighs [1/s^2].
 
     Parameters
     ----------
     block
         each signal's baseline and its part of the block
-    most
-        the greatest shift [s]
 
     """
     left = np.concatenate([part.left(item) / item.sigma for item, part in block])
@@ -413,7 +432,7 @@ def shift_of(block: Sequence[tuple[SignalBaseline, Part]], most: float) -> float
     for _ in range(_SHIFT_ROUNDS if square > 0.0 else 0):
         # Huber's way: a spike counts as much as the cut
         found += float(np.clip(left - found * slope, -_CUT, _CUT) @ slope) / square
-    return min(max(found, -most), most)
+    return found, square
 
 
 def _with_scores(bare: SignalBaseline, parts: Sequence[Part],

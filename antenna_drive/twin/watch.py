@@ -35,9 +35,9 @@ from antenna_drive.parameters.sets import changed, Drive
 from antenna_drive.recording.recording import NANOSECONDS, Recording, unit_of
 from antenna_drive.recording.sheet import TestSheet
 from antenna_drive.twin.baseline import (
-    Baseline, BLOCK_S, block_scores, ENCODER, interpolated, learn, motion_of, names_of_charts,
-    Part, regressors, residual_of, SCORES, shift_of, SignalBaseline, standard_scores, Track,
-    TWO_SIDED, WashOut,
+    Baseline, BLOCK_S, block_scores, DRIFT_S, ENCODER, interpolated, learn, motion_of,
+    names_of_charts, Part, regressors, residual_of, SCORES, shift_of, SignalBaseline,
+    standard_scores, Track, TWO_SIDED, WashOut,
 )
 from antenna_drive.twin.cusum import Charts, limit_of_rate
 from antenna_drive.twin.intake import COMMAND, Intake
@@ -87,7 +87,7 @@ class Settings:
     again_s: float = 30.0
     stale_s: float = 2.0
     reference: float = 1.0
-    clip: float = 5.0
+    clip: float = 3.2
     keep_s: float = 300.0
 
 
@@ -260,6 +260,9 @@ class Twin:
         self.limit = limit_of_rate(settings.reference, settings.alarms_per_day,
                                    int(two_sided.size + two_sided.sum()), BLOCK_S)
         self._charts = Charts(two_sided, reference, self.limit, settings.clip)
+        # by how much the clock of the readings has come ahead of the command's since then [s],
+        # and how well that is known [1/s^2]
+        self._ahead = self._known = 0.0
 
     def put(self, name: str, stamp_ns: int, value: float) -> bool:
         """Take a sample of the real drive; see `Intake.put`."""
@@ -335,7 +338,7 @@ class Twin:
             if not stamps.size:
                 continue
             times = (stamps - start) / NANOSECONDS
-            lag = self.baseline.signals[name].lag if (
+            lag = self._lag(self.baseline.signals[name]) if (
                 self.baseline and name in self.baseline.signals) else 0.0
             twin = interpolated(times - lag, course.time, course.raw)[:, CHANNELS.index(name)]
             residual = values - twin
@@ -351,7 +354,7 @@ class Twin:
         course = self._course
         if not course.time.size:
             return
-        while course.time[-1] > (self._next_block + 1) * BLOCK_S + _BEHIND_S:
+        while course.time[-1] > (self._next_block + 1) * BLOCK_S + _BEHIND_S + self._waited():
             begin = self._next_block * BLOCK_S
             self._next_block += 1
             self._rubbish.append((self._rubbish_counts(), dict(self.intake.accepted)))
@@ -402,14 +405,32 @@ class Twin:
                   raw: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Take the samples before a time; return the twin's times of them, and residuals."""
         times, values = self._pending[name]
-        mine = times - item.lag < end
-        self._pending[name] = times[~mine], values[~mine]
-        times, values = times[mine] - item.lag, values[mine]
+        times = times - self._lag(item)
+        mine = times < end
+        self._pending[name] = self._pending[name][0][~mine], values[~mine]
+        times, values = times[mine], values[mine]
         if not times.size:
             return times, values
         column = CHANNELS.index(name)
         return times, residual_of(column, values, interpolated(times, time, raw)[:, column],
                                   times, self._residual_wash[name])
+
+    def _lag(self, item: SignalBaseline) -> float:
+        """Return by how much a reading is late now [s]."""
+        return item.lag - self._ahead
+
+    def _waited(self) -> float:
+        """Return how much longer readings are waited for than at first [s]."""
+        return max(-self._ahead, 0.0) if self.baseline is not None else 0.0
+
+    def _drift(self, shift: float, weight: float) -> float:
+        """Take the shift of a block; return what of it lies within a sample of the command."""
+        assert self.baseline is not None
+        own = min(max(shift, -self.baseline.spacing), self.baseline.spacing)
+        self._known = math.exp(-BLOCK_S / DRIFT_S) * self._known + weight
+        if self._known > 0.0:
+            self._ahead += own * weight / self._known
+        return own
 
     def _block(self, begin: float) -> None:
         assert self.baseline is not None
@@ -430,8 +451,8 @@ class Twin:
             else:
                 self._missing.setdefault(name, begin)
         signals = self.baseline.signals
-        shift = shift_of([(signals[name], own_part) for name, own_part in there.items()],
-                         self.baseline.spacing) if there else 0.0
+        shift = self._drift(*shift_of([(signals[name], own_part)
+                                       for name, own_part in there.items()])) if there else 0.0
         z, sizes = [], {}
         for name, item in signals.items():
             if name not in there:
