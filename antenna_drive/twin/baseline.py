@@ -367,7 +367,7 @@ class Part:
 
 @dataclass(frozen=True)
 class _Prepared:
-    """One signal of a quiet record: its name, by how much it is late at its end [s], its blocks."""
+    """One signal of a quiet record: its name, its lag at the end [s], and its blocks."""
 
     name: str
     lag: float
@@ -376,7 +376,7 @@ class _Prepared:
 
 def _prepared(track: Track, name: str, table: FloatArray, edges: FloatArray,
               lag: FloatArray) -> _Prepared | None:
-    """Return one signal beside the twin, late by so much in each block; None if too few samples."""
+    """Return one signal beside the twin, with its lag in each block; None if it has too little."""
     column = CHANNELS.index(name)
     times, values = track.samples[name]
     times = times - np.interp(times, edges + 0.5 * BLOCK_S, lag)
@@ -388,7 +388,7 @@ def _prepared(track: Track, name: str, table: FloatArray, edges: FloatArray,
         :, column], times, WashOut())
     rows = interpolated(times, track.time, table)
     return _Prepared(name, float(lag[-1]), [Part(column, residual[part], rows[part])
-                                 for part in _parts(times, edges)])
+                                            for part in _parts(times, edges)])
 
 
 def _fitted_to(item: _Prepared, shifts: Sequence[float]) -> SignalBaseline:
