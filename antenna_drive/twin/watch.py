@@ -35,12 +35,13 @@ from antenna_drive.parameters.sets import changed, Drive
 from antenna_drive.recording.recording import NANOSECONDS, Recording, unit_of
 from antenna_drive.recording.sheet import TestSheet
 from antenna_drive.twin.baseline import (
-    Baseline, BLOCK_S, block_scores, DRIFT_S, ENCODER, interpolated, learn, motion_of,
-    names_of_charts, Part, regressors, residual_of, SCORES, shift_of, SignalBaseline,
-    standard_scores, Track, TWO_SIDED, WashOut,
+    Baseline, BLOCK_S, block_scores, DRIFT_S, ENCODER, interpolated, motion_of, names_of_charts,
+    Part, regressors, residual_of, SCORES, shift_of, SignalBaseline, standard_scores, TWO_SIDED,
+    WashOut,
 )
 from antenna_drive.twin.cusum import Charts, limit_of_rate
 from antenna_drive.twin.intake import COMMAND, Intake
+from antenna_drive.twin.quiet_record import learn, Track
 from antenna_drive.twin.shadow import Shadow
 import numpy as np
 

@@ -18,8 +18,9 @@ from __future__ import annotations
 from antenna_drive.emulator.batch import CHANNELS
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.twin.baseline import (
-    Baseline, learn, Part, regressors, SCORES, shift_of, SignalBaseline, Track,
+    Baseline, Part, regressors, SCORES, shift_of, SignalBaseline,
 )
+from antenna_drive.twin.quiet_record import learn, Track
 import numpy as np
 import pytest
 
@@ -91,6 +92,14 @@ def test_shift_is_that_of_all_signals() -> None:
 
     assert found(0.004) == pytest.approx(0.004, abs=4e-4)
     assert found(-0.007) == pytest.approx(-0.007, abs=4e-4)
+
+
+def test_record_without_enough_samples_judges_nothing() -> None:
+    course = sines()
+    time = np.arange(len(course)) / 200.0
+    few = {'motor_1/ammeter': (time[::2000], time[::2000])}
+    assert not learn(Track(time, course, course, np.sin(time), 0.01, few), 5.0).signals
+    assert not learn(Track(time, course, course, np.sin(time), 0.01, {}), 5.0).signals
 
 
 def test_rounding_of_a_constant_signal_has_nothing_to_say() -> None:
