@@ -1,0 +1,48 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Trials that are published case by case give the figures that the documents state."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import re
+
+from antenna_drive.trial.scorecard import score
+from antenna_drive.trial.scored_cases import read_scored
+import pytest
+
+DOCS = Path(__file__).resolve().parents[2] / 'docs'
+# rows of the table of wild trials, in the words of docs/diagnosis.md
+ROWS = {
+    'top1': 'true effect first', 'top3': 'true effect in the first three',
+    'pairs_both': 'both of a pair named first',
+    'no_gap_on_none': '`no_gap` where nothing is wrong',
+    'auroc_unknown': 'AUROC of the unknown', 'ece': 'expected calibration error',
+    'size_coverage': 'share of the 95 percent intervals',
+    'closed_held_back_median': 'closed on the fourth recording'}
+
+
+@pytest.mark.parametrize('number', [9])
+def test_figures_of_a_wild_trial_are_those_of_its_cases(number: int) -> None:
+    figures = score(read_scored(DOCS / 'trials' / f'wild_{number}.jsonl'))
+    text = (DOCS / 'diagnosis.md').read_text(encoding='utf-8')
+    table = text[text.index('| figure (95 % interval) | trial 4,'):].split('\n\n')[0].splitlines()
+    cells = [[cell.strip() for cell in line.strip('|').split('|')] for line in table]
+    [column] = [k for k, title in enumerate(cells[0])
+                if title == f'trial {number}, {figures["cases"]} cases']
+    for key, words in ROWS.items():
+        [row] = [row for row in cells if row[0].startswith(words)]
+        stated = re.match(r'[\d.]+', row[column])
+        assert stated is not None
+        assert float(stated.group()) == pytest.approx(figures[key], abs=0.005001), words
