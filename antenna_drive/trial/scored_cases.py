@@ -14,8 +14,8 @@
 """
 Cases with their answers in one small file: what the scorecard needs, and who answered what.
 
-A wild trial takes gigabytes. This file of JSON lines takes a few kilobytes a case, can be
-published, and scored again by anybody. Everything else about a case follows from its seed.
+A wild trial takes gigabytes. This file of JSON lines takes a few kilobytes a case. It can be
+published, and anybody can score it again. Everything else about a case follows from its seed.
 """
 
 from __future__ import annotations

@@ -102,8 +102,7 @@ def learn(track: Track, begin: float) -> Baseline:
         signals = {name: _fitted_to(item, [0.0] * len(edges)) for name, item in prepared.items()}
         late = late - _smooth(*_shifts(prepared, signals))
         prepared = _all_prepared(track, table, edges, lags, late)
-    signals = {}
-    shifts = [0.0] * len(edges)
+    signals, shifts = {}, [0.0] * len(edges)
     for _ in range(_SHIFT_PASSES):
         signals = {name: _fitted_to(item, shifts) for name, item in prepared.items()}
         shifts = np.clip(_shifts(prepared, signals)[0], -track.spacing, track.spacing).tolist()

@@ -224,6 +224,9 @@ class Twin:
             maxlen=_RUBBISH_BLOCKS)
         self.baseline: Baseline | None = None
         self.blocks = self.unjudged = 0
+        # by how much the clock of the readings has come ahead of the command's since the quiet
+        # record [s], and how well that is known [1/s^2]
+        self._ahead = self._known = 0.0
         self._build(drive)
         if baseline is not None:
             self._use(baseline)
@@ -261,9 +264,6 @@ class Twin:
         self.limit = limit_of_rate(settings.reference, settings.alarms_per_day,
                                    int(two_sided.size + two_sided.sum()), BLOCK_S)
         self._charts = Charts(two_sided, reference, self.limit, settings.clip)
-        # by how much the clock of the readings has come ahead of the command's since then [s],
-        # and how well that is known [1/s^2]
-        self._ahead = self._known = 0.0
 
     def put(self, name: str, stamp_ns: int, value: float) -> bool:
         """Take a sample of the real drive; see `Intake.put`."""
@@ -355,7 +355,8 @@ class Twin:
         course = self._course
         if not course.time.size:
             return
-        while course.time[-1] > (self._next_block + 1) * BLOCK_S + _BEHIND_S + self._waited():
+        while course.time[-1] > (self._next_block + 1) * BLOCK_S + _BEHIND_S + max(
+                -self._ahead, 0.0):
             begin = self._next_block * BLOCK_S
             self._next_block += 1
             self._rubbish.append((self._rubbish_counts(), dict(self.intake.accepted)))
@@ -406,10 +407,10 @@ class Twin:
                   raw: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Take the samples before a time; return the twin's times of them, and residuals."""
         times, values = self._pending[name]
-        times = times - self._lag(item)
-        mine = times < end
-        self._pending[name] = self._pending[name][0][~mine], values[~mine]
-        times, values = times[mine], values[mine]
+        of_twin = times - self._lag(item)
+        mine = of_twin < end
+        self._pending[name] = times[~mine], values[~mine]
+        times, values = of_twin[mine], values[mine]
         if not times.size:
             return times, values
         column = CHANNELS.index(name)
@@ -419,10 +420,6 @@ class Twin:
     def _lag(self, item: SignalBaseline) -> float:
         """Return by how much a reading is late now [s]."""
         return item.lag - self._ahead
-
-    def _waited(self) -> float:
-        """Return how much longer readings are waited for than at first [s]."""
-        return max(-self._ahead, 0.0) if self.baseline is not None else 0.0
 
     def _drift(self, shift: float, weight: float) -> float:
         """Take the shift of a block; return what of it lies within a sample of the command."""
@@ -442,8 +439,9 @@ class Twin:
         table = regressors(time, course.washed[part])
         own = (time >= begin) & (time < end)
         judged = self.baseline.judged(motion_of(time[own], course.command[part][own]))
+        signals = self.baseline.signals
         there = {}
-        for name, item in self.baseline.signals.items():
+        for name, item in signals.items():
             times, residual = self._residual(name, item, end, time, course.raw[part])
             if times.size:
                 self._missing.pop(name, None)
@@ -451,9 +449,8 @@ class Twin:
                                    interpolated(times, time, table))
             else:
                 self._missing.setdefault(name, begin)
-        signals = self.baseline.signals
-        shift = self._drift(*shift_of([(signals[name], own_part)
-                                       for name, own_part in there.items()])) if there else 0.0
+        shift = self._drift(*shift_of([(signals[name], measured)
+                                       for name, measured in there.items()])) if there else 0.0
         z, sizes = [], {}
         for name, item in signals.items():
             if name not in there:
