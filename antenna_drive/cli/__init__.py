@@ -80,6 +80,7 @@ COMMANDS = {
     'predict': Command('predict', 'predict a recording that the diagnosis has not seen'),
     'diagnose-many': Command('diagnose_many', 'the diagnosis of many machines, one row each'),
     'trial': Command('trial', 'make sealed test cases with an independent antenna'),
+    'trial-without': Command('trial_without', 'leave true effects out of the catalogue'),
     'trial-next': Command('trial_next', 'try designed tests on sealed cases'),
     'twin-trial': Command('twin_trial', 'test the twin on sealed antennas that change'),
     'score': Command('score', 'score the verdicts of a trial against its truths'),

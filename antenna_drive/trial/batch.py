@@ -279,6 +279,39 @@ def diagnose_case(case: Path, options: Sequence[str], limit: float,
     return False
 
 
+def diagnose_recordings(case: Path, recordings: Sequence[str], name: str, limit: float,
+                        options: Sequence[str]) -> str:
+    """
+    Diagnose some recordings of a case in a process of its own, unless that was done before.
+
+    Parameters
+    ----------
+    case
+        folder of the case
+    recordings
+        names of the recordings in it
+    name
+        of the verdict in it; it is there only if the diagnosis succeeds
+    limit
+        time limit [s]
+    options
+        further options for the diagnosis
+
+    Returns
+    -------
+    what the diagnosis said; empty if it was done before
+
+    """
+    if (case / name).exists():
+        return ''
+    draft = case / f'.{name}.{os.getpid()}'
+    said = run_command(['diagnose', *(str(case / f'{item}.csv') for item in recordings),
+                        '--jobs', '1', '--json', str(draft), *options], limit)
+    if draft.exists():
+        os.replace(draft, case / name)
+    return said
+
+
 def predict_kept(case: Path, options: Sequence[str], kept: Path) -> bool:
     """
     Predict the recording that was kept back, before and after, and name it in the verdict.

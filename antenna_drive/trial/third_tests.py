@@ -26,14 +26,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 import json
 import math
-import os
 from pathlib import Path
 from typing import Any
 
 from antenna_drive.errors import one_line
 from antenna_drive.subcommand import run_command
 from antenna_drive.trial import programme, sealing
-from antenna_drive.trial.batch import Done, FORMATS, make_case, write_csv
+from antenna_drive.trial.batch import (
+    diagnose_recordings, Done, FORMATS, make_case, write_csv,
+)
 from antenna_drive.trial.cases import build_machine, make_recording, sheet_of, Truth
 from antenna_drive.trial.real_antenna import simulate
 from antenna_drive.trial.scorecard import Case, rate
@@ -125,7 +126,7 @@ def _is_open(folder: Path, truth: Truth, limit: float, options: Sequence[str]) -
     if not case.is_dir():
         make_case(folder, truth)
     if not (case / OPEN_FILE).exists():
-        _diagnose(case, FIRST, 'two.json', limit, options)
+        diagnose_recordings(case, FIRST, 'two.json', limit, options)
         try:
             verdict = is_open(read_verdict(case / 'two.json'))
         except VerdictError:
@@ -172,7 +173,7 @@ def _third_test(case: Path, truth: Truth, rule: str, limit: float,
         whole, number).items() if key in COLUMNS}, FORMATS)
     sealing.write_whole(case / f'{name}.yaml', yaml.safe_dump(
         {key: value for key, value in sheet.items() if key != 'sensors'}, sort_keys=False))
-    said = _diagnose(case, (*FIRST, name), f'three_{rule}.json', limit, options)
+    said = diagnose_recordings(case, (*FIRST, name), f'three_{rule}.json', limit, options)
     told = _told(case / f'three_{rule}.json', truth)
     if not told:
         return {'failure': one_line(said, 300)}
@@ -205,19 +206,6 @@ def reached(truth: Truth, number: int) -> dict[str, float]:
             'acceleration_deg_s2': math.degrees(float(np.abs(acceleration).max())),
             'travel_deg': math.degrees(float(np.ptp(history.axis_angle))),
             'current_A': float(np.abs(history.current).max())}
-
-
-def _diagnose(case: Path, recordings: Sequence[str], name: str, limit: float,
-              options: Sequence[str]) -> str:
-    """Diagnose recordings of a case in a process of its own; return what it said."""
-    if (case / name).exists():
-        return ''
-    draft = case / f'.{name}.{os.getpid()}'
-    said = run_command(['diagnose', *(str(case / f'{item}.csv') for item in recordings),
-                        '--jobs', '1', '--json', str(draft), *options], limit)
-    if draft.exists():
-        os.replace(draft, case / name)
-    return said
 
 
 def _told(path: Path, truth: Truth) -> dict[str, Any]:

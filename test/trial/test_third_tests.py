@@ -80,7 +80,8 @@ class Commands:
 @pytest.fixture
 def commands(monkeypatch: pytest.MonkeyPatch) -> Commands:
     found = Commands()
-    monkeypatch.setattr(third_tests, 'run_command', found)
+    for module in (batch, third_tests):
+        monkeypatch.setattr(module, 'run_command', found)
     monkeypatch.setattr(third_tests, 'DURATION_S', 2.0)
     monkeypatch.setattr(third_tests, 'make_case', lambda folder, truth: (
         folder / truth['case']).mkdir())

@@ -1,0 +1,76 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Diagnose cases of a trial again, each without its true effect in the catalogue.
+
+A machine's fault may be on no list. So cases whose single effect was named first are diagnosed
+again with that effect, and the same effect in other places, left out. The probability of
+'unknown' must rise. `antenna-drive trial --diagnose` makes the cases; those that are not
+diagnosed yet, or were not right, are not used. The second verdict is DIR/case_0001/without.json.
+The same command resumes an interrupted trial.
+
+The exit code is 1 if no case could be diagnosed.
+
+For example:
+  antenna-drive trial-without wild7 --cases 20
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+import shlex
+
+from antenna_drive.cli.output import add_json_option, check_options, give, Progress
+from antenna_drive.cli.sharing import add_diagnosis_options
+from antenna_drive.parameters.schema import Entry
+from antenna_drive.trial.left_out import RISE, run_trial, SURE
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.add_argument('trial', type=Path, metavar='DIR', help='folder of a diagnosed trial')
+    parser.add_argument('--cases', type=int, default=20, metavar='N',
+                        help='how many cases, in their order (default: %(default)s)')
+    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
+                        help='diagnoses at a time (default: %(default)s here)')
+    add_diagnosis_options(parser, '--config my.yaml')
+    parser.add_argument('--quiet', action='store_true', help='show no progress')
+    add_json_option(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Diagnose the cases again, and print what became of 'unknown'."""
+    check_options(arguments, cases=Entry('', 1, whole=True), jobs=Entry('', 1, whole=True))
+    with Progress('without', arguments.cases, quiet=arguments.quiet) as progress:
+        found = run_trial(arguments.trial, arguments.cases, arguments.jobs, arguments.time_limit,
+                          shlex.split(arguments.diagnose_options),
+                          lambda done, total: progress.update(done))
+    lines = [f'{"case":10s} {"left out":34s} {"unknown before, after":>22s}  named now']
+    lines += [f'{row["case"]:10s} {row["effect"]:34s} {row["unknown_before"]:13.2f} '
+              f'{row["unknown_after"]:8.2f}  {" + ".join(row["named"])}, {row["probability"]:.2f}'
+              for row in found['cases']]
+    if found['cases']:
+        lines.append(f"probability of 'unknown' rises by {found['median_rise']:.2f} (median), "
+                     f'{found["mean_rise"]:.2f} (mean)')
+        for key, words in (('recognised', f'by {RISE:g} or more in'),
+                           ('named_wrongly', f'something else is named above {SURE:g} in')):
+            low, high = found[f'{key}_ci95']
+            lines.append(f'{words} {found[key]:.2f} ({low:.2f} to {high:.2f}) '
+                         f'of {len(found["cases"])} cases')
+    if found['failures']:
+        lines.append(f'{found["failures"]} diagnoses failed')
+    give(found, arguments.json, '\n'.join(lines))
+    return 0 if found['cases'] else 1
