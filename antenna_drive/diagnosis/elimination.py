@@ -40,6 +40,9 @@ class Fits(Protocol):
     def without(self, hypothesis: Hypothesis, effect: str) -> Hypothesis:
         """Return a hypothesis without one of its effects, fitted until it has converged."""
 
+    def joined(self, hypothesis: Hypothesis) -> Hypothesis | None:
+        """Return one effect in place of the same one in each of its places; None if not so."""
+
     def with_another(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         """Return a hypothesis whose fit has converged with each of a few more effects."""
 
@@ -55,6 +58,8 @@ def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings:
                          ) -> tuple[list[Hypothesis], Hypothesis]:
     """
     Test each doubtful effect of the best hypothesis, until the best has none.
+
+    Where its effects are one effect in each of its places, this one is tried, too.
 
     Parameters
     ----------
@@ -81,13 +86,17 @@ def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings:
         doubtful = {effect: rest for effect, rest in rests.items() if rest not in tried and min(
             found[rest].cost - best.cost if rest in found else math.inf,
             converged.loss_without(effect)) < settings.search.doubtful * best.cost}
-        if not doubtful:
+        simplified = [fits.without(converged, effect) for effect in doubtful]
+        tried.update(doubtful.values())
+        if (key := frozenset(best.effects)) not in tried and (whole := fits.joined(converged)):
+            tried.add(key)
+            simplified.append(whole)
+        if not simplified:
             return list(found.values()), converged
-        for effect, rest in doubtful.items():
-            tried.add(rest)
-            simpler = fits.without(converged, effect)
+        for simpler in simplified:
             # all other fits are taken to be as far from convergence as that of the best was
             behind = simpler.cost + best.cost - converged.cost
+            rest = frozenset(simpler.effects)
             if rest not in found or behind < found[rest].cost:
                 found[rest] = replace(simpler, state=replace(simpler.state, cost=behind))
         leading = verdict.best(list(found.values()), settings)
@@ -110,12 +119,13 @@ def settled_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesi
     first = found[frozenset(best.effects)]
     behind = first.cost - best.cost
     size = len(best.effects)
+    close = max(options.close, options.close_share * first.cost)
     rivals = [h for h in hypotheses if h is not first and len(h.effects) == size > 0
-              and h.penalised(price) < first.penalised(price) + options.close]
+              and h.penalised(price) < first.penalised(price) + close]
     # a member that is no larger than its tolerance only helped the fit of the others along
     helped = [(h, effect) for h in hypotheses for effect in sorted(set(h.effects) - set(h.named))
               if len(h.effects) == size + 1 > 1 and set(h.effects) - {effect} != set(best.effects)
-              and h.cost < first.cost + options.close]
+              and h.cost < first.cost + close]
     ends: list[tuple[float, Callable[[], Hypothesis]]] = [
         *((h.cost, partial(fits.converged, h)) for h in rivals),
         *((h.cost, partial(fits.without, h, effect)) for h, effect in helped)]

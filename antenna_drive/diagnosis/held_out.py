@@ -136,8 +136,8 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads:
 
 def refuted(reach: Mapping[str, Any]) -> bool:
     """Return whether effects close nothing of the gap of withheld data; all could be judged."""
-    most = reach['explained_fraction']['ci95'][1]
-    return most is not None and most <= 0.0 and not any(
+    closed = reach['explained_fraction']['value']
+    return closed is not None and closed <= 0.0 and not any(
         fold['judged'] and fold['cannot_be_judged'] for fold in reach['folds'])
 
 

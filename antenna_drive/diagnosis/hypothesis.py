@@ -78,16 +78,18 @@ class Hypothesis:
         Return what the fit would lose without one of its effects, were it quadratic.
 
         Half of Wald's statistic: the square of the effect's sizes in the metric of their own
-        precision, with the nuisances following.
+        precision, with the nuisances following. Up to its tolerance, a nuisance may take over.
         """
         form = self.forms[self.effects.index(effect)]
         sizes = {p.name for p in form.sizes}
         places = [j for j, p in enumerate(self.state.parameters) if p.name in sizes]
+        beyond = np.array([max(abs(self.state.x[j]) - self.state.parameters[j].tolerance, 0.0)
+                           * np.sign(self.state.x[j]) for j in places])
         precision = self.state.hessian + np.diag(proper_precision(self.state.parameters))
         unit = np.sqrt(np.diag(precision))
         # what rounding leaves undetermined has no curvature of its own
         covariance = np.linalg.pinv(precision / np.outer(unit, unit), 1e-6, hermitian=True)
-        scaled = self.state.x[places] * unit[places]
+        scaled = beyond * unit[places]
         return 0.5 * float(scaled @ np.linalg.pinv(
             covariance[np.ix_(places, places)], hermitian=True) @ scaled)
 

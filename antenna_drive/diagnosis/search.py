@@ -32,6 +32,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
+from statistics import fmean
 from typing import Any, TypeVar
 
 from antenna_drive.diagnosis.hypothesis import Hypothesis
@@ -96,7 +97,8 @@ class Search:
         """Return every hypothesis that was fitted to the whole tests, 'none' first."""
         self.progress(0.0, 'nuisances')
         none, singles = self._none_and_singles()
-        singles = self._leading_settled(self._at_lower_noise(singles))
+        singles = self._at_lower_noise(singles)
+        singles = self._leading_settled(singles, self._wanted(singles[0]))
         if self.problem.scale > 1.0:
             singles = self._at_lower_noise(self._exchanged(singles))
         self.progress(0.5, 'pairs of effects')
@@ -163,6 +165,10 @@ class Search:
             return None
         return Hypothesis((), (), self._at_falling_noise(state))
 
+    def _leaves_much(self, hypothesis: Hypothesis) -> bool:
+        """Return whether a hypothesis leaves more than the noise that is assumed."""
+        return self.problem.noise_level(hypothesis.state.residual) > self.settings.wanting
+
     def _at_noise(self, level: float) -> LeastSquares:
         """Return the problem with the misfit as noise, or the sensors' noise if it is small."""
         return self.problem.at_scale(level if level > self.settings.strong else 1.0)
@@ -178,7 +184,7 @@ class Search:
                 break
             self.sensitivities = rescaled(self.sensitivities, self.problem.scale / problem.scale)
             self.problem = problem
-            finalists = found[:self.settings.finalists]
+            finalists = found[:self.settings.most_finalists]
             shared = self._shared_jacobian(problem, best, finalists)
             found = self._sorted(partial(
                 self._refitted, problem, shared, self.settings.iterations), finalists)
@@ -206,6 +212,10 @@ class Search:
     def _priced(self, hypothesis: Hypothesis) -> float:
         return hypothesis.penalised(self.problem.settings.penalty)
 
+    def _reach(self, price: float) -> float:
+        """Return the excess over the best price beyond which a fit is given up."""
+        return max(self.settings.reach, self.settings.reach_share * price)
+
     def _singles(self, none: Hypothesis) -> list[Hypothesis]:
         options = self.settings
         self.progress(0.15, 'sensitivity to each effect')
@@ -215,7 +225,7 @@ class Search:
             lambda entry: self._added(none, entry[1], entry[1].jacobian),
             screened(self.problem, none.state, self.sensitivities)[:options.singles],
             options.finalists)
-        if self.problem.scale > 1.0:
+        if self._leaves_much(none):
             found += self._sorted(
                 lambda entry: self._added_at(none, *entry),
                 scan(self.problem, none.state, self.sensitivities), options.finalists)
@@ -260,7 +270,12 @@ class Search:
         return replace(hypothesis, state=self.problem.fit(
             state, self.settings.settling_iterations))
 
-    def _leading_settled(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+    def _wanted(self, best: Hypothesis) -> int:
+        """Return how many fits to go on with: more if the best leaves much and may be wrong."""
+        return (self.settings.most_finalists if self._leaves_much(best)
+                else self.settings.bases)
+
+    def _leading_settled(self, hypotheses: Sequence[Hypothesis], count: int) -> list[Hypothesis]:
         """Go on with the best fits: one that has stopped early hides what its effect can do."""
         options = self.settings
 
@@ -269,8 +284,8 @@ class Search:
                 self.problem, hypothesis.state, options, options.settling_passes,
                 options.settling_iterations))
 
-        leading = self._pool.map(went_on, hypotheses[:options.bases])
-        return sorted([*leading, *hypotheses[options.bases:]], key=self._priced)
+        leading = self._pool.map(went_on, hypotheses[:count])
+        return sorted([*leading, *hypotheses[count:]], key=self._priced)
 
     def _with_relatives(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """
@@ -353,7 +368,7 @@ class Search:
         options = self.settings
         best = singles[0]
         # beside the best, another effect may look different: it may have hidden a ripple
-        if self.problem.noise_level(best.state.residual) > options.wanting:
+        if self._leaves_much(best):
             self._take_sensitivities(best.state)
         worth = max(options.partner_gain, options.partner_gain_share * best.cost)
         found: dict[tuple[str, ...], Hypothesis] = {}
@@ -379,7 +394,7 @@ class Search:
 
     def _improved(self, pairs: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Go on with the best pair, and try others in the place of each of its effects."""
-        found = self._with_relatives(self._leading_settled(pairs))
+        found = self._with_relatives(self._leading_settled(pairs, self.settings.bases))
         if self.problem.scale > 1.0:
             found = self._at_lower_noise(self._exchanged(found))
         return found
@@ -425,7 +440,7 @@ class Search:
         least = min(self._priced(h) for h in (*singles, *pairs))
         chosen = [singles[0], *(
             h for h in (*singles[1:options.full_singles], *pairs[:options.full_pairs])
-            if self._priced(h) < least + options.reach)]
+            if self._priced(h) < least + self._reach(least))]
         if pairs and self._priced(pairs[0]) < self._priced(singles[0]):
             # each member alone, with the nuisances of the pair
             known = {(h.effects, h.forms) for h in chosen}
@@ -441,6 +456,11 @@ class Search:
             shared = self._shared_jacobian(whole, anchor.state, chosen)
             # the first pass is never the last, and only the last one's Hessian is asked for
             refitted = partial(self._refitted_in_full, shared, number > 0)
+            if not number and len(anchor.effects) > 1:
+                # from far away, with the derivatives of a pair, a fit may get stuck
+                place, first = next((i, h) for i, h in enumerate(chosen) if len(h.effects) == 1)
+                own = self._shared_jacobian(whole, first.state, [first])
+                chosen[place] = self._refitted_in_full(own, False, first)
             chosen = self._sorted(refitted, chosen)
             singles = [h for h in chosen if len(h.effects) == 1]
             bare = [none] if number else [none, self._dropped(singles[0], singles[0].effects[0])]
@@ -453,7 +473,8 @@ class Search:
                 continue
             reached = self._priced(anchor)
             chosen = [singles[0], *(h for h, price in zip(chosen, priced, strict=True)
-                                    if h is not singles[0] and price < reached + options.reach)]
+                                    if h is not singles[0]
+                                    and price < reached + self._reach(reached))]
             if number and before - reached < max(options.settled, options.settled_share * reached):
                 break
             before = reached
@@ -523,6 +544,35 @@ class Search:
         rest = self.converged(replace(
             rest, state=self.whole.fit(state, self.settings.iterations)))
         return rest.without_jacobian(keep_hessian=True)
+
+    def joined(self, hypothesis: Hypothesis) -> Hypothesis | None:
+        """
+        Return a hypothesis with one effect in all of its places, not in each by itself.
+
+        None if its effects are not all the parts of one, in one form. The fit has converged.
+        """
+        effects = self.machine.effects
+        whole = next((item for item in effects.values()
+                      if item.parts and set(item.parts) == set(hypothesis.effects)), None)
+        if whole is None:
+            return None
+        form, *others = {
+            self.machine.counterpart(form, effects[effect], whole)
+            for effect, form in zip(hypothesis.effects, hypothesis.forms, strict=True)}
+        if others:
+            return None
+        point = hypothesis.state.point()
+        for p, *own in zip(form.parameters, *(f.parameters for f in hypothesis.forms),
+                           strict=True):
+            point[p.name] = fmean(point.pop(part.name) for part in own)
+        names = hypothesis.parameters_of(hypothesis.effects)
+        free = {p.name: p for p in self.machine.nuisances}
+        nuisances = [free.get(p.name, p) for p in hypothesis.state.parameters
+                     if p.name not in names]
+        state = self.whole.start((*nuisances, *form.parameters), point)
+        one = self.converged(Hypothesis(
+            (whole.id,), (form,), self.whole.fit(state, self.settings.iterations)))
+        return one.without_jacobian(keep_hessian=True)
 
     def _dropped(self, hypothesis: Hypothesis, effect: str) -> Hypothesis:
         """Return a hypothesis without one of its effects, not yet fitted."""

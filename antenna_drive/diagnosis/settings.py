@@ -32,6 +32,7 @@ TRIAL_0 = 'trial 0'
 TRIAL_2 = 'trial 2'
 TRIAL_6 = 'trial 6'
 TRIAL_7 = 'trial 7'
+TRIAL_9 = 'trial 9'
 WILD = 'wild practice cases'
 
 
@@ -82,6 +83,8 @@ class SearchSettings:
     singles: int = _setting(
         12, '1', 'effects that are fitted after the screening', PRACTICE)
     finalists: int = _setting(5, '1', 'single effects that are fitted further', PRACTICE)
+    most_finalists: int = _setting(
+        7, '1', 'the same where the best of them leaves much', TRIAL_9)
     bases: int = _setting(3, '1', 'single effects that are given partners', PRACTICE)
     partners: int = _setting(5, '1', 'partners that are fitted for each of them', PRACTICE)
     partner_gain: float = _setting(
@@ -98,6 +101,8 @@ class SearchSettings:
     reach: float = _setting(
         250.0, 'half chi-square', 'excess over the best cost beyond which a fit is given up',
         PRACTICE)
+    reach_share: float = _setting(
+        0.1, '1', 'the same as a share of that cost: fits stop early', TRIAL_9)
     strong: float = _setting(
         1.5, 'noise sigma', 'residual level from which the misfit counts as noise', PRACTICE)
     sharper: float = _setting(
@@ -120,6 +125,7 @@ class SearchSettings:
     close: float = _setting(
         30.0, 'half chi-square', 'excess over the best cost up to which another fit is taken to '
         'its end, too', TRIAL_6)
+    close_share: float = _setting(0.05, '1', 'the same as a share of that cost', TRIAL_9)
     rivals: int = _setting(2, '1', 'greatest number of them', TRIAL_6)
     scanned: int = _setting(
         5, '1', 'effects that are fitted from a value found by a scan', PRACTICE)

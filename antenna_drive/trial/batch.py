@@ -398,6 +398,9 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
             for path in [here / KEPT / name / f'{KEPT_BACK}.csv']}
     complete, failures = len(names) - len(wanted), 0
     done(complete, len(names))
+    if scheduler is None:
+        # more threads than cores only take turns
+        options = ['--jobs', str(max(1, (os.cpu_count() or 1) // jobs)), *options]
     late = [(here, here / name, options, limit, path) for name, path in kept.items()
             if path is not None and _unpredicted(folder / name)]
     tasks = [*late, *((here, here / name, options, limit, kept[name],

@@ -95,6 +95,16 @@ def test_only_what_could_be_judged_in_full_is_refuted() -> None:
     assert not refuted(turned)
 
 
+@pytest.mark.parametrize('value, interval, expected', [
+    (0.0, [0.0, 1.0], True),     # withheld data have no gap: nothing is to be explained
+    (-0.1, [-0.6, 0.4], True), (0.1, [-0.4, 0.6], False), (None, [None, None], False)])
+def test_the_share_itself_refutes_not_its_interval(
+        value: float | None, interval: list[float | None], expected: bool) -> None:
+    reach = {'explained_fraction': {'value': value, 'ci95': interval},
+             'folds': [{'judged': ['a'], 'cannot_be_judged': {}}]}
+    assert refuted(reach) == expected
+
+
 def test_an_exact_correction_explains_all_within_its_interval() -> None:
     """Here a fit without noise ends at the truth; with it, the interval reaches one."""
     fraction = judged(Ramp([0.5, 0.5, 0.5]))['explained_fraction']

@@ -186,6 +186,11 @@ class Ends:
         self.asked.append(rest)
         return fitted(rest, self.ends[rest])
 
+    def joined(self, hypothesis: Hypothesis) -> Hypothesis | None:
+        whole = ('both',)
+        return fitted(whole, self.ends[whole]) if (
+            hypothesis.effects == ('one', 'two') and whole in self.ends) else None
+
     def with_another(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         return [fitted(more, cost) for more, cost in self.ends.items()
                 if set(hypothesis.effects) < set(more)]
@@ -205,6 +210,20 @@ def test_a_fit_of_the_offsets_that_got_stuck_raises_no_alarm() -> None:
     assert end.effects == best(hypotheses, DEFAULT).effects == ()
     # others are as far from their ends as the best was: two
     assert [c.cost for c in hypotheses] == [15992.0, 16002.0]
+
+
+def test_one_effect_in_both_places_is_preferred_to_one_in_each() -> None:
+    fits = Ends({(): 90000.0, ('one', 'two'): 11200.0, ('both',): 11230.0})
+    hypotheses, end = backward_elimination(
+        fits, [fitted((), 90000.0), fitted(('one', 'two'), 12200.0),
+               fitted(('both',), 14900.0)], DEFAULT)
+    assert end.effects == ('both',)
+    assert {c.effects: c.cost for c in hypotheses}['both',] == 12230.0
+    # but not where each has a size of its own
+    fits = Ends({(): 90000.0, ('one', 'two'): 11200.0, ('both',): 14000.0})
+    assert backward_elimination(fits, [
+        fitted((), 90000.0), fitted(('one', 'two'), 11200.0)], DEFAULT)[1].effects == (
+            'one', 'two')
 
 
 def test_a_partner_that_only_helped_a_fit_along_is_let_go() -> None:
@@ -231,7 +250,8 @@ def test_what_a_quadratic_fit_loses_without_an_effect() -> None:
     jacobian = random.normal(size=(50, 3))
     jacobian[:, 2] += jacobian[:, 0]
     target = jacobian @ [0.3, -0.2, 1.0] + 0.1 * random.normal(size=50)
-    parameters = tuple(replace(NUMBER, name=name, prior_sigma=0.0, low=-1e6, high=1e6)
+    parameters = tuple(replace(NUMBER, name=name, prior_sigma=0.0, low=-1e6, high=1e6,
+                               tolerance=0.0)
                        for name in ('first', 'second', 'a.size'))
     x, (left,), *_ = np.linalg.lstsq(jacobian, target, rcond=None)
     _, (without,), *_ = np.linalg.lstsq(jacobian[:, :2], target, rcond=None)
@@ -240,16 +260,22 @@ def test_what_a_quadratic_fit_loses_without_an_effect() -> None:
         parameters, np.asarray(x, float), blank, np.zeros((0, 0), np.float32), blank, 0.5 * left,
         kept_hessian=jacobian.T @ jacobian))
     assert hypothesis.loss_without('a') == pytest.approx(0.5 * (without - left), rel=1e-6)
+    # up to its tolerance the effect may stay, as an offset that every machine has
+    _, (within,), *_ = np.linalg.lstsq(jacobian[:, :2], target - 0.4 * jacobian[:, 2], rcond=None)
+    tolerated = (*parameters[:2], replace(parameters[2], tolerance=0.4))
+    hypothesis = Hypothesis(('a',), (Form('', tolerated[2:]),), replace(
+        hypothesis.state, parameters=tolerated))
+    assert hypothesis.loss_without('a') == pytest.approx(0.5 * (within - left), rel=1e-6)
 
 
 def test_a_close_rival_is_taken_to_its_end_before_one_is_named() -> None:
     fits = Ends({('a',): 15995.0, ('b',): 15970.0, ('c',): 15000.0})
     found = [fitted((), 90000.0), fitted(('a',), 16000.0), fitted(('b',), 16010.0),
-             fitted(('c',), 16500.0)]
+             fitted(('c',), 17500.0)]  # not close
     hypotheses, end = settled_rivals(fits, found, fitted(('a',), 15995.0), DEFAULT)
     assert (end.effects, end.cost) == (('b',), 15970.0)
     # costs stay comparable: all but the rival are as far from their ends as the first was, five
-    assert [h.cost for h in hypotheses] == [90000.0, 16000.0, 15975.0, 16500.0]
+    assert [h.cost for h in hypotheses] == [90000.0, 16000.0, 15975.0, 17500.0]
     assert best(hypotheses, DEFAULT).effects == ('b',)
 
 
