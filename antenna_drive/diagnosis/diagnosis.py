@@ -34,6 +34,7 @@ from antenna_drive.diagnosis.elimination import (
     backward_elimination, forward_selection, settled_rivals,
 )
 from antenna_drive.diagnosis.evidence import Evidence
+from antenna_drive.diagnosis.full_fits import FullFits
 from antenna_drive.diagnosis.held_out import held_out, refuted
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.intervals import inflation, jackknife, values_with_intervals
@@ -191,13 +192,18 @@ def diagnose(machine: Machine, progress: Progress = lambda share, doing: None, t
 def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Settings,
               limits: Mapping[str, float]) -> Diagnosis:
     began = time.monotonic()
-    search = Search(LeastSquares(machine, settings=settings),
-                    lambda share, doing: progress(0.9 * share, doing), threads)
-    hypotheses, best = backward_elimination(search, search.run(), settings)
-    hypotheses, best = settled_rivals(search, hypotheses, best, settings)
-    hypotheses, best = forward_selection(search, hypotheses, best, settings)
+    whole = LeastSquares(machine, settings=settings)
+
+    def told(share: float, doing: str) -> None:
+        progress(0.9 * share, doing)
+
+    fits = FullFits(whole, told, threads)
+    found = fits.compared(*Search(whole, told, threads).run())
+    hypotheses, best = backward_elimination(fits, found, settings)
+    hypotheses, best = settled_rivals(fits, hypotheses, best, settings)
+    hypotheses, best = forward_selection(fits, hypotheses, best, settings)
     # the noise is that of the motion that was found
-    problem = search.whole
+    problem = fits.problem
     hypotheses, best = simplified(problem, hypotheses, best)
     none, best = hypotheses[0], best.with_jacobian(problem)
     progress(0.9, 'withheld data')

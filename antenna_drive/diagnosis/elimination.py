@@ -32,7 +32,7 @@ from antenna_drive.diagnosis.settings import Settings
 
 
 class Fits(Protocol):
-    """What runs fits until they have converged, see `search.Search`."""
+    """What runs fits until they have converged, see `full_fits.FullFits`."""
 
     def converged(self, hypothesis: Hypothesis) -> Hypothesis:
         """Go on with a fit."""
@@ -64,7 +64,7 @@ def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings:
     Parameters
     ----------
     fits
-        the search that the hypotheses come from
+        to the whole tests, which the hypotheses come from
     hypotheses
         fitted ones, the nuisances alone first
     settings
@@ -151,7 +151,7 @@ def forward_selection(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypoth
     Parameters
     ----------
     fits
-        the search that the hypotheses come from
+        to the whole tests, which the hypotheses come from
     hypotheses
         from `backward_elimination`
     best

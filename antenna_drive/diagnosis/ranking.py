@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from antenna_drive.diagnosis import verdict
-from antenna_drive.diagnosis.hypothesis import Hypothesis
+from antenna_drive.diagnosis.full_fits import FullFits
 from antenna_drive.diagnosis.least_squares import LeastSquares
 from antenna_drive.diagnosis.machine import Machine
 from antenna_drive.diagnosis.search import Search
@@ -42,8 +42,12 @@ class Ranking:
     confusable: Sequence[Sequence[str]]
 
 
+def _untold(share: float, doing: str) -> None:
+    """Tell nobody how far it is."""
+
+
 def rank_hypotheses(machine: Machine, settings: Settings = DEFAULT) -> Ranking:
     """Search for the effects that a machine lacks, and rank what was found."""
-    found: list[Hypothesis] = Search(
-        LeastSquares(machine, settings=settings), lambda share, doing: None).run()
+    whole = LeastSquares(machine, settings=settings)
+    found = FullFits(whole, _untold).compared(*Search(whole, _untold).run())
     return Ranking(verdict.rank(found, 0.0, settings), verdict.confusable(found, settings))

@@ -20,41 +20,31 @@ The search for effects: from the nuisances alone over single effects to pairs.
 3. The best dozen are fitted, each together with all nuisances. If the best explains much, the
    noise is lowered to what it leaves, and the best are fitted again.
 4. Several of the best are given partners, and the pairs are fitted.
-5. The best singles and pairs are fitted to the whole tests at the sensors' own noise. 'None' is
-   fitted again from the nuisances of the best single effect, so that a fit that got stuck raises
-   no false alarm.
+
+All this is done with coarser steps of the simulation. The best are then fitted to the whole tests
+and compared (`full_fits`).
 """
 
 from __future__ import annotations
 
 from bisect import insort
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from statistics import fmean
 from typing import Any, TypeVar
 
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.least_squares import (
     FitState, Jacobian, LeastSquares, settled, with_initial_conditions,
 )
-from antenna_drive.diagnosis.machine import Effect, Form, Parameter, Point
-from antenna_drive.diagnosis.noise import same_noise, with_estimated_noise
+from antenna_drive.diagnosis.machine import Effect, Form, Point
+from antenna_drive.diagnosis.refitting import dropped, refitted, shared_jacobian
 from antenna_drive.diagnosis.screening import (
     jacobian_of_form, rescaled, scan, screened, sensitivities, Sensitivity,
 )
-import numpy as np
 
 Item = TypeVar('Item')
-
-
-@dataclass(frozen=True)
-class _SharedJacobian:
-    """Derivatives by the nuisances, and by the parameters of courses by their form's name."""
-
-    nuisances: Jacobian
-    courses: Mapping[str, Jacobian]
 
 
 def _others(hypothesis: Hypothesis, form: Form) -> list[int]:
@@ -74,7 +64,7 @@ class Search:
     Parameters
     ----------
     problem
-        the machine in its whole experiments
+        the machine in its experiments
     progress
         called with the share that is done, 0 to 1, and what is being done
     threads
@@ -86,15 +76,14 @@ class Search:
                  threads: int = 1) -> None:
         """Prepare to search."""
         self._pool = ThreadPoolExecutor(threads)
-        self.whole = problem
         self.settings = problem.settings.search
         self.machine = problem.machine.truncated()
         self.problem = LeastSquares(self.machine, settings=problem.settings)
         self.progress = progress
         self.sensitivities: list[Sensitivity] = []
 
-    def run(self) -> list[Hypothesis]:
-        """Return every hypothesis that was fitted to the whole tests, 'none' first."""
+    def run(self) -> tuple[Hypothesis, list[Hypothesis], list[Hypothesis]]:
+        """Return the nuisances alone, and what one effect and two can do, each the best first."""
         self.progress(0.0, 'nuisances')
         none, singles = self._none_and_singles()
         singles = self._at_lower_noise(singles)
@@ -109,7 +98,7 @@ class Search:
             # costs compare at one and the same noise only
             singles = [replace(h, state=self.problem.rescaled(h.state, scale)) for h in singles]
         self.progress(0.7, 'the best in full')
-        return self._in_full(none, singles, pairs)
+        return none, singles, pairs
 
     def _none_and_singles(self) -> tuple[Hypothesis, list[Hypothesis]]:
         """Fit the nuisances alone and with single effects, again where the former got stuck."""
@@ -158,7 +147,7 @@ class Search:
         own = self.settings.stuck * gain
         if best.has_course or best.loss_without(best.effects[0]) > own:
             return None
-        bare = self._dropped(best, best.effects[0]).state
+        bare = dropped(self.machine, best, best.effects[0]).state
         state = self.problem.fit(
             self.problem.start(bare.parameters, bare.point()), self.settings.iterations)
         if state.cost > best.cost + own:
@@ -185,9 +174,9 @@ class Search:
             self.sensitivities = rescaled(self.sensitivities, self.problem.scale / problem.scale)
             self.problem = problem
             finalists = found[:self.settings.most_finalists]
-            shared = self._shared_jacobian(problem, best, finalists)
+            shared = shared_jacobian(problem, best, finalists)
             found = self._sorted(partial(
-                self._refitted, problem, shared, self.settings.iterations), finalists)
+                refitted, problem, shared, self.settings.iterations), finalists)
         return found
 
     # -- single effects ------------------------------------------------------------------------
@@ -211,10 +200,6 @@ class Search:
 
     def _priced(self, hypothesis: Hypothesis) -> float:
         return hypothesis.penalised(self.problem.settings.penalty)
-
-    def _reach(self, price: float) -> float:
-        """Return the excess over the best price beyond which a fit is given up."""
-        return max(self.settings.reach, self.settings.reach_share * price)
 
     def _singles(self, none: Hypothesis) -> list[Hypothesis]:
         options = self.settings
@@ -323,7 +308,7 @@ class Search:
             return list(hypotheses)
         found: list[Hypothesis] = []
         for place, effect in enumerate(best.effects):
-            bare, kept = self._dropped(best, effect), _others(best, best.forms[place])
+            bare, kept = dropped(self.machine, best, effect), _others(best, best.forms[place])
             bare = replace(bare, state=self.problem.start(
                 bare.state.parameters, bare.state.point(), best.state.jacobian[:, kept]))
             found += self._pool.map(
@@ -425,203 +410,3 @@ class Search:
             point.update({part.name: value for part in own})
         state = self._in_place_of(base, base.forms[0], forms, point)
         return [Hypothesis(effect.parts, forms, state)]
-
-    # -- the whole tests -------------------------------------------------------------------------
-
-    def _in_full(self, none: Hypothesis, singles: Sequence[Hypothesis],
-                 pairs: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """
-        Fit the best hypotheses to the whole tests, 'none' first.
-
-        All share the derivatives by the nuisances. In each pass these are taken anew, where the
-        best hypothesis is then.
-        """
-        options = self.settings
-        least = min(self._priced(h) for h in (*singles, *pairs))
-        chosen = [singles[0], *(
-            h for h in (*singles[1:options.full_singles], *pairs[:options.full_pairs])
-            if self._priced(h) < least + self._reach(least))]
-        if pairs and self._priced(pairs[0]) < self._priced(singles[0]):
-            # each member alone, with the nuisances of the pair
-            known = {(h.effects, h.forms) for h in chosen}
-            chosen += [h for h in (self._dropped(pairs[0], e) for e in pairs[0].effects)
-                       if (h.effects, h.forms) not in known]
-        anchor = min(chosen, key=self._priced)
-        # the motion that was found may make readings noisier than the model without effects
-        self.whole = whole = LeastSquares(
-            self.whole.machine.with_noise_at(anchor.state.point()), settings=self.whole.settings)
-        before = np.inf
-        for number in range(options.passes):
-            self.progress(0.7 + 0.3 * number / options.passes, 'the best in full')
-            shared = self._shared_jacobian(whole, anchor.state, chosen)
-            # the first pass is never the last, and only the last one's Hessian is asked for
-            refitted = partial(self._refitted_in_full, shared, number > 0)
-            if not number and len(anchor.effects) > 1:
-                # from far away, with the derivatives of a pair, a fit may get stuck
-                place, first = next((i, h) for i, h in enumerate(chosen) if len(h.effects) == 1)
-                own = self._shared_jacobian(whole, first.state, [first])
-                chosen[place] = self._refitted_in_full(own, False, first)
-            chosen = self._sorted(refitted, chosen)
-            singles = [h for h in chosen if len(h.effects) == 1]
-            bare = [none] if number else [none, self._dropped(singles[0], singles[0].effects[0])]
-            none = self._sorted(refitted, bare)[0]
-            priced = [self._priced(h) for h in chosen]
-            anchor = chosen[0] if priced[0] < none.cost else none
-            if number + 1 < options.passes and self._noise_taken(anchor):
-                # costs compare at one and the same noise only
-                whole, before = self.whole, np.inf
-                continue
-            reached = self._priced(anchor)
-            chosen = [singles[0], *(h for h, price in zip(chosen, priced, strict=True)
-                                    if h is not singles[0]
-                                    and price < reached + self._reach(reached))]
-            if number and before - reached < max(options.settled, options.settled_share * reached):
-                break
-            before = reached
-        # the best form of each effect counts
-        unique = {frozenset(h.effects): h for h in sorted(
-            chosen, key=lambda h: -self._priced(h))}
-        return [none, *sorted(unique.values(), key=self._priced)]
-
-    def _noise_taken(self, best: Hypothesis) -> bool:
-        """Take the noise from what the best hypothesis leaves; return whether it is another."""
-        machine = self.whole.machine
-        point = best.state.point()
-        predicted = machine.simulate([point])[0]
-        residuals = [e.measured - p for e, p in zip(machine.experiments, predicted, strict=True)
-                     if p is not None]
-        experiments = with_estimated_noise(
-            machine.experiments, residuals, self.whole.settings.noise)
-        if same_noise(experiments[0], machine.experiments[0], self.whole.settings.noise):
-            return False
-        self.whole = LeastSquares(machine.with_experiments(experiments),
-                                  settings=self.whole.settings)
-        return True
-
-    def converged(self, hypothesis: Hypothesis) -> Hypothesis:
-        """Go on with a fit, with fresh derivatives, as long as that gains much."""
-        options = self.settings
-        return replace(hypothesis, state=settled(
-            self.whole, hypothesis.state, options, options.final_passes,
-            options.full_iterations))
-
-    def with_another(self, hypothesis: Hypothesis) -> list[Hypothesis]:
-        """Return a hypothesis whose fit has converged with each of a few more effects."""
-        state = hypothesis.state
-        known = sensitivities(self.whole, state, self._pool.map)
-        promising = [item for gain, item in screened(
-            self.whole, state, known, hypothesis.effects)[:self.settings.partners]
-            if gain > self.settings.partner_gain]
-
-        def added(item: Sensitivity) -> Hypothesis:
-            more = self.whole.extended(state, item.form.parameters, [
-                p.start for p in item.form.parameters], item.jacobian)
-            return Hypothesis(
-                (*hypothesis.effects, item.effect), (*hypothesis.forms, item.form),
-                self.whole.fit(more, self.settings.full_iterations)).without_jacobian(True)
-
-        return list(self._pool.map(added, promising))
-
-    def leaves_much(self, hypothesis: Hypothesis) -> bool:
-        """Return whether a hypothesis leaves more than noise in the whole tests."""
-        return self.whole.noise_level(hypothesis.state.residual) > self.settings.wanting
-
-    def judged_by(self, best: Hypothesis,
-                  hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """
-        Return hypotheses with their costs at the noise that one of them leaves.
-
-        Slow noise may be what an effect does that the others lack.
-        """
-        if not self._noise_taken(best):
-            return list(hypotheses)
-        return [replace(h, state=self.whole.judged(h.state)) for h in hypotheses]
-
-    def without(self, hypothesis: Hypothesis, effect: str) -> Hypothesis:
-        """Return a hypothesis without one of its effects, fitted until it has converged."""
-        rest = self._dropped(hypothesis, effect)
-        state = self.whole.start(rest.state.parameters, rest.state.point(), central=True)
-        rest = self.converged(replace(
-            rest, state=self.whole.fit(state, self.settings.iterations)))
-        return rest.without_jacobian(keep_hessian=True)
-
-    def joined(self, hypothesis: Hypothesis) -> Hypothesis | None:
-        """
-        Return a hypothesis with one effect in all of its places, not in each by itself.
-
-        None if its effects are not all the parts of one, in one form. The fit has converged.
-        """
-        effects = self.machine.effects
-        whole = next((item for item in effects.values()
-                      if item.parts and set(item.parts) == set(hypothesis.effects)), None)
-        if whole is None:
-            return None
-        form, *others = {
-            self.machine.counterpart(form, effects[effect], whole)
-            for effect, form in zip(hypothesis.effects, hypothesis.forms, strict=True)}
-        if others:
-            return None
-        point = hypothesis.state.point()
-        for p, *own in zip(form.parameters, *(f.parameters for f in hypothesis.forms),
-                           strict=True):
-            point[p.name] = fmean(point.pop(part.name) for part in own)
-        names = hypothesis.parameters_of(hypothesis.effects)
-        free = {p.name: p for p in self.machine.nuisances}
-        nuisances = [free.get(p.name, p) for p in hypothesis.state.parameters
-                     if p.name not in names]
-        state = self.whole.start((*nuisances, *form.parameters), point)
-        one = self.converged(Hypothesis(
-            (whole.id,), (form,), self.whole.fit(state, self.settings.iterations)))
-        return one.without_jacobian(keep_hessian=True)
-
-    def _dropped(self, hypothesis: Hypothesis, effect: str) -> Hypothesis:
-        """Return a hypothesis without one of its effects, not yet fitted."""
-        gone = hypothesis.effects.index(effect)
-        names = {p.name for p in hypothesis.forms[gone].parameters}
-        state, values = hypothesis.state, hypothesis.state.point()
-        free = {p.name: p for p in self.machine.nuisances}
-        kept = [j for j, p in enumerate(state.parameters) if p.name not in names]
-        own: list[Parameter] = [free.get(p.name, p) for p in (state.parameters[j] for j in kept)]
-        point = self.machine.absorb({p.name: values[p.name] for p in own},
-                                    {name: values[name] for name in names})
-        bare = replace(
-            state.without_jacobian(), parameters=tuple(own),
-            x=np.array([point[p.name] for p in own]),
-            kept_hessian=None if state.kept_hessian is None
-            else state.kept_hessian[np.ix_(kept, kept)])
-        return Hypothesis(
-            tuple(e for i, e in enumerate(hypothesis.effects) if i != gone),
-            tuple(f for i, f in enumerate(hypothesis.forms) if i != gone), bare)
-
-    def _shared_jacobian(self, problem: LeastSquares, state: FitState,
-                         hypotheses: Sequence[Hypothesis]) -> _SharedJacobian:
-        """Take the derivatives where a fit has ended, which several hypotheses share."""
-        point, steps = state.point(), problem.local_steps(state)
-        residual = problem.residuals(point)
-        # a course has so many parameters that its derivatives are worth sharing, and the
-        # prediction is nearly linear in them
-        courses = {form for h in hypotheses for form in h.forms if form.is_course}
-        return _SharedJacobian(
-            problem.jacobian(point, self.machine.nuisances, residual, False, steps),
-            {form.name: problem.jacobian(point, form.parameters, residual, False, steps)
-             for form in courses})
-
-    def _refitted_in_full(self, shared: _SharedJacobian, keep_hessian: bool,
-                          hypothesis: Hypothesis) -> Hypothesis:
-        """Fit a hypothesis to the whole tests and drop its Jacobian."""
-        return self._refitted(self.whole, shared, self.settings.full_iterations,
-                              hypothesis).without_jacobian(keep_hessian)
-
-    def _refitted(self, problem: LeastSquares, shared: _SharedJacobian, iterations: int,
-                  hypothesis: Hypothesis) -> Hypothesis:
-        """Fit a hypothesis to another problem, with shared derivatives."""
-        courses = [form for form in hypothesis.forms if form.name in shared.courses]
-        point, held = self.machine.take_over(hypothesis.state.point(), hypothesis.forms)
-        nuisances = [replace(p, low=0.0, high=0.0) if p.name in held else p
-                     for p in self.machine.nuisances]
-        state = problem.start_from(
-            (*nuisances, *(p for form in courses for p in form.parameters)),
-            np.column_stack([shared.nuisances, *(shared.courses[f.name] for f in courses)]),
-            [p for form in hypothesis.forms if form not in courses for p in form.parameters],
-            point)
-        return replace(hypothesis, state=problem.fit(state, iterations))

@@ -1,0 +1,85 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+A hypothesis somewhere else: at other noise, in whole tests, or without one of its effects.
+
+Several hypotheses share the derivatives by the nuisances, which cost most of a fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from antenna_drive.diagnosis.hypothesis import Hypothesis
+from antenna_drive.diagnosis.least_squares import FitState, Jacobian, LeastSquares
+from antenna_drive.diagnosis.machine import Machine, Parameter
+import numpy as np
+
+
+@dataclass(frozen=True)
+class SharedJacobian:
+    """Derivatives by the nuisances, and by the parameters of courses by their form's name."""
+
+    nuisances: Jacobian
+    courses: Mapping[str, Jacobian]
+
+
+def shared_jacobian(problem: LeastSquares, state: FitState,
+                    hypotheses: Sequence[Hypothesis]) -> SharedJacobian:
+    """Take the derivatives where a fit has ended, which several hypotheses share."""
+    point, steps = state.point(), problem.local_steps(state)
+    residual = problem.residuals(point)
+    # a course has so many parameters that its derivatives are worth sharing, and the
+    # prediction is nearly linear in them
+    courses = {form for h in hypotheses for form in h.forms if form.is_course}
+    return SharedJacobian(
+        problem.jacobian(point, problem.machine.nuisances, residual, False, steps),
+        {form.name: problem.jacobian(point, form.parameters, residual, False, steps)
+         for form in courses})
+
+
+def refitted(problem: LeastSquares, shared: SharedJacobian, iterations: int,
+             hypothesis: Hypothesis) -> Hypothesis:
+    """Fit a hypothesis to another problem, with shared derivatives."""
+    courses = [form for form in hypothesis.forms if form.name in shared.courses]
+    point, held = problem.machine.take_over(hypothesis.state.point(), hypothesis.forms)
+    nuisances = [replace(p, low=0.0, high=0.0) if p.name in held else p
+                 for p in problem.machine.nuisances]
+    state = problem.start_from(
+        (*nuisances, *(p for form in courses for p in form.parameters)),
+        np.column_stack([shared.nuisances, *(shared.courses[f.name] for f in courses)]),
+        [p for form in hypothesis.forms if form not in courses for p in form.parameters],
+        point)
+    return replace(hypothesis, state=problem.fit(state, iterations))
+
+
+def dropped(machine: Machine, hypothesis: Hypothesis, effect: str) -> Hypothesis:
+    """Return a hypothesis without one of its effects, not yet fitted."""
+    gone = hypothesis.effects.index(effect)
+    names = {p.name for p in hypothesis.forms[gone].parameters}
+    state, values = hypothesis.state, hypothesis.state.point()
+    free = {p.name: p for p in machine.nuisances}
+    kept = [j for j, p in enumerate(state.parameters) if p.name not in names]
+    own: list[Parameter] = [free.get(p.name, p) for p in (state.parameters[j] for j in kept)]
+    point = machine.absorb({p.name: values[p.name] for p in own},
+                           {name: values[name] for name in names})
+    bare = replace(
+        state.without_jacobian(), parameters=tuple(own),
+        x=np.array([point[p.name] for p in own]),
+        kept_hessian=None if state.kept_hessian is None
+        else state.kept_hessian[np.ix_(kept, kept)])
+    return Hypothesis(
+        tuple(e for i, e in enumerate(hypothesis.effects) if i != gone),
+        tuple(f for i, f in enumerate(hypothesis.forms) if i != gone), bare)
