@@ -16,6 +16,9 @@
 from __future__ import annotations
 
 import argparse
+import os
+
+from antenna_drive.cli.output import add_json_option
 
 
 def add_worker_options(parser: argparse.ArgumentParser, jobs: int) -> None:
@@ -34,3 +37,12 @@ def add_diagnosis_options(parser: argparse.ArgumentParser, example: str) -> None
     parser.add_argument('--time-limit', type=float, default=900.0, metavar='S',
                         help='time limit of a diagnosis, after which it counts as failed '
                              '(default %(default)s)')
+
+
+def add_batch_options(parser: argparse.ArgumentParser, of: str) -> None:
+    """Add what commands share that diagnose many cases; `of` is what `--jobs` counts."""
+    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
+                        help=f'{of} at a time (default: %(default)s here)')
+    add_diagnosis_options(parser, '--config my.yaml')
+    parser.add_argument('--quiet', action='store_true', help='show no progress')
+    add_json_option(parser)

@@ -28,12 +28,11 @@ A case takes about ten diagnoses. The same command resumes an interrupted trial:
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
 import shlex
 
-from antenna_drive.cli.output import add_json_option, check_options, give, Progress
-from antenna_drive.cli.sharing import add_diagnosis_options
+from antenna_drive.cli.output import check_options, give, Progress
+from antenna_drive.cli.sharing import add_batch_options
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.trial import batch, sealing
 from antenna_drive.trial.third_tests import RULES, run_trial
@@ -52,11 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='folder of the trial')
     parser.add_argument('--rules', nargs='+', choices=RULES, default=list(RULES), metavar='RULE',
                         help=f'some of {", ".join(RULES)} (default: all)')
-    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
-                        help='cases at a time (default: %(default)s here)')
-    add_diagnosis_options(parser, '--config my.yaml')
-    parser.add_argument('--quiet', action='store_true', help='show no progress')
-    add_json_option(parser)
+    add_batch_options(parser, 'cases')
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -29,12 +29,11 @@ For example:
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
 import shlex
 
-from antenna_drive.cli.output import add_json_option, check_options, give, Progress
-from antenna_drive.cli.sharing import add_diagnosis_options
+from antenna_drive.cli.output import check_options, give, Progress
+from antenna_drive.cli.sharing import add_batch_options
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.trial.left_out import RISE, run_trial, SURE
 
@@ -44,11 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('trial', type=Path, metavar='DIR', help='folder of a diagnosed trial')
     parser.add_argument('--cases', type=int, default=20, metavar='N',
                         help='how many cases, in their order (default: %(default)s)')
-    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
-                        help='diagnoses at a time (default: %(default)s here)')
-    add_diagnosis_options(parser, '--config my.yaml')
-    parser.add_argument('--quiet', action='store_true', help='show no progress')
-    add_json_option(parser)
+    add_batch_options(parser, 'diagnoses')
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -178,7 +178,7 @@ class FullFits:
 
     def leaves_much(self, hypothesis: Hypothesis) -> bool:
         """Return whether a hypothesis leaves more than noise in the whole tests."""
-        return self.problem.noise_level(hypothesis.state.residual) > self.settings.wanting
+        return self.problem.leaves_much(hypothesis.state)
 
     def judged_by(self, best: Hypothesis,
                   hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:

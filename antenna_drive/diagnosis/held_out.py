@@ -208,7 +208,7 @@ class _Judge:
             self._settings.held_out.iterations)
         search = self._settings.search
         if (unaided.cost < (1.0 + search.doubtful) * found.cost
-                or problem.noise_level(found.residual) > search.wanting):
+                or problem.leaves_much(found)):
             options = self._settings.held_out
             unaided = settled(problem, unaided, search, options.passes, options.iterations)
             found = min(found, self._added(problem, part, unaided), key=lambda s: s.cost)
@@ -285,7 +285,7 @@ class _Judge:
         own = {p.name for p in testing.parameters(self._nuisances) if p.experiment is not None}
         begin = {name: value for name, value in found.point().items() if name not in own}
         state = self._fitted(testing, self._nuisances, held, {**begin, **held}, self._with)
-        if problem.noise_level(state.residual) > self._settings.search.wanting:
+        if problem.leaves_much(state):
             # or where the fit without effects has left them
             again = self._fitted(testing, self._nuisances, held, {**bare.point(), **held},
                                  self._with)

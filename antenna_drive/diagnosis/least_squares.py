@@ -192,6 +192,10 @@ class LeastSquares:
                 np.minimum(z, self.settings.fit.outlier * level) ** 2)))
         return level
 
+    def leaves_much(self, state: FitState) -> bool:
+        """Return whether a fit leaves more than the sensors' noise."""
+        return self.noise_level(state.residual) > self.settings.search.wanting
+
     # -- beginning a fit -----------------------------------------------------------------------
 
     def jacobian(self, point: dict[str, float], parameters: Sequence[Parameter],

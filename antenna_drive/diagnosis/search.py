@@ -87,7 +87,7 @@ class Search:
         self.progress(0.0, 'nuisances')
         none, singles = self._none_and_singles()
         singles = self._at_lower_noise(singles)
-        singles = self._leading_settled(singles, self._wanted(singles[0]))
+        singles = self._leading_settled(singles, self._to_settle(singles[0]))
         if self.problem.scale > 1.0:
             singles = self._at_lower_noise(self._exchanged(singles))
         self.progress(0.5, 'pairs of effects')
@@ -154,10 +154,6 @@ class Search:
             return None
         return Hypothesis((), (), self._at_falling_noise(state))
 
-    def _leaves_much(self, hypothesis: Hypothesis) -> bool:
-        """Return whether a hypothesis leaves more than the noise that is assumed."""
-        return self.problem.noise_level(hypothesis.state.residual) > self.settings.wanting
-
     def _at_noise(self, level: float) -> LeastSquares:
         """Return the problem with the misfit as noise, or the sensors' noise if it is small."""
         return self.problem.at_scale(level if level > self.settings.strong else 1.0)
@@ -210,7 +206,7 @@ class Search:
             lambda entry: self._added(none, entry[1], entry[1].jacobian),
             screened(self.problem, none.state, self.sensitivities)[:options.singles],
             options.finalists)
-        if self._leaves_much(none):
+        if self.problem.leaves_much(none.state):
             found += self._sorted(
                 lambda entry: self._added_at(none, *entry),
                 scan(self.problem, none.state, self.sensitivities), options.finalists)
@@ -255,9 +251,9 @@ class Search:
         return replace(hypothesis, state=self.problem.fit(
             state, self.settings.settling_iterations))
 
-    def _wanted(self, best: Hypothesis) -> int:
+    def _to_settle(self, best: Hypothesis) -> int:
         """Return how many fits to go on with: more if the best leaves much and may be wrong."""
-        return (self.settings.most_finalists if self._leaves_much(best)
+        return (self.settings.most_finalists if self.problem.leaves_much(best.state)
                 else self.settings.bases)
 
     def _leading_settled(self, hypotheses: Sequence[Hypothesis], count: int) -> list[Hypothesis]:
@@ -353,7 +349,7 @@ class Search:
         options = self.settings
         best = singles[0]
         # beside the best, another effect may look different: it may have hidden a ripple
-        if self._leaves_much(best):
+        if self.problem.leaves_much(best.state):
             self._take_sensitivities(best.state)
         worth = max(options.partner_gain, options.partner_gain_share * best.cost)
         found: dict[tuple[str, ...], Hypothesis] = {}

@@ -84,7 +84,7 @@ class SearchSettings:
         12, '1', 'effects that are fitted after the screening', PRACTICE)
     finalists: int = _setting(5, '1', 'single effects that are fitted further', PRACTICE)
     most_finalists: int = _setting(
-        7, '1', 'the same where the best of them leaves much', TRIAL_9)
+        7, '1', 'fits that go on at lower noise, and where the best of them leaves much', TRIAL_9)
     bases: int = _setting(3, '1', 'single effects that are given partners', PRACTICE)
     partners: int = _setting(5, '1', 'partners that are fitted for each of them', PRACTICE)
     partner_gain: float = _setting(
