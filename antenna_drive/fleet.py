@@ -69,7 +69,7 @@ class FleetMachine:
 
 
 @dataclass(frozen=True)
-class Options:
+class FleetOptions:
     """
     What holds for every machine.
 
@@ -146,7 +146,7 @@ def _is_bag(folder: Path) -> bool:
     return any(folder.glob('*.mcap'))
 
 
-def diagnose_fleet(machines: Sequence[FleetMachine], out: Path, options: Options,
+def diagnose_fleet(machines: Sequence[FleetMachine], out: Path, options: FleetOptions,
                    workers: Workers, done: Callable[[int], None] = lambda count: None,
                    ) -> list[dict[str, Any]]:
     """
@@ -193,7 +193,8 @@ def diagnose_fleet(machines: Sequence[FleetMachine], out: Path, options: Options
     return [rows[machine.name] for machine in machines]
 
 
-def diagnosed(files: Mapping[str, bytes], recordings: Sequence[str], options: Options) -> Files:
+def diagnosed(files: Mapping[str, bytes], recordings: Sequence[str],
+              options: FleetOptions) -> Files:
     """
     Diagnose one machine in a process of its own.
 
@@ -313,7 +314,7 @@ def text(rows: Sequence[Mapping[str, Any]]) -> str:
     return '\n'.join(lines)
 
 
-def _files(machine: FleetMachine, options: Options) -> Files:
+def _files(machine: FleetMachine, options: FleetOptions) -> Files:
     """Return everything that a diagnosis reads, by the path under which it finds it."""
     files: Files = {}
     try:
@@ -341,7 +342,7 @@ def _shipped(config: str) -> str:
     return f'config/{hashlib.sha256(config.encode()).hexdigest()[:8]}/{Path(config).name}'
 
 
-def _key(machine: FleetMachine, options: Options) -> str:
+def _key(machine: FleetMachine, options: FleetOptions) -> str:
     """Return a digest of all that a verdict depends on."""
     digest = hashlib.sha256(repr((fingerprint(), options.config, options.diagnose,
                                   options.corrected)).encode())

@@ -114,7 +114,7 @@ class Measure(Protocol):
 
 
 @dataclass(frozen=True)
-class Reading:
+class Readout:
     """
     A figure taken from the run of one experiment.
 
@@ -221,22 +221,22 @@ def article_measures(drive: Drive) -> dict[str, Measure]:
     bias = {'motor_2/current': 100.0 / most, 'motor_1/current': -100.0 / most}
     voltage = {'torque_share/bias_voltage': 1.0}
     figures: list[Measure] = [
-        Reading('T1.tach_rate', 'deg/s', 'T1', 'plateau',
+        Readout('T1.tach_rate', 'deg/s', 'T1', 'plateau',
                 {name: degrees * weight for name, weight in tachs.items()}, plateau),
-        *(Reading(f'T1.current_{m}', 'A', 'T1', 'plateau', {f'motor_{m}/current': 1.0}, plateau)
+        *(Readout(f'T1.current_{m}', 'A', 'T1', 'plateau', {f'motor_{m}/current': 1.0}, plateau)
           for m in (1, 2)),
-        Reading('T2a.bias', 'percent', 'T2', 'mean', bias, whole_periods),
-        *(Reading(f'T2a.current_{m}', 'A', 'T2', 'mean', {f'motor_{m}/current': 1.0},
+        Readout('T2a.bias', 'percent', 'T2', 'mean', bias, whole_periods),
+        *(Readout(f'T2a.current_{m}', 'A', 'T2', 'mean', {f'motor_{m}/current': 1.0},
                   whole_periods) for m in (1, 2)),
-        Reading('T2b.tach', 'percent', 'T2', 'deviation',
+        Readout('T2b.tach', 'percent', 'T2', 'deviation',
                 {**tachs, 'test_signal/rate_command': -ratio}, calm, 'T1', 100.0),
-        Reading('T2b.encoder', 'percent', 'T2', 'deviation',
+        Readout('T2b.encoder', 'percent', 'T2', 'deviation',
                 {'plant/axis_rate': 1.0, 'test_signal/rate_command': -1.0}, calm, 'T1', 100.0),
-        Reading('step.overshoot', 'percent', 'step', 'overshoot', tachs, {}, None, 100.0),
+        Readout('step.overshoot', 'percent', 'step', 'overshoot', tachs, {}, None, 100.0),
     ]
     greatest = drive.torque_share.circuit.saturation_high
     for name in ('T3a', 'T3b'):
-        figures += [Reading(f'{name}.{quantity}', unit, name, quantity.removesuffix('_share'),
+        figures += [Readout(f'{name}.{quantity}', unit, name, quantity.removesuffix('_share'),
                             voltage, {'after': SAW_TOOTH['period']}, None, scale)
                     for quantity, unit, scale in (
                         ('low', 'V', 1.0), ('low_share', 'percent', 100.0 / greatest),
@@ -244,9 +244,9 @@ def article_measures(drive: Drive) -> dict[str, Measure]:
                         ('time_at_zero', 'percent', 100.0))]
     for name in ('T4a', 'T4e', *filter_variants()):
         figures += [
-            Reading(f'{name}.final', 'percent', name, 'final', bias),
-            Reading(f'{name}.overshoot', 'percent', name, 'overshoot', bias, {}, None, 100.0),
-            Reading(f'{name}.settling', 's', name, 'settling', bias)]
+            Readout(f'{name}.final', 'percent', name, 'final', bias),
+            Readout(f'{name}.overshoot', 'percent', name, 'overshoot', bias, {}, None, 100.0),
+            Readout(f'{name}.settling', 's', name, 'settling', bias)]
     by_name = {figure.name: figure for figure in figures}
     for row, numbers, kinds in (('T4b', GAINS, ('falls', 'falls')),
                                 ('T4d', LAGS, ('falls', 'falls then rises'))):

@@ -23,7 +23,7 @@ from typing import Any
 
 from antenna_drive.bench import measuring
 from antenna_drive.errors import UserError
-from antenna_drive.fleet import diagnose_fleet, FleetMachine, machines_of, Options
+from antenna_drive.fleet import diagnose_fleet, FleetMachine, FleetOptions, machines_of
 from antenna_drive.workers import workers
 
 _SEED = 20262
@@ -71,7 +71,7 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
 def _wall_time(machines: list[FleetMachine], out: Path, address: str) -> float:
     with workers(1, address) as pool:
         began = time.perf_counter()
-        rows = diagnose_fleet(machines, out, Options(), pool)
+        rows = diagnose_fleet(machines, out, FleetOptions(), pool)
         took = time.perf_counter() - began
     for row in rows:
         if row['failure'] is not None:

@@ -43,13 +43,13 @@ _STEP_PATIENCE_S = 0.05
 _OTHERS_READY_S = 8.0
 
 # The type of `own` and `bare`.
-Run = Callable[..., 'Exchange']
+Run = Callable[..., 'ExchangeRun']
 
 _PERCENTILES = (50.0, 99.0, 99.9)
 
 
 @dataclass(frozen=True)
-class Exchange:
+class ExchangeRun:
     """
     The records of five processes in one run.
 
@@ -111,13 +111,13 @@ class Exchange:
 
 
 def own(steps: int, step_s: float = STEP_S, pace: float = 0.0, publish_rate: float = 0.0,
-        placed: bool | None = None) -> Exchange:
+        placed: bool | None = None) -> ExchangeRun:
     """Run the drive's five nodes for some steps; publish_rate is that of their readings [Hz]."""
     return _run('antenna_drive.bench.measured_node', steps, step_s, pace,
                 _parameters(steps, step_s, pace, publish_rate), (), placed)
 
 
-def bare(steps: int, kind: str = 'python', placed: bool | None = None) -> Exchange:
+def bare(steps: int, kind: str = 'python', placed: bool | None = None) -> ExchangeRun:
     """Run the bare exchange for some steps, in Python or compiled."""
     return _run('antenna_drive.bench.bare_node', steps, STEP_S, 0.0,
                 {TEST_SIGNAL: {'run.pace': 0.0}}, (kind,), placed)
@@ -134,7 +134,7 @@ def _parameters(steps: int, step_s: float, pace: float, publish_rate: float,
 
 def _run(module: str, steps: int, step_s: float, pace: float,
          parameters: dict[str, dict[str, Parameter]], more: tuple[str, ...],
-         placed: bool | None = None, last_to_start: str = '') -> Exchange:
+         placed: bool | None = None, last_to_start: str = '') -> ExchangeRun:
     """Run five processes; `last_to_start` is started when the others have long been there."""
     with tempfile.TemporaryDirectory() as folder:
         files = {unit: Path(folder, f'{unit}.npz') for unit in UNITS}
@@ -164,7 +164,7 @@ def _run(module: str, steps: int, step_s: float, pace: float,
                 processes.start(last_to_start)
             wait_until(lambda: all(path.exists() for path in files.values()))
         nodes = {unit: read(path) for unit, path in files.items()}
-    return Exchange(step_s, pace, nodes, float(nodes[TEST_SIGNAL].times[1] - began), steal)
+    return ExchangeRun(step_s, pace, nodes, float(nodes[TEST_SIGNAL].times[1] - began), steal)
 
 
 def measure(repetitions: int, quick: bool, progress: Callable[[str], None],
@@ -197,7 +197,7 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None],
 
     steps = 1500 if quick else 5000
     result: dict[str, Any] = {'steps': steps, 'step_s': STEP_S}
-    kinds: dict[str, Callable[[], Exchange]] = {
+    kinds: dict[str, Callable[[], ExchangeRun]] = {
         'own': partial(own, steps, placed=False),
         'bare_compiled': partial(bare, steps, 'compiled', placed=False),
         'readings': partial(own, steps, publish_rate=100.0, placed=False),
@@ -208,7 +208,7 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None],
         'half_step': partial(own, steps, STEP_S / 2.0, publish_rate=100.0, placed=False),
         'busy': partial(_beside_a_busy_process, steps),
         'first': _first_step}
-    runs: dict[str, list[Exchange]] = {name: [] for name in kinds}
+    runs: dict[str, list[ExchangeRun]] = {name: [] for name in kinds}
     for turn in range(repetitions):
         for name, run in kinds.items():
             progress(f'as fast as possible, turn {turn + 1} of {repetitions}: {name}')
@@ -243,14 +243,14 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None],
     return result
 
 
-def _first_step() -> Exchange:
+def _first_step() -> ExchangeRun:
     """Start the node with the largest physics when all others wait for it."""
     steps = WARM_STEPS + 1
     return _run('antenna_drive.bench.measured_node', steps, STEP_S, 0.0,
                 _parameters(steps, STEP_S, 0.0, 0.0), (), False, MOTORS[0])
 
 
-def _beside_a_busy_process(steps: int) -> Exchange:
+def _beside_a_busy_process(steps: int) -> ExchangeRun:
     busy = subprocess.Popen([sys.executable, '-c', 'while True: pass'])
     try:
         return own(steps, publish_rate=100.0, placed=False)
@@ -281,7 +281,7 @@ def _percentiles(runs: list[Any]) -> dict[str, Any]:
             for percent in _PERCENTILES}
 
 
-def _cpu(runs: list[Exchange]) -> dict[str, Any]:
+def _cpu(runs: list[ExchangeRun]) -> dict[str, Any]:
     by_unit = {unit: [run.cpu_per_step(unit) for run in runs] for unit in UNITS}
     return {**{unit: measuring.figure(values, 's') for unit, values in by_unit.items()},
             'all': measuring.figure(np.sum(list(by_unit.values()), axis=0).tolist(), 's')}

@@ -36,7 +36,7 @@ from typing import Any
 from antenna_drive.article import readings
 from antenna_drive.article.experiments import DriveExperiment
 from antenna_drive.article.measures import (
-    article_experiments, article_measures, Measure, OLD_CIRCUIT, Reading, Results,
+    article_experiments, article_measures, Measure, OLD_CIRCUIT, Readout, Results,
 )
 from antenna_drive.parameters import Drive, load, ParameterError
 from antenna_drive.parameters.loading import find, MOTOR_SECTIONS, PLACES, SECTIONS
@@ -361,7 +361,7 @@ def _experiment(name: str, body: Any) -> DriveExperiment:
         None if share is None else _number(f'{key}.bias_share', share, -1.0, 1.0))
 
 
-def _figure(name: str, body: Any, experiments: set[str]) -> Reading:
+def _figure(name: str, body: Any, experiments: set[str]) -> Readout:
     key = f'figures.{name}'
     table = mapping_of(key, body, ('experiment', 'kind', 'signal', 'arguments', 'compared_with',
                                    'scale', 'unit'))
@@ -377,7 +377,7 @@ def _figure(name: str, body: Any, experiments: set[str]) -> Reading:
         raise ParameterError(f'{key}.signal: {quoted(signal)} given, allowed is a mapping of '
                              'signals '
                              'to weights')
-    return Reading(name, str(table.get('unit', '1')), str(table['experiment']),
+    return Readout(name, str(table.get('unit', '1')), str(table['experiment']),
                    str(table['kind']),
                    {str(part): _number(f'{key}.signal.{part}', weight)
                     for part, weight in signal.items()},

@@ -105,8 +105,8 @@ def slope(x: Any, y: Sequence[float]) -> tuple[float, float, float]:
     blocks = [part for part in np.array_split(np.arange(len(y)), BLOCKS) if len(part)]
     at = np.array([np.mean(np.asarray(x)[part]) for part in blocks])
     mean = np.array([np.mean(np.asarray(y)[part]) for part in blocks])
-    spread = at - at.mean()
-    value = float(spread @ mean / (spread @ spread))
-    rest = mean - mean.mean() - value * spread
-    error = math.sqrt(float(rest @ rest) / (len(blocks) - 2) / float(spread @ spread))
+    centred = at - at.mean()
+    value = float(centred @ mean / (centred @ centred))
+    rest = mean - mean.mean() - value * centred
+    error = math.sqrt(float(rest @ rest) / (len(blocks) - 2) / float(centred @ centred))
     return value, value - T_18 * error, value + T_18 * error

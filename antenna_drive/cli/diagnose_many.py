@@ -70,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose the machines, and write table and page; 1 if a diagnosis failed."""
-    from antenna_drive.fleet import diagnose_fleet, machines_of, Options, share, summary, text
+    from antenna_drive.fleet import diagnose_fleet, machines_of, FleetOptions, share, summary, text
     from antenna_drive.pages import render
     from antenna_drive.workers import workers
 
@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
     machines = machines_of(arguments.folder, out)
     # each diagnosis gets its share of the cores; a worker of a cluster has one
     threads = 1 if arguments.scheduler else max(1, (os.cpu_count() or 1) // arguments.jobs)
-    options = Options(
+    options = FleetOptions(
         tuple(arguments.config), tuple(shlex.split(arguments.diagnose_options)), threads,
         arguments.time_limit, arguments.memory_limit, arguments.corrected)
     with (Progress('machines', len(machines)) as progress,

@@ -96,7 +96,7 @@ def run(arguments: argparse.Namespace) -> int:
     run_test = _run_test(arguments)
     from antenna_drive.machines.antenna.drive_limits import DriveLimits, read_limits
     from antenna_drive.machines.antenna.investigation import (
-        DECIDED, headline, Investigation, lines, Plan,
+        DECIDED, headline, Investigation, lines, InvestigationPlan,
     )
     from antenna_drive.machines.antenna.planned_tests import BUILT_IN
     from antenna_drive.machines.antenna.sensors import SensorModel
@@ -120,7 +120,8 @@ def run(arguments: argparse.Namespace) -> int:
 
         story = Investigation(
             arguments.out, drive, limits, replace(base, waveform=None, start='rest'), run_test,
-            Plan(arguments.max_tests, arguments.until, arguments.duration, arguments.seed), first,
+            InvestigationPlan(arguments.max_tests, arguments.until, arguments.duration,
+                              arguments.seed), first,
             # the nodes give true values, another drive what its sensors read
             None if arguments.by else SensorModel.of(base.sensors), arguments.jobs).run(show)
     title, lead = headline(story)
@@ -137,17 +138,17 @@ def _run_test(arguments: argparse.Namespace) -> RunTest:
         if arguments.settings or arguments.real:
             raise UserError('--by: another drive has its own parameters; --real and --set are '
                             'those of the five nodes')
-        return _Command(shlex.split(arguments.by))
+        return _TestsByCommand(shlex.split(arguments.by))
     # a fault of the middleware must not end an investigation
     parse_settings(arguments.settings)
     words = [sys.executable, '-m', 'antenna_drive', 'record', '--quiet', '--play', '{sheet}',
              '--out', '{out}', '--duration', '{duration}']
     for option, given in (('--config', arguments.real), ('--set', arguments.settings)):
         words += [option, *given] if given else []
-    return _Command(words)
+    return _TestsByCommand(words)
 
 
-class _Command:
+class _TestsByCommand:
     """Runs tests by a command."""
 
     def __init__(self, words: Sequence[str]) -> None:

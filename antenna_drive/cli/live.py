@@ -95,8 +95,8 @@ def run(args: argparse.Namespace) -> int:
                         f'{", ".join(experiments())}')
     if experiment is None and not args.join and not args.config and not args.settings:
         experiment = 'T3b'
-    from antenna_drive.live.serving import Options, serve
-    return serve(Options(
+    from antenna_drive.live.serving import LiveOptions, serve
+    return serve(LiveOptions(
         join=args.join, namespace=args.namespace, experiment=experiment,
         config=tuple(args.config), parameters=parse_settings(args.settings),
         pace=1.0 if args.pace is None else args.pace, out=args.out.resolve(), port=args.port,

@@ -47,7 +47,7 @@ from antenna_drive.recording.atomic import refuse_existing
 from antenna_drive.recording.files import read_recording
 
 if TYPE_CHECKING:
-    from antenna_drive.machines.antenna.prediction import Recorder
+    from antenna_drive.machines.antenna.prediction import RecorderErrors
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -70,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Predict, write what was asked for; 1 if the prediction is worse than --against."""
     # the compiled physics takes a while to load: not before it is needed
-    from antenna_drive.machines.antenna.prediction import predict, Recorder
+    from antenna_drive.machines.antenna.prediction import predict, RecorderErrors
     from antenna_drive.parameters.loading import load
     from antenna_drive.recording.csv_format import write_csv
 
@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.out.suffix != '.csv':
             raise UserError(f'--out {arguments.out}: allowed is a name that ends with .csv')
         refuse_existing(arguments.out)
-    recorder = _recorder(arguments.recorder) if arguments.recorder else Recorder()
+    recorder = _recorder(arguments.recorder) if arguments.recorder else RecorderErrors()
     drive = load(*arguments.config)
     other = load(*arguments.against) if arguments.against else None
     with warnings_in_one_line():
@@ -117,8 +117,8 @@ def _mean_ratio(signals: dict[str, dict[str, Any]]) -> float:
                         for item in signals.values()) / len(signals))
 
 
-def _recorder(path: Path) -> Recorder:
-    from antenna_drive.machines.antenna.prediction import Recorder
+def _recorder(path: Path) -> RecorderErrors:
+    from antenna_drive.machines.antenna.prediction import RecorderErrors
     try:
         content = json.loads(path.read_text(encoding='utf-8'))
     except (ValueError, RecursionError) as error:
@@ -127,6 +127,6 @@ def _recorder(path: Path) -> Recorder:
     if not isinstance(entries, list):
         raise UserError(f'{path}: recorder: is missing; give the JSON of antenna-drive diagnose')
     try:
-        return Recorder.of(entries)
+        return RecorderErrors.of(entries)
     except UserError as error:
         raise UserError(f'{path}: {error}') from None

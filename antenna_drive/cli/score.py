@@ -19,7 +19,8 @@ trial, and checks each truth against its seal. A case whose diagnosis failed cou
 case that was not diagnosed yet is pending and not scored.
 
 --cases writes the cases with their answers into one small file. Such a file can be published and
-scored again, alone or together with others and with folders.
+scored again, alone or together with others and with folders; a trial may be continued in another
+folder (`antenna-drive trial --skip`).
 
 docs/trial.md defines every figure. The exit code is 1 if there is no verdict to score.
 
@@ -41,6 +42,7 @@ from typing import Any
 
 from antenna_drive.cli.output import add_json_option, give, replaced
 from antenna_drive.errors import UserError
+from antenna_drive.trial.cases import Truth
 from antenna_drive.trial.scorecard import Case, read_cases, score
 from antenna_drive.trial.scored_cases import case_lines, identity, read_scored, SUFFIX
 
@@ -92,19 +94,23 @@ def run(arguments: argparse.Namespace) -> int:
 def _all_cases(trials: Sequence[Path]) -> tuple[list[Case], int]:
     """Return the cases of all trials, and how many are pending; refuses what is there twice."""
     cases: list[Case] = []
-    pending = 0
+    pending: list[str] = []
     seen: dict[str, Path] = {}  # which trial a case is in
     for trial in trials:
-        found, waiting = (read_scored(trial), 0) if trial.suffix == SUFFIX else read_cases(trial)
-        pending += waiting
+        found, waiting = (read_scored(trial), []) if trial.suffix == SUFFIX else read_cases(trial)
+        pending += map(_key, waiting)
         cases += found
         for case in found:
-            key = json.dumps(identity(case), sort_keys=True)
+            key = _key(case.truth)
             if key in seen:
                 raise UserError(f'{trial}: {case.truth.get("case")} is in {seen[key]}, too; give '
                                 'each trial once')
             seen[key] = trial
-    return cases, pending
+    return cases, sum(key not in seen for key in pending)
+
+
+def _key(truth: Truth) -> str:
+    return json.dumps(identity(truth), sort_keys=True)
 
 
 def _lines(figures: dict[str, Any]) -> list[str]:

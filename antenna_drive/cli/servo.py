@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Compare; 0 if the diagnosis has the lower withheld error in every split, else 1."""
     # the compiled physics loads slowly, so it is imported only here
     from antenna_drive.machines.servo.log import ServoLog
-    from antenna_drive.machines.servo.rounds import Effort
+    from antenna_drive.machines.servo.rounds import FitEffort
     from antenna_drive.machines.servo.study import directions, SPLITS, study, text
 
     check_options(arguments, runs=Entry('', 20, whole=True), jobs=Entry('', 1, whole=True))
@@ -74,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
     tests = [ServoLog.of(path.stem, read_bam(path), folder) for path in paths]
     splits = tuple(SPLITS) if arguments.split == 'both' else (arguments.split,)
     chosen = directions(tests, splits)
-    effort = Effort(arguments.runs, max(20, arguments.runs // 5))
+    effort = FitEffort(arguments.runs, max(20, arguments.runs // 5))
     with Progress('servo', 1.0) as progress:
         result = study(tests, chosen, effort, arguments.without, arguments.jobs,
                        Path(arguments.keep) if arguments.keep else None,

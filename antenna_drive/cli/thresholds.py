@@ -18,7 +18,8 @@ Without TRIAL the table is printed: name, value, unit, what it decides, which tr
 TRIAL, a folder of `antenna-drive trial --diagnose`, every verdict is decided anew from the fits
 that it keeps, with each threshold of the verdict halved and doubled. That takes seconds, because
 nothing is fitted. Thresholds of the search change the fits themselves: --again runs the first
---cases diagnoses with one of them changed, which takes minutes; interrupted, it goes on.
+--cases diagnoses with one of them changed, which takes minutes for each; interrupted, it goes on.
+It also tells how long a diagnosis takes with each.
 
 For example:
 
@@ -34,6 +35,7 @@ from collections.abc import Iterator, Mapping
 import json
 import math
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 from antenna_drive.cli.output import add_json_option, check_options, give, Progress
@@ -53,6 +55,8 @@ from antenna_drive.workers import workers
 DECIDED = ('penalty', 'verdict')
 FIGURES = ('top1', 'within_set', 'pairs_both', 'no_gap_on_none', 'auroc_unknown',
            'overconfident_outside', 'ece')
+# What --again tells besides: it costs time to search more.
+MEAN_SECONDS = 'seconds_mean'
 FACTORS = {'halved': 0.5, 'doubled': 2.0}
 
 
@@ -82,8 +86,9 @@ def run(arguments: argparse.Namespace) -> int:
         found = _run_again(arguments)
     else:
         found = _decided_anew(arguments.trial)
-    lines = [f'{"":44s}' + ''.join(f'{name[:12]:>14s}' for name in FIGURES)]
-    lines += [f'{name:44s}' + ''.join(f'{figures[key]:14.3f}' for key in FIGURES)
+    columns = list(found['as they are'])
+    lines = [f'{"":44s}' + ''.join(f'{name[:12]:>14s}' for name in columns)]
+    lines += [f'{name:44s}' + ''.join(f'{figures[key]:14.3f}' for key in columns)
               for name, figures in found.items()]
     give(found, arguments.json, '\n'.join(lines))
     return 0
@@ -164,7 +169,9 @@ def _run_again(arguments: argparse.Namespace) -> dict[str, Mapping[str, float]]:
             verdict = read_verdict(path) if path.exists() else None
             cases.append(Case(sealing.open_truth(folder, case, manifest), verdict))
         figures = score(cases, 0)
-        found[label] = {key: float(figures[key]) for key in FIGURES}
+        seconds = [case.verdict.seconds for case in cases if case.verdict]
+        found[label] = {**{key: float(figures[key]) for key in FIGURES},
+                        MEAN_SECONDS: fmean(seconds) if seconds else math.nan}
     return found
 
 

@@ -27,7 +27,8 @@ is not in the catalogue.
 The hash of the manifest is printed before any recording is made. Note it down to prove later
 that no truth was changed. With --diagnose each case is diagnosed too, and the verdict is written
 to DIR/case_0001/verdict.json; `antenna-drive score DIR` scores the verdicts. The same command
-resumes an interrupted trial.
+resumes an interrupted trial. On another machine, --skip leaves out the cases that a file of
+`antenna-drive score --cases` holds; the file and DIR are scored together then.
 
 With --wild, each case also has the imperfections of a real machine and recorder, which no sheet
 lists, and other programmes, lengths, rates and sheets. A fourth recording is kept from the
@@ -44,6 +45,7 @@ that they all have under the same path.
 For example:
   antenna-drive trial --cases 200 --seed 7 --out trial7 --diagnose && antenna-drive score trial7
   antenna-drive trial --wild --cases 20 --seed 7 --out wild7 --diagnose
+  antenna-drive trial --wild --cases 20 --seed 7 --out rest7 --diagnose --skip wild7.jsonl
   antenna-drive trial --machine joint --machine axis --cases 60 --seed 7 --out other7 --diagnose
 """
 
@@ -53,6 +55,7 @@ import argparse
 import os
 from pathlib import Path
 import shlex
+from typing import Any
 
 from antenna_drive.cli.output import check_options, Progress
 from antenna_drive.cli.sharing import add_diagnosis_options, add_worker_options
@@ -61,6 +64,7 @@ from antenna_drive.parameters.schema import Entry
 from antenna_drive.trial import batch, sealing
 from antenna_drive.trial.family import FAMILIES
 from antenna_drive.trial.others.machines import MACHINES
+from antenna_drive.trial.scored_cases import identity, read_scored
 
 RATES_HZ = (50.0, 500.0)
 USUAL_RATE_HZ = 200.0
@@ -92,6 +96,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='forms of effects, outsiders and programmes; nothing may be tuned '
                              'on b, which needs --wild (default %(default)s)')
     add_worker_options(parser, os.cpu_count() or 1)
+    parser.add_argument('--skip', type=Path, metavar='FILE',
+                        help='make and diagnose no case that this file of `antenna-drive score '
+                             '--cases` holds')
     parser.add_argument('--diagnose', action='store_true',
                         help='diagnose each case as well')
     add_diagnosis_options(parser, '--config my.yaml')
@@ -109,13 +116,15 @@ def run(arguments: argparse.Namespace) -> int:
         family=arguments.family, machines=_others(arguments))
     print(f'{folder}: {arguments.cases} truths sealed, manifest '
           f'{sealing.manifest_seal(manifest)}', flush=True)
-    with Progress('recordings', arguments.cases, quiet=arguments.quiet) as progress:
+    skipped = set() if arguments.skip is None else _scored(arguments.skip, folder, manifest)
+    count = arguments.cases - len(skipped)
+    with Progress('recordings', count, quiet=arguments.quiet) as progress:
         batch.make_cases(folder, manifest, arguments.jobs,
-                         lambda done, total: progress.update(done), arguments.scheduler)
-    print(f'{folder}: {arguments.cases} cases complete', flush=True)
+                         lambda done, total: progress.update(done), arguments.scheduler, skipped)
+    print(f'{folder}: {count} cases complete', flush=True)
     if not arguments.diagnose:
         return 0
-    with Progress('diagnoses', arguments.cases, quiet=arguments.quiet) as progress:
+    with Progress('diagnoses', count, quiet=arguments.quiet) as progress:
         failures = batch.diagnose_cases(
             folder, manifest, arguments.jobs,
             # each diagnosis gets its share of the cores; a worker of a cluster has one
@@ -123,11 +132,25 @@ def run(arguments: argparse.Namespace) -> int:
                            max(1, (os.cpu_count() or 1) // arguments.jobs)),
              *shlex.split(arguments.diagnose_options)],
             arguments.time_limit, lambda done, total: progress.update(done),
-            arguments.scheduler)
+            arguments.scheduler, skipped)
     if failures:
         print(f'{folder}: {failures} diagnoses failed, see {batch.FAILURE} in their folders; '
               'run the same command to try them again')
     return 1 if failures else 0
+
+
+def _scored(path: Path, folder: Path, manifest: dict[str, Any]) -> set[str]:
+    """Return the names of the cases that a file holds; refuses cases of another trial."""
+    here = {name: identity(sealing.open_truth(folder, name, manifest))
+            for name in manifest['seals']}
+    names = set()
+    for case in read_scored(path):
+        name = case.truth['case']
+        if identity(case.truth) != here.get(name):
+            raise UserError(f'{path}: {name}: is no case of this trial; give the cases, the seed '
+                            'and the options with which the file was made')
+        names.add(name)
+    return names
 
 
 def _others(arguments: argparse.Namespace) -> list[str]:

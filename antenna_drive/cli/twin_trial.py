@@ -127,14 +127,14 @@ def outcome(truth: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, Any
     if settings['kind'] == 'verdict':
         return {**kept, **_grown(truth)}
     from antenna_drive.twin.proving import watched
-    from antenna_drive.twin.watch import Settings
+    from antenna_drive.twin.watch import TwinSettings
     columns = onset.make_recording(truth)
     if truth['effects']:
         kept['shows_by'] = onset.shows_by(truth, columns, WITHIN_S)
     return {**kept, 'waveform': truth['sheets'][0]['waveform']['type'],
             'onset_s': truth['onset_s'], **watched(
                 columns, truth['sheets'][0], truth['onset_s'],
-                Settings(alarms_per_day=settings['alarms_per_day']))}
+                TwinSettings(alarms_per_day=settings['alarms_per_day']))}
 
 
 def _grown(truth: dict[str, Any]) -> dict[str, Any]:

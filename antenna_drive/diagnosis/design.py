@@ -125,7 +125,7 @@ class TestSpace(ABC):
 
 
 @dataclass(frozen=True)
-class Effort:
+class DesignEffort:
     """
     How much is searched.
 
@@ -242,7 +242,8 @@ class TestDesign:
 
     def __init__(self, space: TestSpace, rivals: Sequence[Rival] = (), inflated: float = 1.0,
                  objective: str = SEPARATE, suspected: Sequence[str] = (), threads: int = 2,
-                 settings: Settings = DEFAULT, effort: Effort = Effort(), seed: int = 0) -> None:
+                 settings: Settings = DEFAULT, effort: DesignEffort = DesignEffort(),
+                 seed: int = 0) -> None:
         """Prepare to search."""
         self._space, self._rivals, self._inflated = space, list(rivals), inflated
         self._objective, self._suspected = objective, list(suspected)
@@ -266,15 +267,15 @@ class TestDesign:
                  for _ in range(effort.drawn) for family in self._space.families]
         with ThreadPoolExecutor(self._threads) as pool:
             progress(0.0, 'tests within the limits')
-            rough: list[Judged] = []
+            screened: list[Judged] = []
             for test in pool.map(self._screened, drawn):
-                rough.append(test)
-                progress(0.3 * len(rough) / len(drawn), 'tests within the limits')
+                screened.append(test)
+                progress(0.3 * len(screened) / len(drawn), 'tests within the limits')
             refused: dict[str, int] = {}
-            for test in rough:
+            for test in screened:
                 if not self._allowed(test):
                     refused[test.tightest[0]] = refused.get(test.tightest[0], 0) + 1
-            allowed = [test for test in rough if self._allowed(test)]
+            allowed = [test for test in screened if self._allowed(test)]
             if self._objective == RANDOM:
                 return self._proposal(allowed[:1], refused, (), len(drawn))
             progress(0.3, 'the best with all tolerances free')
@@ -294,7 +295,7 @@ class TestDesign:
             beyond: Iterable[Judged] = ()
             if not helpful:
                 beyond = _best(pool.map(self._judge, _of_each_family(
-                    [test for test in rough if not self._allowed(test)], effort.varied)))
+                    [test for test in screened if not self._allowed(test)], effort.varied)))
         progress(1.0, 'done')
         return self._proposal(helpful, refused, [test for test in beyond if self._helps(test)],
                               len(drawn) + len(variants), judged)

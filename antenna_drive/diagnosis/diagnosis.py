@@ -41,7 +41,7 @@ from antenna_drive.diagnosis.intervals import inflation, jackknife, values_with_
 from antenna_drive.diagnosis.interventions import (
     interventions, lines as lines_of_labels, simplified,
 )
-from antenna_drive.diagnosis.lack_of_fit import lack_of_fit, remains, residual_tests
+from antenna_drive.diagnosis.lack_of_fit import lack_of_fit, remainders, residual_tests
 from antenna_drive.diagnosis.least_squares import LeastSquares
 from antenna_drive.diagnosis.machine import Machine
 from antenna_drive.diagnosis.rivals import rivals_of
@@ -132,12 +132,12 @@ def _why_small(item: Mapping[str, Any]) -> str:
     return f'explains {100.0 * item["share"]:.2g} % of the gap'
 
 
-def _remainders(remains: Mapping[str, Any]) -> list[str]:
+def _remainders(found: Mapping[str, Any]) -> list[str]:
     """Return what remains of the signals that matter, or of all if nobody said which do."""
-    asked = any(item.get('matters') is not None for item in remains.values())
+    asked = any(item.get('matters') is not None for item in found.values())
     return [f'{signal} {item["beyond_noise"]:.2g} {item["unit"]} beyond noise of '
             f'{item["noise"]:.2g} {item["unit"]}' + (', which matters' if asked else '')
-            for signal, item in remains.items() if 'rms' in item
+            for signal, item in found.items() if 'rms' in item
             and (item['matters'] if asked else item['beyond_noise'] > item['noise'])]
 
 
@@ -239,7 +239,7 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         'confusable': decision.confusable,
         'how_far': reach,
         'could_hide': could_hide(problem, none.state) if decision.word == 'no_gap' else [],
-        'remains': remains(problem, best.state, limits),
+        'remains': remainders(problem, best.state, limits),
         'residual_tests': residual_tests(problem, best.state, lack),
         'may_enter_at': [vars(place) for place in places if place.evidence > 0.0],
         'fits': evidence.as_data(),

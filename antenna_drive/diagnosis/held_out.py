@@ -62,7 +62,7 @@ class _Fold:
     gap_after, after : with those effects that can be judged; None if none can
     judged : ids of these
     reasons : why the others cannot be judged, by id
-    spread : change of `after` with each of the judged effects' numbers, shape (n c, m)
+    jacobian : change of `after` with each of the judged effects' numbers, shape (n c, m)
     names : of these numbers
     values, low, high : of these numbers, and their bounds, shape (m,)
     covariance : of these numbers, shape (m, m)
@@ -77,7 +77,7 @@ class _Fold:
     after: FloatArray | None = None
     judged: tuple[str, ...] = ()
     reasons: Mapping[str, str] = field(default_factory=dict)
-    spread: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    jacobian: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     names: tuple[str, ...] = ()
     values: FloatArray = field(default_factory=lambda: np.zeros(0))
     low: FloatArray = field(default_factory=lambda: np.zeros(0))
@@ -231,7 +231,7 @@ class _Judge:
         """Return the reasons why effects cannot be judged, by id, and the fit's covariance."""
         own = [v for p, v in zip(found.parameters, inflation(problem, found), strict=True)
                if p.name in self._effects]
-        spread = covariance(found, fmean(own or [1.0]), self._settings.interval)
+        posterior = covariance(found, fmean(own or [1.0]), self._settings.interval)
         price = self._settings.penalty.parameter
         gain = unaided.cost - found.cost
         reasons = {}
@@ -242,11 +242,11 @@ class _Judge:
                 reasons[effect] = (f'the training data gain {max(gain, 0.0):.1f} by the effects, '
                                    f'less than the price of a parameter, {price:g}')
             else:
-                ratio = _deviations(form, found, spread)
+                ratio = _deviations(form, found, posterior)
                 if ratio < 1.0:
                     reasons[effect] = ('the training data do not determine it: its value is '
                                        f'{ratio:.1f} standard deviations')
-        return reasons, spread
+        return reasons, posterior
 
     def _unseen_labels(self, testing: Part, training: Part) -> dict[str, str]:
         """Return the reasons why effects cannot be judged whose label training does not have."""
@@ -273,7 +273,7 @@ class _Judge:
             return fold
         part = Part(machine, [i for i, group in enumerate(groups) if group != groups[k]])
         training, unaided, found = self._trained(part)
-        reasons, spread = self._undetermined(training, unaided, found)
+        reasons, posterior = self._undetermined(training, unaided, found)
         reasons = {**reasons, **self._unseen_labels(testing, part)}
         fold = replace(fold, reasons=reasons)
         judged = self._judged(reasons)
@@ -299,8 +299,8 @@ class _Judge:
         unseen = self._unseen(problem, point, state.residual, reasons)
         fold = replace(fold, gap_after=_gap(testing, point), after=after,
                        reasons={**reasons, **unseen})
-        return self._with_spread(fold, judged, found, spread,
-                                 slope - jacobian @ follow.astype(np.float32))
+        return self._with_jacobian(fold, judged, found, posterior,
+                                   slope - jacobian @ follow.astype(np.float32))
 
     def second_half(self, k: int) -> _Fold:
         """Judge on the second half of a test what the first half has taught."""
@@ -316,7 +316,7 @@ class _Judge:
                           _shaped(own, own.residuals(unaided.point())))
         if not self._best.effects:
             return fold
-        reasons, spread = self._undetermined(problem, unaided, found)
+        reasons, posterior = self._undetermined(problem, unaided, found)
         fold = replace(fold, reasons=reasons)
         judged = self._judged(reasons)
         if not judged:
@@ -329,8 +329,8 @@ class _Judge:
         unseen = self._unseen(own, point, residual, reasons)
         fold = replace(fold, gap_after=_gap(testing, point), after=_shaped(own, residual),
                        reasons={**reasons, **unseen})
-        return self._with_spread(fold, judged, found, spread,
-                                 own.jacobian(point, judged, residual, False))
+        return self._with_jacobian(fold, judged, found, posterior,
+                                   own.jacobian(point, judged, residual, False))
 
     def _unseen(self, problem: LeastSquares, point: dict[str, float], residual: FloatArray,
                 reasons: Mapping[str, str]) -> dict[str, str]:
@@ -358,8 +358,8 @@ class _Judge:
         experiment = self._problem.experiments[k]
         return _Fold(experiment.name, experiment.time, gap, before)
 
-    def _with_spread(self, fold: _Fold, judged: Sequence[Parameter], found: FitState,
-                     spread: FloatArray, slope: Jacobian) -> _Fold:
+    def _with_jacobian(self, fold: _Fold, judged: Sequence[Parameter], found: FitState,
+                       posterior: FloatArray, slope: Jacobian) -> _Fold:
         """Return a fold with the uncertainty of the numbers that can be judged."""
         column = {p.name: j for j, p in enumerate(judged)}
         judged = self._judged(fold.reasons)
@@ -369,10 +369,10 @@ class _Judge:
         places = [names.index(p.name) for p in judged]
         return replace(
             fold, judged=tuple(e for e in self._best.effects if e not in fold.reasons),
-            spread=np.asarray(slope[:, [column[p.name] for p in judged]], np.float64),
+            jacobian=np.asarray(slope[:, [column[p.name] for p in judged]], np.float64),
             names=tuple(p.name for p in judged), values=found.x[places],
             low=np.array([p.low for p in judged]),
-            high=np.array([p.high for p in judged]), covariance=spread[np.ix_(places, places)])
+            high=np.array([p.high for p in judged]), covariance=posterior[np.ix_(places, places)])
 
     def _fitted(self, testing: Part, nuisances: Sequence[Parameter], held: Mapping[str, float],
                 begin: Mapping[str, float], slopes: Slopes) -> FitState:
@@ -393,12 +393,12 @@ def _shaped(problem: LeastSquares, residual: FloatArray) -> FloatArray:
     return np.where(problem.valid, residual, np.nan).reshape(shape)
 
 
-def _deviations(form: Form, found: FitState, spread: FloatArray) -> float:
+def _deviations(form: Form, found: FitState, posterior: FloatArray) -> float:
     """Return how far the sizes of an effect are from zero, in standard deviations."""
     names = [p.name for p in found.parameters]
     places = [names.index(p.name) for p in form.sizes]
     sizes = found.x[places]
-    square = float(sizes @ np.linalg.pinv(spread[np.ix_(places, places)]) @ sizes)
+    square = float(sizes @ np.linalg.pinv(posterior[np.ix_(places, places)]) @ sizes)
     return math.sqrt(max(square, 0.0) / len(places))
 
 
@@ -449,7 +449,7 @@ def _changes(fold: _Fold, block_s: float, random: np.random.Generator,
     """Return how the energy of each block changes with draws of the effect's numbers."""
     residual = np.nan_to_num(_after(fold))
     rows, channels = residual.shape
-    slope = fold.spread.reshape(rows, channels, -1)
+    slope = fold.jacobian.reshape(rows, channels, -1)
     summed = _in_blocks(fold.time, block_s)
     first = summed(np.einsum('nc,ncm->nm', residual, slope))
     number = slope.shape[2]

@@ -62,8 +62,8 @@ def inflation(problem: LeastSquares, state: FitState) -> FloatArray:
         of a fit that has converged, with its Jacobian
 
     """
-    spread = covariance(state, 1.0, problem.settings.interval)
-    return _inflation(problem, state, spread)
+    posterior = covariance(state, 1.0, problem.settings.interval)
+    return _inflation(problem, state, posterior)
 
 
 def contrast_deviation(problem: LeastSquares, state: FitState, contrast: FloatArray) -> float:
@@ -84,7 +84,7 @@ def contrast_deviation(problem: LeastSquares, state: FitState, contrast: FloatAr
     return float(np.sqrt(contrast @ covariance(state, float(inflated), settings) @ contrast))
 
 
-def _inflation(problem: LeastSquares, state: FitState, spread: FloatArray) -> FloatArray:
+def _inflation(problem: LeastSquares, state: FitState, posterior: FloatArray) -> FloatArray:
     """Return the inflation along the columns of a product with the covariance, shape (k,)."""
     jacobian, weight = state.jacobian, state.weight
     block_s = problem.machine.time_scales.block_s
@@ -94,9 +94,9 @@ def _inflation(problem: LeastSquares, state: FitState, spread: FloatArray) -> Fl
     starts = np.flatnonzero(np.diff(labels, prepend=-1.0))
     scores = np.add.reduceat(
         jacobian * (weight * state.residual).astype(np.float32)[:, np.newaxis], starts, axis=0)
-    found = np.sum(np.square(scores.astype(float) @ spread), axis=0)
-    independent = np.sum((state.hessian @ spread) * spread, axis=0)
-    prior = proper_precision(state.parameters) @ np.square(spread)
+    found = np.sum(np.square(scores.astype(float) @ posterior), axis=0)
+    independent = np.sum((state.hessian @ posterior) * posterior, axis=0)
+    prior = proper_precision(state.parameters) @ np.square(posterior)
     # a value that priors alone determine has no scatter to compare
     by_data = independent > _BY_DATA * (independent + prior)
     return np.where(by_data, np.maximum(found / np.where(by_data, independent, 1.0), 1.0), 1.0)

@@ -127,8 +127,8 @@ def _fast(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> tuple[str
     return signal, loudest, share
 
 
-def remains(problem: LeastSquares, state: FitState,
-            limits: Mapping[str, float]) -> dict[str, dict[str, Any]]:
+def remainders(problem: LeastSquares, state: FitState,
+               limits: Mapping[str, float]) -> dict[str, dict[str, Any]]:
     """
     Return what a hypothesis leaves of each signal, in its own unit, for the JSON.
 

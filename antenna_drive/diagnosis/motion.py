@@ -57,11 +57,11 @@ class Motion:
         last = np.arange(self.time.size)
         last[direction == 0.0] = 0
         held = direction[np.maximum.accumulate(last)]
-        turns = self.time[np.flatnonzero(np.diff(held) != 0.0) + 1]
+        reversals = self.time[np.flatnonzero(np.diff(held) != 0.0) + 1]
         since = np.full(self.time.size, np.inf)
-        if turns.size:
-            k = np.searchsorted(turns, self.time, side='right') - 1
-            since = np.where(k >= 0, self.time - turns[np.maximum(k, 0)], np.inf)
+        if reversals.size:
+            k = np.searchsorted(reversals, self.time, side='right') - 1
+            since = np.where(k >= 0, self.time - reversals[np.maximum(k, 0)], np.inf)
         size = np.abs(self.load)
         labels = np.full(self.time.size, _NAMES.index('constant rate'))
         labels[size > np.quantile(size, _HIGH_LOAD_QUANTILE)] = _NAMES.index('high load')

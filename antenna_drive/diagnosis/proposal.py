@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
-from antenna_drive.diagnosis.design import Effort, Judged, Proposal, SEPARATE, TestSpace
+from antenna_drive.diagnosis.design import DesignEffort, Judged, Proposal, SEPARATE, TestSpace
 from antenna_drive.diagnosis.discrimination import known_to
 from antenna_drive.diagnosis.machine import FloatArray
 from antenna_drive.diagnosis.rivals import Rival
@@ -189,7 +189,7 @@ class ProposalContents:
 
 
 def contents(proposal: Proposal, space: TestSpace, settings: Settings = DEFAULT,
-             effort: Effort = Effort()) -> ProposalContents:
+             effort: DesignEffort = DesignEffort()) -> ProposalContents:
     """
     Return what the page about a proposal says.
 

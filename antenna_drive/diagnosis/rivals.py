@@ -137,9 +137,9 @@ def rivals_of(problem: LeastSquares, answers: Sequence[Answer], inflated: float,
         if state.kept_hessian is None:
             state = hypothesis.with_jacobian(problem).state
         shared = [j for j, p in enumerate(state.parameters) if p.experiment is None]
-        spread = covariance(state, inflated, problem.settings.interval)
+        posterior = covariance(state, inflated, problem.settings.interval)
         found.append(Rival(
             answer.effects, hypothesis.effects, tuple(form.name for form in hypothesis.forms),
             answer.probability, tuple(state.parameters[j].name for j in shared),
-            state.x[shared], spread[np.ix_(shared, shared)]))
+            state.x[shared], posterior[np.ix_(shared, shared)]))
     return found

@@ -101,7 +101,7 @@ def claims(name: str) -> list[dict[str, str]]:
     return found
 
 
-class Plan(NamedTuple):
+class ExperimentChanges(NamedTuple):
     """
     What an experiment changes in a drive, by unit.
 
@@ -117,7 +117,7 @@ class Plan(NamedTuple):
 
 
 def plan(name: str, settings: Mapping[str, Mapping[str, Any]],
-         configuration: tuple[str, ...] = ()) -> Plan:
+         configuration: tuple[str, ...] = ()) -> ExperimentChanges:
     """
     Compare an experiment with what is in force.
 
@@ -131,7 +131,7 @@ def plan(name: str, settings: Mapping[str, Mapping[str, Any]],
         files that the experiment is built on, as in `DriveExperiment.drive`
 
     """
-    result = Plan({}, {})
+    result = ExperimentChanges({}, {})
     for unit, (entry, value) in _wanted(experiments()[name].drive(*configuration)):
         key, place = entry
         now = settings.get(unit, {}).get(key)

@@ -98,7 +98,7 @@ class OwnDrive:
             processes.__exit__(None, None, None)
 
 
-class Recorder:
+class RecorderProcess:
     """
     The recorder of this package as a process of its own, which the drive does not wait for.
 

@@ -28,13 +28,13 @@ import webbrowser
 from antenna_drive.errors import UserError
 from antenna_drive.live.board import Board
 from antenna_drive.live.link import DriveLink
-from antenna_drive.live.own_processes import OwnDrive, Recorder
+from antenna_drive.live.own_processes import OwnDrive, RecorderProcess
 from antenna_drive.live.server import Server
 from antenna_drive.live.session import Session
 
 
 @dataclass(frozen=True)
-class Options:
+class LiveOptions:
     """What the command was told; see `antenna-drive live --help`."""
 
     join: bool = False
@@ -51,7 +51,7 @@ class Options:
     foxglove: int | None = None
 
 
-def serve(options: Options) -> int:
+def serve(options: LiveOptions) -> int:
     """
     Serve the page until SIGINT or SIGTERM.
 
@@ -70,7 +70,7 @@ def serve(options: Options) -> int:
     return asyncio.run(_serve(options))
 
 
-async def _serve(options: Options) -> int:
+async def _serve(options: LiveOptions) -> int:
     ended = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -85,7 +85,7 @@ async def _serve(options: Options) -> int:
             link = DriveLink(board, options.namespace)
         except ValueError as error:  # rclpy names what is wrong with a namespace
             raise UserError(f'--namespace {options.namespace}: {error}') from error
-        session = Session(link, board, Recorder(options.out, options.namespace), own,
+        session = Session(link, board, RecorderProcess(options.out, options.namespace), own,
                           options.experiment)
         try:
             await _serve_session(options, session, ended)
@@ -97,7 +97,7 @@ async def _serve(options: Options) -> int:
     return 0
 
 
-async def _serve_session(options: Options, session: Session, ended: asyncio.Event) -> None:
+async def _serve_session(options: LiveOptions, session: Session, ended: asyncio.Event) -> None:
     token = (options.token or secrets.token_urlsafe(24)) if options.host else ''
     server = Server(session, options.host, options.port, token)
     foxglove = None

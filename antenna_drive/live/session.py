@@ -27,7 +27,7 @@ from antenna_drive.live.board import Board
 from antenna_drive.live.experiment_buttons import listed, plan, preview
 from antenna_drive.live.link import DriveLink
 from antenna_drive.live.loading import recordings_in, thinned
-from antenna_drive.live.own_processes import off_the_loop, OwnDrive, Recorder
+from antenna_drive.live.own_processes import off_the_loop, OwnDrive, RecorderProcess
 from antenna_drive.parameters.schema import ParameterError
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.panels import PANELS
@@ -46,7 +46,7 @@ class Session:
     `ask` raises UserError for what is refused; the message is for the page.
     """
 
-    def __init__(self, link: DriveLink, board: Board, recorder: Recorder,
+    def __init__(self, link: DriveLink, board: Board, recorder: RecorderProcess,
                  own: OwnDrive | None = None, experiment: str | None = None) -> None:
         """
         Serve a drive.

@@ -35,7 +35,7 @@ from antenna_drive.physics.compiling import inner
 import numpy as np
 
 
-class Form(NamedTuple):
+class CompiledForm(NamedTuple):
     """
     What a compiled loop needs of a unit.
 
@@ -77,19 +77,19 @@ def _advance_source(k: int, h: float, u: FloatArray, y: FloatArray, memory: Any)
     signal_generator.sample(k + 1, 1, h, origins, record, bits, rows)
 
 
-def _of_block(unit: Any) -> Form:
+def _of_block(unit: Any) -> CompiledForm:
     record, x, mode, _, work, y = unit.memory()
     rates = unit.block.rates.function
-    return Form(f'{rates.__module__}.{rates.__qualname__}', _advance_block(unit.block),
-                lambda step_s: (record, x, mode, work, inner_steps(step_s)), y,
-                lambda step: None, unit.block.folder)
+    return CompiledForm(f'{rates.__module__}.{rates.__qualname__}', _advance_block(unit.block),
+                        lambda step_s: (record, x, mode, work, inner_steps(step_s)), y,
+                        lambda step: None, unit.block.folder)
 
 
-def _of_source(unit: Any) -> Form:
+def _of_source(unit: Any) -> CompiledForm:
     y = np.zeros((1, len(unit.outputs), 2))
-    return Form(signal_generator.__name__, _advance_source,
-                lambda step_s: (*unit.memory(), y), y[0],
-                unit.reached, Path(signal_generator.__file__).resolve().parent)
+    return CompiledForm(signal_generator.__name__, _advance_source,
+                        lambda step_s: (*unit.memory(), y), y[0],
+                        unit.reached, Path(signal_generator.__file__).resolve().parent)
 
 
 @inner
@@ -101,18 +101,18 @@ def _advance_partner(k: int, h: float, u: FloatArray, y: FloatArray, memory: Any
         seen[row, 1] = u[row, 1]
 
 
-def _of_partner(unit: Any) -> Form:
+def _of_partner(unit: Any) -> CompiledForm:
     y, seen = unit.memory()
-    return Form(partner.__name__, _advance_partner, lambda step_s: (seen,), y,
-                lambda step: None, Path(partner.__file__).resolve().parent)
+    return CompiledForm(partner.__name__, _advance_partner, lambda step_s: (seen,), y,
+                        lambda step: None, Path(partner.__file__).resolve().parent)
 
 
 # By exact type: a subclass may do something else in its step.
-FORMS: dict[type[Unit], Callable[[Any], Form]] = {
+FORMS: dict[type[Unit], Callable[[Any], CompiledForm]] = {
     BlockUnit: _of_block, SourceUnit: _of_source, partner.PartnerUnit: _of_partner}
 
 
-def form_of(unit: Unit) -> Form | None:
+def form_of(unit: Unit) -> CompiledForm | None:
     """Return the compiled form of a unit, None if it has none."""
     make = FORMS.get(type(unit))
     return make(unit) if make else None

@@ -31,7 +31,7 @@ from typing import Any, Protocol
 from antenna_drive.emulator.unit import FloatArray, Unit
 from antenna_drive.lockstep import compiled_loop as loop
 from antenna_drive.lockstep.compiled_loop import Call, Peer, Reading, Time, Word
-from antenna_drive.lockstep.compiled_unit import Form, form_of
+from antenna_drive.lockstep.compiled_unit import CompiledForm, form_of
 from antenna_drive.lockstep.delays import empty_counts
 from antenna_drive.lockstep.frame import HEADER, READING_PREFIX
 from antenna_drive.lockstep.inbox import DEPTH, Frame
@@ -68,7 +68,7 @@ def exchange(s, memory):
 """
 
 
-class Channel(Protocol):
+class FrameChannel(Protocol):
     """
     What carries the frames: C functions and what they are called with, all as addresses.
 
@@ -109,7 +109,7 @@ def _compiled(name: str, advance: Any, folder: Path) -> Any:
     return generated('exchange', text, names, folders).exchange.dispatcher
 
 
-def _loop_of(form: Form) -> Any:
+def _loop_of(form: CompiledForm) -> Any:
     return _compiled(form.name, form.advance, form.folder)
 
 
@@ -153,7 +153,8 @@ class Exchange:
 
     """
 
-    def __init__(self, member: Member, form: Form, channel: Channel, stamps: int = 0) -> None:
+    def __init__(self, member: Member, form: CompiledForm, channel: FrameChannel,
+                 stamps: int = 0) -> None:
         """
         Prepare the loop.
 

@@ -42,7 +42,7 @@ from antenna_drive.twin.baseline import Baseline
 from antenna_drive.twin.growing import GrowingVerdict
 from antenna_drive.twin.intake import COMMAND
 from antenna_drive.twin.topics import load_topics, own_topics, Topic, TopicMap
-from antenna_drive.twin.watch import Settings, Twin
+from antenna_drive.twin.watch import Twin, TwinSettings
 from antenna_drive.workers import worker_processes
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
@@ -112,7 +112,7 @@ class _TwinNode:
         self._log = node.get_logger()
         overrides = Overrides(node)
         numbers = {name: overrides.number(name, entry, default) for (name, entry), default in zip(
-            _ENTRIES.items(), (Settings.alarms_per_day, Settings.quiet_s), strict=True)}
+            _ENTRIES.items(), (TwinSettings.alarms_per_day, TwinSettings.quiet_s), strict=True)}
         texts = {name: _text(overrides, name) for name in _TEXTS}
         config = [name for name in overrides.names('config', ()) if name != 'reference']
         switches = {name: _switch(overrides.rest(), name) for name in _SWITCHES}
@@ -125,7 +125,7 @@ class _TwinNode:
         with told_while_compiling(node):
             self._twin = Twin(
                 loaded(configuration) if configuration else drive, sheet,
-                Settings(alarms_per_day=numbers['alarms_per_day'], quiet_s=numbers['quiet']),
+                TwinSettings(alarms_per_day=numbers['alarms_per_day'], quiet_s=numbers['quiet']),
                 kept, tuned if switches['tune'] and kept is None else None)
         self._written = kept is not None
         self._arrived: SimpleQueue[tuple[Topic, tuple[float, ...], int, int]] = SimpleQueue()

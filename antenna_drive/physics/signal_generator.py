@@ -54,8 +54,8 @@ def prbs_bits() -> NDArray[np.float64]:
 @inner
 def _cycle(t: float, p: Waveform) -> float:
     """Return where in its period the waveform is, from 0 up to but not including 1."""
-    turns = t / p.period + p.phase
-    return max(0.0, turns - math.floor(turns + _ON_TIME))
+    cycles = t / p.period + p.phase
+    return max(0.0, cycles - math.floor(cycles + _ON_TIME))
 
 
 @inner
@@ -92,8 +92,8 @@ def _shape(t: float, p: Waveform, bits: FloatArray) -> tuple[float, float]:
         return (1.0 if _cycle(t, p) < 0.5 - _ON_TIME else -1.0), 0.0
     if kind == SAW_TOOTH:
         # it jumps nowhere: what is a little before a period's end need not count as after it
-        turns = t / p.period + p.phase
-        value, slope = _saw_tooth(turns - math.floor(turns))
+        cycles = t / p.period + p.phase
+        value, slope = _saw_tooth(cycles - math.floor(cycles))
         return value, slope / p.period
     if kind == SAW_TOOTH_JUMP:
         s = _cycle(t, p)

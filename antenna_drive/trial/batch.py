@@ -21,7 +21,7 @@ it, and a verdict only once the diagnosis has succeeded.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 import json
 import math
 import os
@@ -158,7 +158,8 @@ def _make_folder(final: Path, truth: Truth, names: Mapping[int, str]) -> None:
 
 
 def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
-               done: Done = lambda part, total: None, scheduler: str | None = None) -> None:
+               done: Done = lambda part, total: None, scheduler: str | None = None,
+               skipped: Container[str] = ()) -> None:
     """
     Make all cases that do not exist yet.
 
@@ -175,10 +176,12 @@ def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
     scheduler
         address of a dask.distributed scheduler whose workers make them; they see the folder
         under the same path
+    skipped
+        names of cases that are not wanted
 
     """
     _remove_drafts(folder)
-    names = list(manifest['seals'])
+    names = [name for name in manifest['seals'] if name not in skipped]
     wanted = [name for name in names if not (folder / name).is_dir()]
     truths = [sealing.open_truth(folder, name, manifest) for name in wanted]
     complete = len(names) - len(wanted)
@@ -259,24 +262,15 @@ def diagnose_case(case: Path, options: Sequence[str], limit: float,
     True if there is a verdict; otherwise FAILURE holds the reason
 
     """
-    draft = case / f'.{VERDICT}'
     correction = [] if kept is None else ['--corrected', str(case / CORRECTED)]
-    failure = run_command(['diagnose', *(str(case / f'{name}.csv') for name in RECORDINGS),
-                           '--json', str(draft), *correction, *options], limit)
+    failure = diagnose_recordings(case, RECORDINGS, VERDICT, limit, [*correction, *options])
     (case / FAILURE).unlink(missing_ok=True)
-    if draft.exists():
-        try:
-            json.loads(draft.read_text(encoding='utf-8'))
-        except ValueError as error:
-            failure = f'verdict is not JSON: {error}\n{failure}'
-        else:
-            os.replace(draft, case / VERDICT)
-            if kept is not None:
-                predict_kept(case, options, kept)
-            return True
-    draft.unlink(missing_ok=True)
-    sealing.write_whole(case / FAILURE, failure[-20000:] + '\n')
-    return False
+    if not (case / VERDICT).exists():
+        sealing.write_whole(case / FAILURE, failure[-20000:] + '\n')
+        return False
+    if kept is not None:
+        predict_kept(case, options, kept)
+    return True
 
 
 def diagnose_recordings(case: Path, recordings: Sequence[str], name: str, limit: float,
@@ -307,8 +301,14 @@ def diagnose_recordings(case: Path, recordings: Sequence[str], name: str, limit:
     draft = case / f'.{name}.{os.getpid()}'
     said = run_command(['diagnose', *(str(case / f'{item}.csv') for item in recordings),
                         '--jobs', '1', '--json', str(draft), *options], limit)
-    if draft.exists():
-        os.replace(draft, case / name)
+    if not draft.exists():
+        return said
+    try:
+        json.loads(draft.read_text(encoding='utf-8'))
+    except ValueError as error:
+        draft.unlink()
+        return f'verdict is not JSON: {error}\n{said}'
+    os.replace(draft, case / name)
     return said
 
 
@@ -362,7 +362,7 @@ def _unpredicted(case: Path) -> bool:
 def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
                    options: Sequence[str] = (), limit: float = math.inf,
                    done: Done = lambda part, total: None,
-                   scheduler: str | None = None) -> int:
+                   scheduler: str | None = None, skipped: Container[str] = ()) -> int:
     """
     Diagnose all cases that have no verdict yet, including those that failed before.
 
@@ -385,13 +385,15 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
     scheduler
         address of a dask.distributed scheduler whose workers diagnose them; they see the folder
         under the same path
+    skipped
+        names of cases that are not wanted
 
     Returns
     -------
     number of cases that failed
 
     """
-    names = list(manifest['seals'])
+    names = [name for name in manifest['seals'] if name not in skipped]
     wanted = [name for name in names if not (folder / name / VERDICT).exists()]
     here = folder if scheduler is None else folder.absolute()
     kept = {name: path if path.exists() else None for name in names

@@ -80,9 +80,9 @@ def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float =
     random = np.random.default_rng([seed, 0])
     kinds = random.permutation(kinds_of(count))
     catalogue = list(forms.catalogue.values())
-    singles = turns(catalogue, random)
-    firsts, seconds = turns(catalogue, random), turns(catalogue, random)
-    outsiders = turns(list(forms.outside.values()), random)
+    singles = round_robin(catalogue, random)
+    firsts, seconds = round_robin(catalogue, random), round_robin(catalogue, random)
+    outsiders = round_robin(list(forms.outside.values()), random)
     sizes = {kind: iter(even_sizes(int(np.sum(kinds == kind)), random)) for kind in MIX}
     truths = []
     for number, kind in enumerate(kinds, start=1):
@@ -128,7 +128,7 @@ def kinds_of(count: int) -> list[str]:
             for _ in range(high - low)]
 
 
-def turns(effects: Sequence[Effect], random: np.random.Generator) -> Iterator[Effect]:
+def round_robin(effects: Sequence[Effect], random: np.random.Generator) -> Iterator[Effect]:
     """Yield effects in turn and for ever, each round in another order."""
     while True:
         for k in random.permutation(len(effects)):

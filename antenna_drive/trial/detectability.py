@@ -29,7 +29,9 @@ import math
 
 from antenna_drive.trial.cases import build_machine, draw_truths, sheet_of, Truth
 from antenna_drive.trial.family import FAMILIES
-from antenna_drive.trial.machine import apply_tolerances, draw_tolerances, Records, Tolerances
+from antenna_drive.trial.machine import (
+    apply_tolerances, draw_tolerances, Records, ToleranceFactors,
+)
 from antenna_drive.trial.real_antenna import FloatArray, simulate
 from antenna_drive.trial.sensors import record
 from antenna_drive.trial.sheet import SensorGrade
@@ -75,14 +77,14 @@ class Study:
         neutral = draw_tolerances(0.0, np.random.default_rng(0))
         self._base = self._signals(neutral, (0.3, -0.2), None)
         columns = []
-        spread = tolerance * UNIFORM_SPREAD
+        sigma = tolerance * UNIFORM_SPREAD
         total = sum(part.size for part in neutral)
         for place, part in enumerate(neutral):
             for index in np.ndindex(part.shape):
                 sides = []
                 for sign in (1.0, -1.0):
                     moved = copy.deepcopy(neutral)
-                    moved[place][index] += sign * PROBE * spread
+                    moved[place][index] += sign * PROBE * sigma
                     sides.append(self._signals(moved, (0.3, -0.2), None))
                 columns.append((sides[0] - sides[1]) / (2.0 * PROBE))
                 report(len(columns) / total)
@@ -91,7 +93,7 @@ class Study:
         gram = self._nuisance.T @ self._nuisance
         self._solver = np.linalg.inv(gram + np.eye(len(gram)))
 
-    def _places(self, neutral: Tolerances) -> list[FloatArray]:
+    def _places(self, neutral: ToleranceFactors) -> list[FloatArray]:
         """Return the effects of the motors' places in their gaps, of each recording alone."""
         columns = []
         for place in ((0.4, -0.2), (0.3, -0.1)):
@@ -105,7 +107,7 @@ class Study:
         count = len(self._times)
         return list(UNIFORM_SPREAD * np.kron(np.eye(len(self._base) // count), np.ones(count)))
 
-    def _signals(self, tolerances: Tolerances, place: tuple[float, float],
+    def _signals(self, tolerances: ToleranceFactors, place: tuple[float, float],
                  effect: tuple[str, dict[str, float]] | None) -> FloatArray:
         """Return all recorded signals in standard deviations of noise, concatenated."""
         parts = []

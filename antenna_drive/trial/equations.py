@@ -393,9 +393,9 @@ def rotor_derivative(motor: Any, y: FloatArray, dy: FloatArray, at: int, which: 
     dy[at + TACH] = 0.0
     dy[at + TACH_SLOPE] = 0.0
     if motor.coupling_frequency > 0.0:
-        pull = motor.coupling_frequency
+        omega = motor.coupling_frequency
         dy[at + TACH] = y[at + TACH_SLOPE]
-        dy[at + TACH_SLOPE] = pull * pull * (w - y[at + TACH]) - 0.1 * pull * y[at + TACH_SLOPE]
+        dy[at + TACH_SLOPE] = omega * omega * (w - y[at + TACH]) - 0.1 * omega * y[at + TACH_SLOPE]
 
 
 @compiled
@@ -429,13 +429,13 @@ def structure_derivative(structure: Any, y: FloatArray, dy: FloatArray, t: float
         twist = angle - theta_a
         if k == 0 and structure.mode_play > 0.0:
             twist -= structure.mode_play * math.tanh(twist / structure.mode_play)
-        pull = -omega * omega * twist - 2.0 * zeta * omega * (rate - w_a)
+        acceleration = -omega * omega * twist - 2.0 * zeta * omega * (rate - w_a)
         if k == 0 and structure.mode_friction != 0.0:
-            pull -= (structure.mode_friction / inertia
-                     * math.tanh((rate - w_a) / structure.mode_friction_rate))
-        applied -= inertia * pull
+            acceleration -= (structure.mode_friction / inertia
+                             * math.tanh((rate - w_a) / structure.mode_friction_rate))
+        applied -= inertia * acceleration
         dy[MODES_AT + 2 * k] = rate
-        dy[MODES_AT + 2 * k + 1] = pull
+        dy[MODES_AT + 2 * k + 1] = acceleration
     dy[DAHL] = 0.0
     if structure.dahl != 0.0:
         applied -= structure.dahl * structure.coulomb * y[DAHL]

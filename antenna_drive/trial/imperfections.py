@@ -27,7 +27,7 @@ import math
 from typing import Any
 
 from antenna_drive.trial.machine import Records
-from antenna_drive.trial.real_antenna import FloatArray, History, simulate
+from antenna_drive.trial.real_antenna import FloatArray, simulate, TrueSignals
 from antenna_drive.trial.sensors import Noise, record, sample_instants
 from antenna_drive.trial.sheet import CaseSheet
 import numpy as np
@@ -174,7 +174,7 @@ def kept_rows(count: int, share: float, random: np.random.Generator) -> NDArray[
 
 
 def late_history(machine: Records, sheet: CaseSheet, instants: FloatArray,
-                 delays: Mapping[str, float], place: tuple[float, float]) -> History:
+                 delays: Mapping[str, float], place: tuple[float, float]) -> TrueSignals:
     """
     Simulate a test and return what each channel reads at the instants: what was so much earlier.
 

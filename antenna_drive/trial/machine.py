@@ -127,7 +127,7 @@ def _build_circuit(record: Any, circuit: str, filter_1: str, bias_pot: float) ->
     record['filter_pole'] = FILTER_1[filter_1]['pole']
 
 
-class Tolerances(NamedTuple):
+class ToleranceFactors(NamedTuple):
     """Factors near 1 for all toleranced constants, in a fixed order."""
 
     motors: NDArray[np.float64]         # shape (2, len(TOLERANCED_MOTOR))
@@ -135,7 +135,7 @@ class Tolerances(NamedTuple):
     circuit: NDArray[np.float64]        # shape (len(TOLERANCED_CIRCUIT),)
 
 
-def draw_tolerances(tolerance: float, random: np.random.Generator) -> Tolerances:
+def draw_tolerances(tolerance: float, random: np.random.Generator) -> ToleranceFactors:
     """
     Draw the deviations of one antenna from the reference, uniform within +-tolerance.
 
@@ -151,15 +151,15 @@ def draw_tolerances(tolerance: float, random: np.random.Generator) -> Tolerances
         return 1.0 + tolerance * random.uniform(-1.0, 1.0, shape)
 
     width = sum(_width(name) for name in TOLERANCED_STRUCTURE)
-    return Tolerances(factors(2, len(TOLERANCED_MOTOR)), factors(width),
-                      factors(len(TOLERANCED_CIRCUIT)))
+    return ToleranceFactors(factors(2, len(TOLERANCED_MOTOR)), factors(width),
+                            factors(len(TOLERANCED_CIRCUIT)))
 
 
 def _width(field: str) -> int:
     return math.prod(_SHAPES.get(field, ()))
 
 
-def apply_tolerances(machine: Records, tolerances: Tolerances) -> None:
+def apply_tolerances(machine: Records, tolerances: ToleranceFactors) -> None:
     """Multiply every toleranced constant of the machine by its factor."""
     for column, name in enumerate(TOLERANCED_MOTOR):
         machine.motors[name] *= tolerances.motors[:, column]

@@ -30,14 +30,14 @@ import math
 from typing import Any
 
 from antenna_drive.trial import equations, integrator
-from antenna_drive.trial.cases import build_machine, case_name, sheet_of, Truth, turns
+from antenna_drive.trial.cases import build_machine, case_name, round_robin, sheet_of, Truth
 from antenna_drive.trial.effects import CATALOGUE
 from antenna_drive.trial.imperfections import draw_imperfections, recorder_noise
 from antenna_drive.trial.machine import Records
 from antenna_drive.trial.programme import draw_sheets
 from antenna_drive.trial.real_antenna import (
-    FloatArray, History, history_of, input_edges, SimulationError, start_state, state_sizes,
-    TOLERANCE,
+    FloatArray, history_of, input_edges, SimulationError, start_state, state_sizes, TOLERANCE,
+    TrueSignals,
 )
 from antenna_drive.trial.sensors import record, sample_instants
 from antenna_drive.trial.sheet import CaseSheet
@@ -67,7 +67,7 @@ def draw_truths(count: int, seed: int, tolerance: float, healthy_s: float = 0.0)
         length of tests in which nothing happens; 0: an effect is switched on in each [s]
 
     """
-    effects = turns(list(CATALOGUE.values()), np.random.default_rng([seed, 0]))
+    effects = round_robin(list(CATALOGUE.values()), np.random.default_rng([seed, 0]))
     return [_truth(number, seed, tolerance, healthy_s, effects)
             for number in range(1, count + 1)]
 
@@ -165,7 +165,7 @@ def shows_by(truth: Truth, columns: Mapping[str, FloatArray], within_s: float) -
 
 
 def simulate_changes(stretches: Sequence[tuple[Records, float]], sheet: CaseSheet,
-                     times: FloatArray, place: tuple[float, float] = (0.0, 0.0)) -> History:
+                     times: FloatArray, place: tuple[float, float] = (0.0, 0.0)) -> TrueSignals:
     """
     Simulate one test from rest, with one machine after the other.
 
@@ -208,7 +208,7 @@ def _later(test: NDArray[Any], by: float) -> NDArray[Any]:
 
 
 def _stretch(machine: Records, test: NDArray[Any], y: FloatArray, mode: NDArray[np.int64],
-             times: FloatArray, length: float) -> History:
+             times: FloatArray, length: float) -> TrueSignals:
     """Integrate one machine from its own zero of time; leave the last state in `y`."""
     instants = np.append(times, length)
     states = np.full((len(instants), equations.STATES), math.nan)
@@ -222,10 +222,10 @@ def _stretch(machine: Records, test: NDArray[Any], y: FloatArray, mode: NDArray[
     return history_of(machine, test, times, states[:-1], edges, statistics)
 
 
-def _joined(parts: Sequence[History]) -> History:
+def _joined(parts: Sequence[TrueSignals]) -> TrueSignals:
     values: dict[str, Any] = {}
-    for item in fields(History):
+    for item in fields(TrueSignals):
         own = [getattr(part, item.name) for part in parts]
         axis = 0 if item.name == 'state' else -1
         values[item.name] = sum(own) if isinstance(own[0], int) else np.concatenate(own, axis)
-    return History(**values)
+    return TrueSignals(**values)

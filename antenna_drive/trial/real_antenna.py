@@ -41,7 +41,7 @@ class SimulationError(RuntimeError):
 
 
 @dataclass(frozen=True)
-class History:
+class TrueSignals:
     """
     The true signals at the requested times; arrays have shape (n,) unless noted.
 
@@ -120,7 +120,7 @@ def state_sizes(machine: Records) -> FloatArray:
 
 def simulate(machine: Records, sheet: CaseSheet, times: FloatArray,
              place: tuple[float, float] = (0.0, 0.0),
-             tolerance: float = TOLERANCE) -> History:
+             tolerance: float = TOLERANCE) -> TrueSignals:
     """
     Simulate one test from rest and return the true signals.
 
@@ -176,7 +176,7 @@ def input_edges(machine: Records, test: np.void, end: float) -> FloatArray:
 
 
 def history_of(machine: Records, test: NDArray[np.void], times: FloatArray, states: FloatArray,
-               edges: FloatArray, statistics: NDArray[np.int64]) -> History:
+               edges: FloatArray, statistics: NDArray[np.int64]) -> TrueSignals:
     bounds = np.concatenate(([0.0], edges, times[-1:]))
     stretch = np.minimum(np.searchsorted(bounds, times, side='right') - 1, len(edges))
     middles = 0.5 * (bounds[stretch] + bounds[stretch + 1])
@@ -186,7 +186,7 @@ def history_of(machine: Records, test: NDArray[np.void], times: FloatArray, stat
     encoder = (states[:, equations.ENCODER] if machine.structure[0]['encoder_frequency'] > 0.0
                else states[:, equations.THETA_A])
     columns = [MOTOR_AT + which * MOTOR_SIZE for which in range(2)]
-    return History(
+    return TrueSignals(
         time=times, command=command,
         current=states[:, [at + equations.I for at in columns]].T,
         rate=states[:, [at + equations.W for at in columns]].T,

@@ -128,7 +128,7 @@ class Case:
         return self.named_among(1)
 
 
-def read_cases(folder: Path) -> tuple[list[Case], int]:
+def read_cases(folder: Path) -> tuple[list[Case], list[Truth]]:
     """
     Read truths and verdicts of a trial, checking every seal.
 
@@ -139,7 +139,7 @@ def read_cases(folder: Path) -> tuple[list[Case], int]:
 
     Returns
     -------
-    the diagnosed cases, and the number of cases not yet diagnosed
+    the diagnosed cases, and the truths of those that are not diagnosed yet
 
     Raises
     ------
@@ -147,7 +147,8 @@ def read_cases(folder: Path) -> tuple[list[Case], int]:
 
     """
     manifest = sealing.read_manifest(folder)
-    cases, pending = [], 0
+    cases: list[Case] = []
+    pending: list[Truth] = []
     for name in manifest['seals']:
         truth = sealing.open_truth(folder, name, manifest)
         place = folder / name
@@ -160,7 +161,7 @@ def read_cases(folder: Path) -> tuple[list[Case], int]:
         elif (place / FAILURE).exists():
             cases.append(Case(truth, None))
         else:
-            pending += 1
+            pending.append(truth)
     return cases, pending
 
 

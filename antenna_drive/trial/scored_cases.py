@@ -37,16 +37,16 @@ _KEPT = ('case', 'seed', 'kind', 'effects', 'machine', 'family', 'tolerance', 's
          'durations_s')
 
 
-def identity(case: Case) -> Truth:
+def identity(truth: Truth) -> Truth:
     """Return a truth without what follows from its seed: no two cases have the same."""
-    return {key: case.truth[key] for key in _KEPT if key in case.truth}
+    return {key: truth[key] for key in _KEPT if key in truth}
 
 
 def case_lines(cases: Iterable[Case]) -> Iterator[str]:
     """Yield one line of JSON for each case: whose it is, and the answer."""
     for case in cases:
         yield json.dumps({
-            'truth': identity(case), 'verdict': case.verdict and content_of(case.verdict),
+            'truth': identity(case.truth), 'verdict': case.verdict and content_of(case.verdict),
             'closed': case.closed if math.isfinite(case.closed) else None}, allow_nan=False) + '\n'
 
 

@@ -19,7 +19,7 @@ from collections.abc import Callable
 import math
 
 from antenna_drive.trial.machine import LAW_B, Records
-from antenna_drive.trial.real_antenna import FloatArray, History
+from antenna_drive.trial.real_antenna import FloatArray, TrueSignals
 from antenna_drive.trial.sheet import SensorGrade
 import numpy as np
 from scipy.signal import lfilter
@@ -58,8 +58,8 @@ def sample_instants(rate: float, duration: float,
     """
     count = int(round(rate * duration)) + 1
     grid = np.arange(count) / rate
-    spread = np.clip(random.normal(0.0, JITTER, count), -0.3, 0.3) / rate
-    instants = np.maximum(grid + spread, 0.0)
+    jitter = np.clip(random.normal(0.0, JITTER, count), -0.3, 0.3) / rate
+    instants = np.maximum(grid + jitter, 0.0)
     error = np.clip(random.normal(0.0, STAMP_ERROR_S, count), -0.1 / rate, 0.1 / rate)
     stamps = np.round((instants + error) / STAMP_DIGIT_S) * STAMP_DIGIT_S
     instants[0] = stamps[0] = 0.0
@@ -109,7 +109,7 @@ def _ammeters(current: FloatArray, machine: Records, stamps: FloatArray) -> Floa
     return current
 
 
-def record(history: History, machine: Records, grade: SensorGrade, stamps: FloatArray,
+def record(history: TrueSignals, machine: Records, grade: SensorGrade, stamps: FloatArray,
            random: np.random.Generator, noise: Noise | None = None) -> dict[str, FloatArray]:
     """
     Return the recording of true signals.
@@ -153,8 +153,8 @@ def record(history: History, machine: Records, grade: SensorGrade, stamps: Float
         name = f'tach_rate_{which + 1}_rad_s'
         true = (1.0 + float(sensors[f'tach_error_{which + 1}'])) * history.tach[which]
         offset = random.uniform(-1.0, 1.0) * grade.tach_noise_rad_s
-        spread = np.hypot(grade.tach_noise_rad_s, grade.tach_noise_relative * true)
-        columns[name] = _digits(true + offset + noise(name, count) * spread,
+        sigma = np.hypot(grade.tach_noise_rad_s, grade.tach_noise_relative * true)
+        columns[name] = _digits(true + offset + noise(name, count) * sigma,
                                 grade.tach_step_rad_s)
     columns['encoder_rad'] = _encoder(history.encoder_angle, machine, grade, random)
     bias = (1.0 + float(sensors['bias_error'])) * history.bias

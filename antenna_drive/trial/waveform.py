@@ -126,8 +126,8 @@ def corners(test: Any, end: float) -> NDArray[np.float64]:
         shift = 0.0 if test['shape'] == SQUARE else 0.25
         last = math.ceil(2.0 * ((end - start) / period + phase)) + 1
         first = math.floor(2.0 * phase) - 1
-        turns = [(0.5 * k + shift - phase) * period for k in range(first, last + 1)]
-        times += [start, *(start + turn for turn in turns if start == 0.0 or turn > 0.0)]
+        edges = [(0.5 * k + shift - phase) * period for k in range(first, last + 1)]
+        times += [start, *(start + edge for edge in edges if start == 0.0 or edge > 0.0)]
     elif test['shape'] == KNOTS:
         times += test['knot_time'][:int(test['knots'])].tolist()
     elif test['shape'] != REST:

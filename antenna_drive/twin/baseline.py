@@ -78,7 +78,7 @@ class SignalBaseline:
     Attributes
     ----------
     lag : by which the reading is late [s]
-    centre, spread : of the regressors, shape (m,)
+    centre, scale : of the regressors, shape (m,)
     coefficients : of the standardised regressors, in units of the signal, shape (m,)
     sigma : robust standard deviation of what is left, in units of the signal
     mean, deviation : of the scores, shape (5,); deviation 0 where a score says nothing
@@ -88,7 +88,7 @@ class SignalBaseline:
 
     lag: float
     centre: FloatArray
-    spread: FloatArray
+    scale: FloatArray
     coefficients: FloatArray
     sigma: float
     mean: FloatArray
@@ -206,16 +206,16 @@ def direction(course: FloatArray) -> FloatArray:
     return np.asarray(np.tanh(course[:, _RATE] / _STANDS))
 
 
-def standardised(rows: FloatArray, centre: FloatArray, spread: FloatArray) -> FloatArray:
+def standardised(rows: FloatArray, centre: FloatArray, scale: FloatArray) -> FloatArray:
     """Return regressors with mean 0 and variance 1; a constant one is 0, the first one 1."""
-    safe = np.where(spread > 0.0, spread, 1.0)
-    result = np.where(spread > 0.0, (rows - centre) / safe, 0.0)
+    safe = np.where(scale > 0.0, scale, 1.0)
+    result = np.where(scale > 0.0, (rows - centre) / safe, 0.0)
     result[:, 0] = 1.0
     return np.asarray(result)
 
 
 @dataclass(frozen=True)
-class Part:
+class SignalBlock:
     """
     One signal in one block.
 
@@ -236,17 +236,17 @@ class Part:
         """Return the slope of the twin's signal, shape (n,)."""
         return np.asarray(self.rows[:, SLOPES + self.column])
 
-    def shifted(self, shift_s: float) -> Part:
+    def shifted(self, shift_s: float) -> SignalBlock:
         """Return the part beside a twin that is earlier by a time [s]."""
         return replace(self, residual=self.residual - shift_s * self.slope)
 
     def left(self, baseline: SignalBaseline) -> FloatArray:
         """Return what the regressors of a baseline leave of the residual, shape (n,)."""
-        own = standardised(self.rows, baseline.centre, baseline.spread)
+        own = standardised(self.rows, baseline.centre, baseline.scale)
         return np.asarray(self.residual - own @ baseline.coefficients)
 
 
-def shift_of(block: Sequence[tuple[SignalBaseline, Part]]) -> tuple[float, float]:
+def shift_of(block: Sequence[tuple[SignalBaseline, SignalBlock]]) -> tuple[float, float]:
     """
     Return by how much the twin is late in one block [s], and what that weighs [1/s^2].
 
@@ -286,9 +286,9 @@ def scores(left: FloatArray, signal: FloatArray, slope: FloatArray,
                      0.5 * math.log1p(float((cut**2).mean()))])
 
 
-def block_scores(baseline: SignalBaseline, part: Part) -> tuple[FloatArray, FloatArray]:
+def block_scores(baseline: SignalBaseline, part: SignalBlock) -> tuple[FloatArray, FloatArray]:
     """Return the scores of one signal in one block, and what is left of its residual."""
-    own = standardised(part.rows, baseline.centre, baseline.spread)
+    own = standardised(part.rows, baseline.centre, baseline.scale)
     left = part.left(baseline)
     return scores(left / baseline.sigma, own[:, 1 + part.column],
                   own[:, SLOPES + part.column], part.rows[:, WAY]), left

@@ -29,7 +29,7 @@ from antenna_drive.parameters.loading import load
 from antenna_drive.recording.csv_format import FIELD_COLUMNS
 from antenna_drive.recording.recording import make_channel, NANOSECONDS, Recording, unit_of
 from antenna_drive.recording.sheet import parse_sheet
-from antenna_drive.twin.watch import GAP, Settings, Twin
+from antenna_drive.twin.watch import GAP, Twin, TwinSettings
 import numpy as np
 
 # So much arrives between two looks of the twin [s].
@@ -87,7 +87,7 @@ def played(twin: Twin, columns: Mapping[str, FloatArray]) -> Iterator[float]:
 
 
 def watched(columns: Mapping[str, FloatArray], sheet: Mapping[str, Any], onset_s: float,
-            settings: Settings | None = None) -> dict[str, Any]:
+            settings: TwinSettings | None = None) -> dict[str, Any]:
     """
     Return what a twin says of a test in which an effect is switched on.
 

@@ -30,8 +30,9 @@ from antenna_drive.emulator.batch import CHANNELS
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.recording.recording import unit_of
 from antenna_drive.twin.baseline import (
-    Baseline, BLOCK_S, block_scores, CUT, DRIFT_S, interpolated, LEAST_SAMPLES, motion_of, Part,
-    regressors, residual_of, SCORES, shift_of, SignalBaseline, SLOPES, standardised, WashOut, WAY,
+    Baseline, BLOCK_S, block_scores, CUT, DRIFT_S, interpolated, LEAST_SAMPLES, motion_of,
+    regressors, residual_of, SCORES, shift_of, SignalBaseline, SignalBlock, SLOPES, standardised,
+    WashOut, WAY,
 )
 import numpy as np
 from numpy.typing import NDArray
@@ -137,8 +138,8 @@ def lag_of(track: Track, name: str) -> float:
 
 
 def _correlation(one: FloatArray, other: FloatArray) -> float:
-    spread = float(one.std() * other.std())
-    return float(((one - one.mean()) * (other - other.mean())).mean()) / spread if spread else 0.0
+    scale = float(one.std() * other.std())
+    return float(((one - one.mean()) * (other - other.mean())).mean()) / scale if scale else 0.0
 
 
 @dataclass(frozen=True)
@@ -147,7 +148,7 @@ class _Prepared:
 
     name: str
     lag: float
-    parts: Sequence[Part]
+    parts: Sequence[SignalBlock]
 
 
 def _all_prepared(track: Track, table: FloatArray, edges: FloatArray, lags: Mapping[str, float],
@@ -170,7 +171,7 @@ def _prepared(track: Track, name: str, table: FloatArray, edges: FloatArray,
     residual = residual_of(column, values, interpolated(times, track.time, track.course)[
         :, column], times, WashOut())
     rows = interpolated(times, track.time, table)
-    return _Prepared(name, float(lag[-1]), [Part(column, residual[part], rows[part])
+    return _Prepared(name, float(lag[-1]), [SignalBlock(column, residual[part], rows[part])
                                             for part in _parts(times, edges)])
 
 
@@ -184,23 +185,23 @@ def _fitted_to(item: _Prepared, shifts: Sequence[float]) -> SignalBaseline:
     residual = np.concatenate([part.shifted(shift).residual
                                for part, shift in zip(item.parts, shifts, strict=True)])
     rows = np.concatenate([part.rows for part in item.parts])
-    centre, spread = rows.mean(axis=0), rows.std(axis=0)
-    spread = np.where(_moves(rows, spread), spread, 0.0)
+    centre, scale = rows.mean(axis=0), rows.std(axis=0)
+    scale = np.where(_moves(rows, scale), scale, 0.0)
     least = _LEAST[unit_of(item.name) or '']
-    own = standardised(rows, centre, spread)
+    own = standardised(rows, centre, scale)
     coefficients = _fitted(own, residual, least)
     sigma = _robust(residual - own @ coefficients, least)
-    return SignalBaseline(item.lag, centre, spread, coefficients, sigma,
+    return SignalBaseline(item.lag, centre, scale, coefficients, sigma,
                           *np.zeros((3, len(SCORES))))
 
 
-def _moves(rows: FloatArray, spread: FloatArray) -> NDArray[np.bool_]:
+def _moves(rows: FloatArray, scale: FloatArray) -> NDArray[np.bool_]:
     """Return which regressors more than rounding moves; the others have nothing to say."""
     size = np.abs(rows).max(axis=0)
     # the slope of a constant is what rounding makes of it, in a second
     of_signals, slopes = size[1:SLOPES], size[SLOPES:WAY]
     np.maximum(slopes, of_signals, out=slopes)
-    return np.asarray(spread > 1e-9 * np.maximum(size, 1e-9))
+    return np.asarray(scale > 1e-9 * np.maximum(size, 1e-9))
 
 
 def _robust(values: FloatArray, least: float) -> float:
@@ -239,7 +240,7 @@ def _smooth(shifts: FloatArray, weights: FloatArray) -> FloatArray:
     return np.asarray(kernel @ (weights * shifts) / np.maximum(kernel @ weights, 1e-30))
 
 
-def _with_scores(bare: SignalBaseline, parts: Sequence[Part],
+def _with_scores(bare: SignalBaseline, parts: Sequence[SignalBlock],
                  shifts: Sequence[float]) -> SignalBaseline:
     """Return a baseline with mean and scatter of its scores."""
     table = np.array([block_scores(bare, part.shifted(shift))[0]

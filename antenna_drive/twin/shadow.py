@@ -40,7 +40,7 @@ AHEAD = 5
 _BEHIND = 40
 
 
-class _Command(Unit):
+class _CommandSource(Unit):
     """Puts out the command that was laid onto the next macro-steps."""
 
     outputs: ClassVar[tuple[Signal, ...]] = wiring.OUTPUTS[wiring.TEST_SIGNAL]
@@ -84,7 +84,7 @@ class Shadow:
     def __init__(self, drive: Drive, changes: Changes | None = None,
                  step_s: float = MACRO_STEP) -> None:
         """Build the drive; it begins with the first command."""
-        self._command = _Command()
+        self._command = _CommandSource()
         others = {name: units.build(name, drive) for name in wiring.UNITS
                   if name != wiring.TEST_SIGNAL}
         self._emulator = Emulator(drive, step_s, {**others, wiring.TEST_SIGNAL: self._command})

@@ -36,8 +36,8 @@ from antenna_drive.recording.recording import NANOSECONDS, Recording, unit_of
 from antenna_drive.recording.sheet import TestSheet
 from antenna_drive.twin.baseline import (
     Baseline, BLOCK_S, block_scores, DRIFT_S, ENCODER, interpolated, motion_of, names_of_charts,
-    Part, regressors, residual_of, SCORES, shift_of, SignalBaseline, standard_scores, TWO_SIDED,
-    WashOut,
+    regressors, residual_of, SCORES, shift_of, SignalBaseline, SignalBlock, standard_scores,
+    TWO_SIDED, WashOut,
 )
 from antenna_drive.twin.cusum import Charts, limit_of_rate
 from antenna_drive.twin.intake import COMMAND, Intake
@@ -65,7 +65,7 @@ Tune = Callable[[Recording, Drive], str]
 
 
 @dataclass(frozen=True)
-class Settings:
+class TwinSettings:
     """
     How a twin judges.
 
@@ -207,10 +207,10 @@ class Twin:
     """
 
     def __init__(self, drive: Drive, sheet: TestSheet | None = None,
-                 settings: Settings | None = None, baseline: Baseline | None = None,
+                 settings: TwinSettings | None = None, baseline: Baseline | None = None,
                  tune: Tune | None = None, step_s: float = MACRO_STEP) -> None:
         """Begin with nothing known of the real drive."""
-        self.settings = settings or Settings()
+        self.settings = settings or TwinSettings()
         self.sheet = sheet or TestSheet()
         self.drive = drive
         self.intake = Intake(self.settings.keep_s)
@@ -445,8 +445,8 @@ class Twin:
             times, residual = self._residual(name, item, end, time, course.raw[part])
             if times.size:
                 self._missing.pop(name, None)
-                there[name] = Part(CHANNELS.index(name), residual,
-                                   interpolated(times, time, table))
+                there[name] = SignalBlock(CHANNELS.index(name), residual,
+                                          interpolated(times, time, table))
             else:
                 self._missing.setdefault(name, begin)
         shift = self._drift(*shift_of([(signals[name], measured)

@@ -117,5 +117,5 @@ def test_steps_are_short_where_a_wave_turns_fast() -> None:
     rate = math.radians(0.5)
     assert fine.steps[:, 0].max() * rate * 200000.0 <= 0.7 * 1.0001
     assert schedule(command, Bias(), time, Longest(2.5e-3)).steps.shape[0] == 1600
-    assert schedule(command, Bias(), time, replace(longest, turns=100.0)).steps.shape[0] == 1600
+    assert schedule(command, Bias(), time, replace(longest, cycles=100.0)).steps.shape[0] == 1600
     assert fine.steps[:, 0].sum() == pytest.approx(4.0)

@@ -27,7 +27,9 @@ from antenna_drive.errors import UserError
 from antenna_drive.machines.antenna import investigation
 from antenna_drive.machines.antenna.drive_limits import DriveLimits
 from antenna_drive.machines.antenna.field_recording import CHANNELS, RATE_COMMAND
-from antenna_drive.machines.antenna.investigation import Investigation, lines, Plan, sensed
+from antenna_drive.machines.antenna.investigation import (
+    Investigation, InvestigationPlan, lines, sensed,
+)
 from antenna_drive.machines.antenna.planned_tests import BUILT_IN
 from antenna_drive.machines.antenna.sensors import SensorModel
 from antenna_drive.pages import render
@@ -83,7 +85,7 @@ class Laboratory:
 
 
 def investigate(folder: Path, lab: Laboratory, **changes: Any) -> dict[str, Any]:
-    plan = Plan(**{'most': 4, 'until': 0.9, 'duration': 20.0, **changes})
+    plan = InvestigationPlan(**{'most': 4, 'until': 0.9, 'duration': 20.0, **changes})
     return Investigation(folder, DRIVE, LIMITS, BUILT_IN['square'], lab.run_test, plan).run()
 
 

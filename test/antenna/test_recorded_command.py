@@ -131,7 +131,7 @@ def test_what_nobody_recorded_is_open_within_a_hole() -> None:
     command = lacking(lambda t: np.asarray(np.sin(omega * t)), 4.0, 4.27)
     (begin, end), = command.holes
     assert 4.0 - PERIOD <= begin <= 4.0 and 4.27 <= end <= 4.27 + PERIOD
-    assert command.jumps.size == 0 and command.doubt[0] > 0.1
+    assert command.jumps.size == 0 and command.uncertainty[0] > 0.1
     places = np.linspace(begin, end, 20001)
     changed = command.with_mean(0, 0.25)
     assert np.mean(changed(places) - command(places)) == pytest.approx(0.25, rel=1e-3)

@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from antenna_drive.diagnosis import (
-    Effect, Effort, Experiment, FloatArray, Form, Judged, Machine, Parameter, Point, Rival,
+    DesignEffort, Effect, Experiment, FloatArray, Form, Judged, Machine, Parameter, Point, Rival,
     TestDesign, TestSpace,
 )
 from antenna_drive.diagnosis.design import CRITERIA
@@ -27,7 +27,7 @@ from antenna_drive.diagnosis.proposal import as_data, contents, lines
 import numpy as np
 import pytest
 
-SMALL = Effort(drawn=8, judged=6, varied=2, variants=2, confirmed=2)
+SMALL = DesignEffort(drawn=8, judged=6, varied=2, variants=2, confirmed=2)
 
 
 class Lever(Machine):

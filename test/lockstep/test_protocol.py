@@ -27,7 +27,7 @@ from pathlib import Path
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.lockstep import compiled_loop
-from antenna_drive.lockstep.compiled_unit import Form, FORMS
+from antenna_drive.lockstep.compiled_unit import CompiledForm, FORMS
 from antenna_drive.lockstep.exchange import Exchange
 from antenna_drive.lockstep.inbox import DEPTH, Inbox, Refusal
 from antenna_drive.lockstep.member import Conductor, Guest, Member, SLACK
@@ -92,7 +92,7 @@ def advance(k: int, h: float, u: FloatArray, y: FloatArray, memory: tuple[FloatA
         y[1, 0] = math.nan
 
 
-FORMS[Chaotic] = lambda unit: Form(
+FORMS[Chaotic] = lambda unit: CompiledForm(
     'chaotic', advance, lambda step_s: (unit.broken_at,), unit.x, lambda step: None,
     Path(__file__).resolve().parent)
 

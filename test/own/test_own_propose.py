@@ -20,13 +20,13 @@ from pathlib import Path
 from typing import Any
 
 from antenna_drive.cli import main
-from antenna_drive.diagnosis import Effort, Rival, TestDesign
+from antenna_drive.diagnosis import DesignEffort, Rival, TestDesign
 from antenna_drive.machines.own import effect, Log, Model, ModelError, own_tests, read_log, size
 import numpy as np
 from own.swing import swing
 import pytest
 
-SMALL = Effort(drawn=6, judged=4, varied=1, variants=1, confirmed=1)
+SMALL = DesignEffort(drawn=6, judged=4, varied=1, variants=1, confirmed=1)
 
 
 def push_off(duration_s: float, random: np.random.Generator) -> Log:

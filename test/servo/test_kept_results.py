@@ -20,7 +20,7 @@ from pathlib import Path
 from antenna_drive.errors import UserError
 from antenna_drive.machines.servo.bam import read_bam
 from antenna_drive.machines.servo.log import ServoLog
-from antenna_drive.machines.servo.rounds import Effort
+from antenna_drive.machines.servo.rounds import FitEffort
 from antenna_drive.machines.servo.study import _KeptResults, Direction
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def log() -> ServoLog:
 
 def test_a_result_is_found_for_the_same_study_and_no_other(tmp_path: Path,
                                                            log: ServoLog) -> None:
-    effort = Effort(100, 20)
+    effort = FitEffort(100, 20)
     kept = _KeptResults(tmp_path, [log], effort, ['encoder.offset'])
     assert kept.find(DIRECTION) is None
     kept.put(DIRECTION, RESULT)
@@ -46,14 +46,14 @@ def test_a_result_is_found_for_the_same_study_and_no_other(tmp_path: Path,
     assert again.find(Direction('gain', (100.0, 400.0))) is None
     moved = ServoLog(**{**vars(log), 'measured': np.zeros_like(log.measured)})
     for other in (_KeptResults(tmp_path, [moved], effort, ['encoder.offset']),
-                  _KeptResults(tmp_path, [log], Effort(101, 20), ['encoder.offset']),
+                  _KeptResults(tmp_path, [log], FitEffort(101, 20), ['encoder.offset']),
                   _KeptResults(tmp_path, [log], effort, [])):
         assert other.find(DIRECTION) is None
     assert sorted(path.suffix for path in tmp_path.iterdir()) == ['.json']
 
 
 def test_a_damaged_result_is_not_found(tmp_path: Path, log: ServoLog) -> None:
-    kept = _KeptResults(tmp_path, [log], Effort(100, 20), [])
+    kept = _KeptResults(tmp_path, [log], FitEffort(100, 20), [])
     kept.put(DIRECTION, RESULT)
     file, = tmp_path.iterdir()
     for text in (file.read_text()[:-5], '[]', '{}', ''):
@@ -63,9 +63,9 @@ def test_a_damaged_result_is_not_found(tmp_path: Path, log: ServoLog) -> None:
 
 def test_nothing_is_kept_without_a_folder_and_a_bad_one_is_told(tmp_path: Path,
                                                                 log: ServoLog) -> None:
-    kept = _KeptResults(None, [log], Effort(100, 20), [])
+    kept = _KeptResults(None, [log], FitEffort(100, 20), [])
     kept.put(DIRECTION, RESULT)
     assert kept.find(DIRECTION) is None
     (tmp_path / 'file').write_text('')
     with pytest.raises(UserError, match='cannot be written'):
-        _KeptResults(tmp_path / 'file', [log], Effort(100, 20), []).put(DIRECTION, RESULT)
+        _KeptResults(tmp_path / 'file', [log], FitEffort(100, 20), []).put(DIRECTION, RESULT)

@@ -34,7 +34,7 @@ from antenna_drive.machines.servo.firmware import firmware_of
 from antenna_drive.machines.servo.log import ServoLog
 from antenna_drive.machines.servo.machine import ServoMachine
 from antenna_drive.machines.servo.physics import GRAVITY, ORDER
-from antenna_drive.machines.servo.rounds import Effort, folds, lacking, numbers
+from antenna_drive.machines.servo.rounds import FitEffort, folds, lacking, numbers
 from antenna_drive.machines.servo.study import compared, Direction, directions, summed
 from antenna_drive.programs import BAD_INPUT
 import numpy as np
@@ -290,7 +290,7 @@ def test_nothing_withheld_can_change_what_is_found() -> None:
     direction = Direction('gain', (150.0, 400.0))
     spoilt = [t if t.kp < 800.0 else ServoLog(**{
         **vars(t), 'measured': np.zeros_like(t.measured)}) for t in tests]
-    effort = Effort(60, 20)
+    effort = FitEffort(60, 20)
     first, second = (compared(each, direction, effort) for each in (tests, spoilt))
     assert first['rounds'] == second['rounds']
     for name, model in first['models'].items():
@@ -302,7 +302,7 @@ def test_nothing_withheld_can_change_what_is_found() -> None:
 def test_the_search_finds_what_a_servo_lacks_and_no_more() -> None:
     tests = [made(kp, name, load_friction=0.25)
              for kp in (200.0, 600.0) for name in ('sweep', 'mixed')]
-    found = lacking(tests, Effort(1200, 300))
+    found = lacking(tests, FitEffort(1200, 300))
     assert 'gearbox.load_dependent_friction' in found.effects
     assert found.fit.error < 3e-3
     assert set(numbers(())) == set(BASE)
@@ -382,7 +382,7 @@ def test_logs_that_cannot_serve_are_told_in_one_line(
 @pytest.mark.skipif(not LOGS.is_dir(), reason='the recordings of the servo are not here')
 def test_a_real_servos_diagnosis_beats_the_ladder_on_withheld_gains() -> None:
     tests = [ServoLog.of(path.stem, read_bam(path)) for path in sorted(LOGS.glob('*.json'))]
-    result = compared(tests, Direction('gain', (100.0, 400.0)), Effort())
+    result = compared(tests, Direction('gain', (100.0, 400.0)), FitEffort())
     errors = {name: model['withheld_mrad'] for name, model in result['models'].items()}
     ours = errors.pop('diagnosed')
     assert ours < min(errors.values())

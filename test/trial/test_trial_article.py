@@ -19,7 +19,7 @@ import functools
 import math
 
 from antenna_drive.trial.machine import reference_machine
-from antenna_drive.trial.real_antenna import History, simulate
+from antenna_drive.trial.real_antenna import simulate, TrueSignals
 from antenna_drive.trial.sheet import CaseSheet
 import numpy as np
 from numpy.typing import NDArray
@@ -32,14 +32,14 @@ OLD_POLE = 1.369863
 
 
 @functools.cache
-def square(bias_v: float) -> History:
+def square(bias_v: float) -> TrueSignals:
     """Run T1 or T2: a square wave of 0.013 deg/s and 6.3 s."""
     sheet = CaseSheet('old', 'old', {'type': 'fixed', 'voltage_V': bias_v},
                       {'type': 'square', 'amplitude_deg_s': 0.013, 'period_s': 6.3})
     return simulate(reference_machine(), sheet, np.arange(0.0, 31.499, 0.0005))
 
 
-def after_reversal(history: History, first: float, last: float) -> NDArray[np.bool_]:
+def after_reversal(history: TrueSignals, first: float, last: float) -> NDArray[np.bool_]:
     """Select the samples so long after a reversal, the first period left out."""
     since = np.mod(history.time, HALF_PERIOD_S)
     return (history.time > 2.0 * HALF_PERIOD_S) & (since >= first) & (since <= last)

@@ -342,3 +342,19 @@ def test_command_prints_the_seal_first(tmp_path: Path,
     text = json.dumps(manifest, sort_keys=True, separators=(',', ':'))
     assert hashlib.sha256(text.encode()).hexdigest() in lines[0]
     assert (folder / 'case_0001' / 'rec_c.yaml').exists()
+
+
+def test_command_leaves_out_what_a_file_of_scored_cases_holds(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    first, rest, file = tmp_path / 'first', tmp_path / 'rest', tmp_path / 'first.jsonl'
+    words = ['trial', '--cases', '2', '--sample-rate', '50', '--jobs', '1', '--quiet']
+    assert main([*words, '--seed', '2', '--out', str(first)]) == 0
+    (first / 'case_0001' / 'failure.txt').write_text('none')
+    assert main(['score', str(first), '--cases', str(file), '--json', '-']) == 0
+    assert main([*words, '--seed', '2', '--out', str(rest), '--skip', str(file)]) == 0
+    assert not (rest / 'case_0001').exists()
+    assert ((rest / 'case_0002' / 'rec_a.csv').read_bytes()
+            == (first / 'case_0002' / 'rec_a.csv').read_bytes())
+    capsys.readouterr()
+    assert main([*words, '--seed', '3', '--out', str(tmp_path / 'x'), '--skip', str(file)]) == 2
+    assert 'case_0001: is no case of this trial' in capsys.readouterr().err

@@ -20,7 +20,7 @@ import math
 from antenna_drive.trial import equations
 from antenna_drive.trial.equations import MODES_AT, MOTOR_AT, MOTOR_SIZE
 from antenna_drive.trial.machine import Records, reference_machine
-from antenna_drive.trial.real_antenna import History, simulate
+from antenna_drive.trial.real_antenna import simulate, TrueSignals
 from antenna_drive.trial.sheet import CaseSheet
 import numpy as np
 import pytest
@@ -50,7 +50,7 @@ def ideal_mechanics() -> Records:
     return machine
 
 
-def energy(machine: Records, history: History) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def energy(machine: Records, history: TrueSignals) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Return the mechanical energy at every sample [J]."""
     y, structure = history.state, machine.structure[0]
     theta_a, w_a = y[:, equations.THETA_A], y[:, equations.W_A]

@@ -182,8 +182,8 @@ def test_sizes_and_machines_are_scored(made: Path) -> None:
         (made / case / 'verdict.json').write_text(json.dumps({
             'verdict': 'explained', 'which': [{'effects': [key], 'probability': 1.0}]}))
     cases, pending = read_cases(made)
-    figures = score(cases, pending)
-    assert pending == 0 and figures['top1'] == 1.0
+    figures = score(cases, len(pending))
+    assert pending == [] and figures['top1'] == 1.0
     assert {name: row['cases'] for name, row in figures['by_machine'].items()} == {
         name: sum(case.machine == name for case in cases)
         for name in {case.machine for case in cases}}

@@ -446,6 +446,23 @@ def test_published_cases_score_as_their_folder(scored_trial: Path, tmp_path: Pat
     assert 'case_0001 is in' in capsys.readouterr().err
 
 
+def test_a_trial_continued_in_another_folder_scores_as_one(
+        scored_trial: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    published = tmp_path / 'first.jsonl'
+    assert main(['score', str(scored_trial), '--cases', str(published), '--json', '-']) == 0
+    whole = json.loads(capsys.readouterr().out)
+    for name in ('case_0001', 'case_0002', 'case_0003'):
+        for path in (scored_trial / name).iterdir():
+            path.unlink()
+    assert main(['score', str(published), str(scored_trial), '--json', '-']) == 0
+    assert json.loads(capsys.readouterr().out) == whole
+    (scored_trial / 'case_0004').mkdir()
+    (scored_trial / 'case_0004' / 'verdict.json').write_text(json.dumps(verdict(('a.x', 1.0))))
+    assert main(['score', str(published), str(scored_trial), '--json', '-']) == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert (figures['cases'], figures['pending']) == (4, 0)
+
+
 @pytest.mark.parametrize('line', [
     '{', '[]', '{"truth": {"kind": "odd"}}', '[' * 100_000,
     '{"truth": {"kind": "single", "effects": [{"id": "a.x"}]}, "verdict": null}',

@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 
 from antenna_drive.trial.machine import apply_tolerances, draw_tolerances, reference_machine
-from antenna_drive.trial.real_antenna import History
+from antenna_drive.trial.real_antenna import TrueSignals
 from antenna_drive.trial.sensors import COLUMNS, record, sample_instants
 from antenna_drive.trial.sheet import SensorGrade
 import numpy as np
@@ -26,11 +26,11 @@ from numpy.typing import NDArray
 import pytest
 
 
-def still_history(count: int, rate: float = 0.0) -> tuple[History, NDArray[np.float64]]:
+def still_history(count: int, rate: float = 0.0) -> tuple[TrueSignals, NDArray[np.float64]]:
     """Return a history of constants."""
     times = np.arange(count) / 200.0
     flat = np.ones(count)
-    return History(
+    return TrueSignals(
         time=times, command=0.0 * flat, current=np.stack([flat, -flat]),
         rate=rate * np.stack([flat, flat]), tach=rate * np.stack([flat, flat]),
         axis_angle=1e-3 * flat, axis_rate=0.0 * flat, encoder_angle=1e-3 * flat,

@@ -18,7 +18,7 @@ from __future__ import annotations
 from antenna_drive.emulator.batch import CHANNELS
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.twin.baseline import (
-    Baseline, Part, regressors, SCORES, shift_of, SignalBaseline,
+    Baseline, regressors, SCORES, shift_of, SignalBaseline, SignalBlock,
 )
 from antenna_drive.twin.quiet_record import learn, Track
 import numpy as np
@@ -87,7 +87,7 @@ def test_shift_is_that_of_all_signals() -> None:
             late = np.sin((k + 1.3) * (time + shift)) - course[:, k]
             late += 0.01 * random.standard_normal(time.size)
             late[17] += 5.0  # a spike
-            parts.append((item, Part(k, late, rows)))
+            parts.append((item, SignalBlock(k, late, rows)))
         return shift_of(parts)[0]
 
     assert found(0.004) == pytest.approx(0.004, abs=4e-4)

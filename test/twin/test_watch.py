@@ -28,13 +28,13 @@ from antenna_drive.trial.effects import CATALOGUE
 from antenna_drive.twin import watch
 from antenna_drive.twin.baseline import Baseline
 from antenna_drive.twin.proving import played
-from antenna_drive.twin.watch import Settings, Twin
+from antenna_drive.twin.watch import Twin, TwinSettings
 import numpy as np
 import pytest
 
 pytestmark = pytest.mark.slow
 # A shorter quiet record than usual, to save the machine's time.
-BRIEF = Settings(quiet_s=40.0)
+BRIEF = TwinSettings(quiet_s=40.0)
 ONSET_S, END_S = 75.0, 92.0
 
 

@@ -56,7 +56,7 @@ _APART_S = 1e-9
 # An interval between samples longer than this many usual ones lacks rows.
 _LACKS_ROWS = 1.5
 # ... and its command is not told by those around it if they part by this share of its range.
-_IN_DOUBT = 0.01
+_UNCERTAIN = 0.01
 _PARABOLA = np.linalg.inv(np.vander(_PLACES, 3, increasing=True))
 
 
@@ -92,8 +92,8 @@ class SheetCommand:
         if isinstance(w, (sheets.Square, sheets.Triangle)):
             period, phase = w.period_s or 1.0, w.phase or 0.0
             first = 0.0 if isinstance(w, sheets.Square) else 0.25
-            turns = np.arange(np.floor(phase) - 1.0, end / period + phase + 1.0, 0.5) + first
-            times = (turns - phase) * period
+            cycles = np.arange(np.floor(phase) - 1.0, end / period + phase + 1.0, 0.5) + first
+            times = (cycles - phase) * period
             return times[(times > 0.0) & (times < end)]
         if isinstance(w, sheets.Knots):
             times = np.unique(w.times_s or ())
@@ -118,7 +118,7 @@ class RecordedCommand:
         none are
     holes : begin and end of each interval whose rows are missing and not told by those around
         it, shape (h, 2) [s]
-    doubt : by how much the command may be off in the middle of each hole, shape (h,) [rad/s]
+    uncertainty : by how much the command may be off in the middle of each hole, shape (h,) [rad/s]
 
     """
 
@@ -128,17 +128,18 @@ class RecordedCommand:
     jumps: FloatArray
     slack: FloatArray
     holes: FloatArray
-    doubt: FloatArray
+    uncertainty: FloatArray
 
     @classmethod
     def of(cls, time: FloatArray, value: FloatArray) -> RecordedCommand:
         """Take the samples of a command, shape (n,), and find its jumps."""
-        change, doubt = np.abs(np.diff(value)), _doubt(time, value)
+        change, uncertainty = np.abs(np.diff(value)), _uncertainty(time, value)
         usual = np.median(change) + 1e-12
         around = np.maximum(np.r_[change[1:], 0.0], np.r_[0.0, change[:-1]])
         large = (change > 0.05 * np.ptp(value)) & (change > 20.0 * usual) & (change > 4.0 * around)
         # straight lines go on where rows are missing, and curves turn in it
-        large &= np.isnan(doubt) | ((doubt > _IN_DOUBT * np.ptp(value)) & _level(time, value))
+        uncertain = uncertainty > _UNCERTAIN * np.ptp(value)
+        large &= np.isnan(uncertainty) | (uncertain & _level(time, value))
         k = np.flatnonzero(large)
         jumps, regular = regular_times(time[k], time[k + 1])
         width = time[k + 1] - time[k]
@@ -154,13 +155,14 @@ class RecordedCommand:
         # the three pieces of an interval with a jump: the middle one is the jump
         pieces = np.insert(
             np.where(large[:, np.newaxis], 0.0, slopes), np.repeat(k, 2), 0.0, axis=0)
-        open_ = np.nan_to_num(doubt) > _IN_DOUBT * np.ptp(value)
+        open_ = np.nan_to_num(uncertainty) > _UNCERTAIN * np.ptp(value)
         open_[k] = False
         open_[_corners(time, value)[0]] = False
         h = np.flatnonzero(open_)
         return cls(times[order], values[order], pieces, jumps,
                    np.where(lacking, 0.5 * width - _APART_S, 0.0),
-                   np.column_stack([time[h], time[h + 1]]), doubt[h])._with_corners(time, value)
+                   np.column_stack([time[h], time[h + 1]]),
+                   uncertainty[h])._with_corners(time, value)
 
     def _with_corners(self, time: FloatArray, value: FloatArray) -> RecordedCommand:
         """Return the command with a corner wherever straight lines meet between two samples."""
@@ -196,7 +198,8 @@ class RecordedCommand:
         felt = (self.holes[:, 0] > begin) & (self.holes[:, 1] < end)
         return RecordedCommand(self.time[first:last] - begin, self.value[first:last],
                                self.slope[first:last - 1], self.jumps[inside] - begin,
-                               self.slack[inside], self.holes[felt] - begin, self.doubt[felt])
+                               self.slack[inside], self.holes[felt] - begin,
+                               self.uncertainty[felt])
 
     def with_jump(self, number: int, later: float) -> RecordedCommand:
         """Return the command with one of its jumps later [s], by less than its slack."""
@@ -217,20 +220,21 @@ class RecordedCommand:
         return replace(self, slope=slope)
 
 
-def _doubt(time: FloatArray, value: FloatArray) -> FloatArray:
+def _uncertainty(time: FloatArray, value: FloatArray) -> FloatArray:
     """
     Return by how much the two sides of each interval part in its middle, shape (n - 1,).
 
     Each side is taken on as a line and as a parabola. It is NaN where no rows are missing.
     """
     width = np.diff(time)
-    doubt = np.full(width.size, np.nan)
+    uncertainty = np.full(width.size, np.nan)
     for i in np.flatnonzero(width > _LACKS_ROWS * np.median(width)):
         middle = 0.5 * (time[i] + time[i + 1])
-        doubt[i] = min((abs(_taken_on(time[i - n:i + 1], value[i - n:i + 1], middle)
-                            - _taken_on(time[i + 1:i + 2 + n], value[i + 1:i + 2 + n], middle))
-                        for n in (1, 2) if n <= i < width.size - n), default=0.0)
-    return doubt
+        apart = (abs(_taken_on(time[i - n:i + 1], value[i - n:i + 1], middle)
+                     - _taken_on(time[i + 1:i + 2 + n], value[i + 1:i + 2 + n], middle))
+                 for n in (1, 2) if n <= i < width.size - n)
+        uncertainty[i] = min(apart, default=0.0)
+    return uncertainty
 
 
 def _taken_on(time: FloatArray, value: FloatArray, at: float) -> float:
@@ -373,18 +377,18 @@ class Longest:
     usual : at most so long [s]
     shortest : even where a wave asks for less [s]
     wave : angle by which a wave may turn in a step [rad]
-    turns : of the fastest wave, per turn of the axis, 0 for none
+    cycles : of the fastest wave per turn of the axis, 0 for none
 
     """
 
     usual: float
     shortest: float = 0.0
     wave: float = math.inf
-    turns: float = 0.0
+    cycles: float = 0.0
 
     def at(self, rate: FloatArray) -> FloatArray:
         """Return the longest step where the axis turns at these rates [rad/s], as an array."""
-        asked = self.wave / np.maximum(self.turns * np.abs(rate), 1e-9)
+        asked = self.wave / np.maximum(self.cycles * np.abs(rate), 1e-9)
         return np.asarray(np.minimum(self.usual, np.maximum(self.shortest, asked)))
 
 

@@ -29,7 +29,7 @@ import shutil
 from typing import Any
 
 from antenna_drive.diagnosis import (
-    as_data, DEFAULT, Diagnosis, Effort, Rival, Settings, TestDesign,
+    as_data, DEFAULT, DesignEffort, Diagnosis, Rival, Settings, TestDesign,
 )
 from antenna_drive.drafts import drafted
 from antenna_drive.errors import UserError
@@ -56,7 +56,7 @@ Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
-class Plan:
+class InvestigationPlan:
     """
     What an investigation is to do.
 
@@ -109,9 +109,10 @@ class Investigation:
     """
 
     def __init__(self, folder: Path, drive: Drive, limits: DriveLimits, base: TestSheet,
-                 run_test: RunTest, plan: Plan = Plan(), first: TestSheet | None = None,
-                 sensors: SensorModel | None = None, threads: int = 2,
-                 settings: Settings = DEFAULT, effort: Effort = Effort()) -> None:
+                 run_test: RunTest, plan: InvestigationPlan = InvestigationPlan(),
+                 first: TestSheet | None = None, sensors: SensorModel | None = None,
+                 threads: int = 2, settings: Settings = DEFAULT,
+                 effort: DesignEffort = DesignEffort()) -> None:
         """Begin, or go on where an earlier run of the same investigation was."""
         self._folder, self._drive, self._base = folder, drive, base
         self._run_test, self._plan, self._first = run_test, plan, first

@@ -398,17 +398,17 @@ class AntennaMachine(Machine):
             self._run_modifiers[name][0].apply(run, value)
         record = run.numbers.view(kind)
         run.write_waves()
-        turns = fastest_wave(test.record)
+        cycles = fastest_wave(test.record)
         for shape, parts in run.waves.items():
             if shape.angle != 'axis' and any(parts):
-                turns = max(turns, shape.order * float(record[shape.angle]['gear_ratio'][0]))
+                cycles = max(cycles, shape.order * float(record[shape.angle]['gear_ratio'][0]))
         axis = record['plant']['axis']
         if axis['mode_inertias'][0, EXTRA_MODE] > 0.0:
             axis['mode_inertias_count'] = EXTRA_MODE + 1
         stiff = any(record[motor]['gearbox'][name][0] > 0.0
                     for motor in ('motor_1', 'motor_2') for name in _STIFF)
         longest = min(self._longest_step, LONGEST_STEP) if stiff else self._longest_step
-        plan = self._plan(job.experiment, run, Longest(longest, SHORTEST_STEP, WAVE_STEP, turns))
+        plan = self._plan(job.experiment, run, Longest(longest, SHORTEST_STEP, WAVE_STEP, cycles))
         if disturbance is not None:
             plan = _disturbed(plan, run, *disturbance)
         time = test.output_times

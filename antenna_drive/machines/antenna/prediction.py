@@ -45,7 +45,7 @@ def _none() -> FloatArray:
 
 
 @dataclass
-class Recorder:
+class RecorderErrors:
     """
     The errors of a recorder that no number of the drive stands for.
 
@@ -65,7 +65,7 @@ class Recorder:
     clock_rate: float = 0.0
 
     @classmethod
-    def of(cls, entries: Iterable[Mapping[str, Any]]) -> Recorder:
+    def of(cls, entries: Iterable[Mapping[str, Any]]) -> RecorderErrors:
         """
         Take the entries of a verdict's `recorder`.
 
@@ -150,7 +150,7 @@ class Prediction:
         return Recording.from_arrays(self.time, signals)
 
 
-def predict(name: str, recording: Recording, drive: Drive, recorder: Recorder | None = None,
+def predict(name: str, recording: Recording, drive: Drive, recorder: RecorderErrors | None = None,
             note: Note = lambda text: None) -> Prediction:
     """
     Predict a recording from its rate command and its test sheet.
@@ -174,7 +174,7 @@ def predict(name: str, recording: Recording, drive: Drive, recorder: Recorder | 
 
     """
     test = _WholeTest.of(name, recording, drive, note)
-    predicted = _readings(test, recorder or Recorder())
+    predicted = _readings(test, recorder or RecorderErrors())
     if not np.isfinite(predicted).all():
         raise UserError(f'{name}: the run of this configuration diverged')
     # a recording that starts at another time is counted from its first sample
@@ -182,7 +182,7 @@ def predict(name: str, recording: Recording, drive: Drive, recorder: Recorder | 
     return Prediction(longest[-test.time.size:], test.measured, predicted)
 
 
-def _readings(test: _WholeTest, recorder: Recorder) -> FloatArray:
+def _readings(test: _WholeTest, recorder: RecorderErrors) -> FloatArray:
     """Return what the recorder says of the drive in a test, shape (n, 6)."""
     late = recorder.delay - recorder.clock
     found = np.empty((test.time.size, len(CHANNELS)))

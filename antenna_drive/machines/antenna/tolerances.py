@@ -162,8 +162,9 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
             elif test.time[0] - _FELT_S < begin < test.time[-1]:
                 yield _within(name, 's', half, JumpTime(begin - half, end - half), k)
 
-        for i, ((begin, _), doubt) in enumerate(zip(command.holes, command.doubt, strict=True)):
-            yield _within(f'hole:{test.name}:{begin:.3f}', 'rad/s', 2.0 * float(doubt),
+        for i, (begin, _) in enumerate(command.holes):
+            yield _within(f'hole:{test.name}:{begin:.3f}', 'rad/s',
+                          2.0 * float(command.uncertainty[i]),
                           UnrecordedMean(i), k)
 
     given = allowed([test])

@@ -37,13 +37,13 @@ _OF_MOTORS = tuple((motor, part, stem) for motor in ('motor_1', 'motor_2') for p
 
 def fastest_wave(record: np.ndarray[Any, np.dtype[Any]]) -> float:
     """Return the cycles per turn of the axis of the fastest wave in a drive's record; 0: none."""
-    turns = 0.0
+    cycles = 0.0
     for motor, part, stem in _OF_MOTORS:
         numbers = record[motor][part]
         if any(numbers[stem + end][0] != 0.0 for end in ('', '_second', '_third')):
-            turns = max(turns, float(numbers[f'{stem}_cycles'][0])
-                        * float(record[motor]['gear_ratio'][0]))
-    return turns
+            cycles = max(cycles, float(numbers[f'{stem}_cycles'][0])
+                         * float(record[motor]['gear_ratio'][0]))
+    return cycles
 
 
 @dataclass(frozen=True)

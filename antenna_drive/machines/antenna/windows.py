@@ -128,9 +128,9 @@ def windows(recording: FieldRecording, drive: Drive, bias: Bias, most: int) -> l
     telling = _Telling(recording, drive, bias)
     choices = [[first], *([window] for window in _later(recording, first, _COMPARED_S))]
     if most > 1:
-        brief = replace(first, end=first.compared + 0.5 * _COMPARED_S)
-        choices += [[brief, window] for window in _later(recording, first, 0.5 * _COMPARED_S)
-                    if window.compared >= brief.end]
+        short = replace(first, end=first.compared + 0.5 * _COMPARED_S)
+        choices += [[short, window] for window in _later(recording, first, 0.5 * _COMPARED_S)
+                    if window.compared >= short.end]
     worth = [telling.of(choice) - sum(window.cost for window in choice) for choice in choices]
     return choices[int(np.argmax(worth))]
 
@@ -139,8 +139,8 @@ def first_window(recording: FieldRecording) -> Window:
     """Return the window at the start of the motion."""
     joined = float(recording.time[0])
     if recording.onset - joined <= _SOON_S:
-        brief = recording.end - joined <= WHOLE_S
-        return Window(end=math.inf if brief else joined + _COMPARED_S)
+        short = recording.end - joined <= WHOLE_S
+        return Window(end=math.inf if short else joined + _COMPARED_S)
     compared = recording.onset - _BEFORE_S
     begin = 0.0 if compared <= _REST_S else compared - _REST_LEFT_S
     return Window(begin, compared, compared + _COMPARED_S)

@@ -38,7 +38,7 @@ CYCLES: Final = (1, 2, *range(8, 41, 2))
 
 
 @dataclass(frozen=True)
-class Number:
+class Bounds:
     """
     The range of a parameter of the servo.
 
@@ -82,53 +82,53 @@ TIED: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({
     'load_friction': ('load_friction_motor', 'load_friction_external'),
     'load_stribeck': ('load_stribeck_motor', 'load_stribeck_external'),
 })
-NUMBERS: Final[Mapping[str, Number]] = MappingProxyType({
-    'torque_constant': Number(0.05, 3.0, 0.3, 0.002, logarithmic=True),
-    'resistance': Number(0.3, 15.0, 2.0, 0.002, logarithmic=True),
-    'armature_inertia': Number(1e-4, 0.05, 2.5e-3, 0.005, logarithmic=True),
-    'coulomb_torque': Number(1e-4, 0.3, 0.02, 0.005, logarithmic=True),
-    'viscous_friction': Number(1e-5, 0.3, 0.01, 0.005, logarithmic=True),
-    'stribeck_torque': Number(0.0, 0.2, 0.01, 5e-4),
-    'stribeck_rate': Number(0.02, 5.0, 0.5, 0.02, logarithmic=True, shape=True),
-    'stribeck_shape': Number(0.5, 4.0, 1.35, 0.02, shape=True),
-    'load_friction': Number(0.0, 0.6, 0.1, 2e-3),
-    'load_friction_motor': Number(0.0, 0.6, 0.1, 2e-3),
-    'load_friction_external': Number(0.0, 0.6, 0.1, 2e-3),
-    'load_stribeck': Number(0.0, 1.0, 0.05, 2e-3),
-    'load_stribeck_motor': Number(0.0, 1.0, 0.05, 2e-3),
-    'load_stribeck_external': Number(0.0, 1.0, 0.05, 2e-3),
-    'load_quadratic_motor': Number(0.0, 1.0, 0.02, 4e-3),
-    'load_quadratic_external': Number(0.0, 1.0, 0.02, 4e-3),
-    'load_square': Number(0.0, 1.5, 0.05, 4e-3),
-    'load_square_stribeck': Number(0.0, 1.5, 0.05, 4e-3),
-    'ageing': Number(0.0, 0.15, 0.02, 2e-3),
-    'friction_asymmetry': Number(-0.5, 0.5, 0.0, 0.01),
-    'viscous_quadratic': Number(0.0, 0.01, 2e-4, 5e-5),
-    'viscous_thinning': Number(0.0, 3.0, 0.1, 0.01),
-    'friction_temperature': Number(-0.03, 0.03, 0.0, 5e-4),
-    'friction_cosine': Number(-0.3, 0.3, 0.0, 5e-3),
-    'friction_sine': Number(-0.3, 0.3, 0.0, 5e-3),
-    'ripple_cosine': Number(-0.03, 0.03, 0.0, 5e-4),
-    'ripple_sine': Number(-0.03, 0.03, 0.0, 5e-4),
-    'backlash': Number(0.0, 0.02, 3e-3, 5e-4),
-    'compliance': Number(0.0, 0.1, 0.01, 1e-3),
-    'saturation': Number(0.0, 0.3, 0.02, 2e-3),
-    'current_limit': Number(0.0, 1.0, 0.2, 5e-3),
-    'winding_temperature': Number(0.0, 6e-3, 0.0, 2e-4),
-    'coasting': Number(0.0, 1.0, 0.1, 0.01),
-    'bridge_drop': Number(0.0, 2.0, 0.05, 5e-3),
-    'braking': Number(0.0, 1.0, 0.02, 5e-3),
-    'supply_resistance': Number(0.0, 0.5, 0.05, 5e-3),
-    'gain_error': Number(-0.1, 0.1, 0.0, 2e-3),
-    'derivative_gain': Number(0.0, 0.02, 0.0, 2e-4),
-    'dead_band': Number(0.0, 0.05, 2e-3, 5e-4),
-    'duty_limit': Number(0.0, 0.6, 0.02, 5e-3),
-    'goal_slowness': Number(0.0, 2.0, 0.05, 5e-3),
-    'delay': Number(-6e-3, 0.05, 3e-3, 5e-4),
-    'position_offset': Number(-0.1, 0.1, 0.0, 1e-3),
-    'eccentricity_cosine': Number(-0.03, 0.03, 0.0, 1e-3),
-    'eccentricity_sine': Number(-0.03, 0.03, 0.0, 1e-3),
-    'load_moment': Number(-0.15, 0.15, 0.0, 5e-3),
+NUMBERS: Final[Mapping[str, Bounds]] = MappingProxyType({
+    'torque_constant': Bounds(0.05, 3.0, 0.3, 0.002, logarithmic=True),
+    'resistance': Bounds(0.3, 15.0, 2.0, 0.002, logarithmic=True),
+    'armature_inertia': Bounds(1e-4, 0.05, 2.5e-3, 0.005, logarithmic=True),
+    'coulomb_torque': Bounds(1e-4, 0.3, 0.02, 0.005, logarithmic=True),
+    'viscous_friction': Bounds(1e-5, 0.3, 0.01, 0.005, logarithmic=True),
+    'stribeck_torque': Bounds(0.0, 0.2, 0.01, 5e-4),
+    'stribeck_rate': Bounds(0.02, 5.0, 0.5, 0.02, logarithmic=True, shape=True),
+    'stribeck_shape': Bounds(0.5, 4.0, 1.35, 0.02, shape=True),
+    'load_friction': Bounds(0.0, 0.6, 0.1, 2e-3),
+    'load_friction_motor': Bounds(0.0, 0.6, 0.1, 2e-3),
+    'load_friction_external': Bounds(0.0, 0.6, 0.1, 2e-3),
+    'load_stribeck': Bounds(0.0, 1.0, 0.05, 2e-3),
+    'load_stribeck_motor': Bounds(0.0, 1.0, 0.05, 2e-3),
+    'load_stribeck_external': Bounds(0.0, 1.0, 0.05, 2e-3),
+    'load_quadratic_motor': Bounds(0.0, 1.0, 0.02, 4e-3),
+    'load_quadratic_external': Bounds(0.0, 1.0, 0.02, 4e-3),
+    'load_square': Bounds(0.0, 1.5, 0.05, 4e-3),
+    'load_square_stribeck': Bounds(0.0, 1.5, 0.05, 4e-3),
+    'ageing': Bounds(0.0, 0.15, 0.02, 2e-3),
+    'friction_asymmetry': Bounds(-0.5, 0.5, 0.0, 0.01),
+    'viscous_quadratic': Bounds(0.0, 0.01, 2e-4, 5e-5),
+    'viscous_thinning': Bounds(0.0, 3.0, 0.1, 0.01),
+    'friction_temperature': Bounds(-0.03, 0.03, 0.0, 5e-4),
+    'friction_cosine': Bounds(-0.3, 0.3, 0.0, 5e-3),
+    'friction_sine': Bounds(-0.3, 0.3, 0.0, 5e-3),
+    'ripple_cosine': Bounds(-0.03, 0.03, 0.0, 5e-4),
+    'ripple_sine': Bounds(-0.03, 0.03, 0.0, 5e-4),
+    'backlash': Bounds(0.0, 0.02, 3e-3, 5e-4),
+    'compliance': Bounds(0.0, 0.1, 0.01, 1e-3),
+    'saturation': Bounds(0.0, 0.3, 0.02, 2e-3),
+    'current_limit': Bounds(0.0, 1.0, 0.2, 5e-3),
+    'winding_temperature': Bounds(0.0, 6e-3, 0.0, 2e-4),
+    'coasting': Bounds(0.0, 1.0, 0.1, 0.01),
+    'bridge_drop': Bounds(0.0, 2.0, 0.05, 5e-3),
+    'braking': Bounds(0.0, 1.0, 0.02, 5e-3),
+    'supply_resistance': Bounds(0.0, 0.5, 0.05, 5e-3),
+    'gain_error': Bounds(-0.1, 0.1, 0.0, 2e-3),
+    'derivative_gain': Bounds(0.0, 0.02, 0.0, 2e-4),
+    'dead_band': Bounds(0.0, 0.05, 2e-3, 5e-4),
+    'duty_limit': Bounds(0.0, 0.6, 0.02, 5e-3),
+    'goal_slowness': Bounds(0.0, 2.0, 0.05, 5e-3),
+    'delay': Bounds(-6e-3, 0.05, 3e-3, 5e-4),
+    'position_offset': Bounds(-0.1, 0.1, 0.0, 1e-3),
+    'eccentricity_cosine': Bounds(-0.03, 0.03, 0.0, 1e-3),
+    'eccentricity_sine': Bounds(-0.03, 0.03, 0.0, 1e-3),
+    'load_moment': Bounds(-0.15, 0.15, 0.0, 5e-3),
 })
 
 
@@ -137,7 +137,7 @@ def base_name(name: str) -> str:
     return name.partition(CYCLES_MARK)[0]
 
 
-def number(name: str) -> Number:
+def number(name: str) -> Bounds:
     """Return the range of a parameter; its name may have cycles."""
     return NUMBERS[base_name(name)]
 

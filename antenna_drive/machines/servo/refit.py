@@ -117,8 +117,8 @@ def refit(tests: Sequence[ServoLog], names: Sequence[str], begins: Sequence[Valu
     starts = [(initial_values(names), WIDE),
               *((initial_values(names, known), NEAR) for known in begins)]
     share = int(0.75 * runs / len(starts))
-    fits = [_search(tests, names, start, spread, share, seed + i)
-            for i, (start, spread) in enumerate(starts)]
+    fits = [_search(tests, names, start, step_size, share, seed + i)
+            for i, (start, step_size) in enumerate(starts)]
     best = min(fits, key=lambda fit: fit.error)
     return _search(tests, names, best.values, CLOSE, runs - share * len(starts), seed)
 
@@ -129,7 +129,7 @@ def nearby(tests: Sequence[ServoLog], names: Sequence[str], start: Values, runs:
     return _search(tests, names, initial_values(names, start), 0.5 * NEAR, runs, seed)
 
 
-def _search(tests: Sequence[ServoLog], names: Sequence[str], start: Values, spread: float,
+def _search(tests: Sequence[ServoLog], names: Sequence[str], start: Values, step_size: float,
             runs: int, seed: int) -> Fit:
     """Search with CMA-ES; the result is never worse than the start."""
     items = [number(name) for name in names]
@@ -142,7 +142,7 @@ def _search(tests: Sequence[ServoLog], names: Sequence[str], start: Values, spre
     best = Fit(begin, error(tests, begin))
     inside = [min(max(item.share(start[name]), 0.01), 0.99)
               for name, item in zip(names, items, strict=True)]
-    strategy = cma.CMAEvolutionStrategy(inside, spread, {
+    strategy = cma.CMAEvolutionStrategy(inside, step_size, {
         'bounds': [0.0, 1.0], 'seed': seed, 'maxfevals': runs, 'verbose': -9, 'tolfun': 1e-6})
     while not strategy.stop():
         candidates = strategy.ask()

@@ -38,8 +38,8 @@ import numpy as np
 Progress = Callable[[float, str], None]
 # The effects of a model with the names of their forms, in the order in which they were added.
 Structure = tuple[tuple[str, str], ...]
-# Share by which each new number must lower the withheld error.
-WORTH = 0.01
+# Share of the withheld error by which each new number must lower it.
+PRICE_PER_NUMBER = 0.01
 ROUNDS = 7
 # How many hypotheses of the ranking (pairs among them) and how many single effects are tried.
 TRIED_RANKED, TRIED_SINGLES = 2, 7
@@ -47,7 +47,7 @@ ITERATIONS = 5
 
 
 @dataclass(frozen=True)
-class Effort:
+class FitEffort:
     """
     How long is searched.
 
@@ -108,7 +108,7 @@ def folds(tests: Sequence[ServoLog]) -> list[Fold]:
     return [part for part in parts if part.fitted and part.withheld]
 
 
-def lacking(tests: Sequence[ServoLog], effort: Effort, without: Sequence[str] = (),
+def lacking(tests: Sequence[ServoLog], effort: FitEffort, without: Sequence[str] = (),
             progress: Progress = lambda share, doing: None) -> Found:
     """
     Find what the model of a motor with Coulomb and viscous friction lacks.
@@ -159,7 +159,7 @@ def lacking(tests: Sequence[ServoLog], effort: Effort, without: Sequence[str] = 
         worth = _judged(parts, structure, fit.values, scale)
         for piece in structure:
             shorter = tuple(p for p in structure if p != piece)
-            price = 1.0 + WORTH * (len(numbers(structure)) - len(numbers(shorter)))
+            price = 1.0 + PRICE_PER_NUMBER * (len(numbers(structure)) - len(numbers(shorter)))
             bare = _judged(parts, shorter, fit.values, scale)
             if bare <= price * worth:
                 rounds[-1]['dropped'].append(piece[0])
@@ -200,7 +200,7 @@ class _Trial:
                                   strict=True))
         start = {**values, **own}
         judged = _judged(parts, wider, start, scale)
-        return cls(wider, start, judged, judged * (1.0 + WORTH * len(own)))
+        return cls(wider, start, judged, judged * (1.0 + PRICE_PER_NUMBER * len(own)))
 
 
 def numbers(structure: Structure) -> tuple[str, ...]:

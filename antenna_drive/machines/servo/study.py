@@ -38,7 +38,7 @@ from antenna_drive.machines.servo import refit as servo_refit
 from antenna_drive.machines.servo.catalogue import catalogue, vector
 from antenna_drive.machines.servo.log import ServoLog
 from antenna_drive.machines.servo.refit import Fit, LADDER, PARENTS
-from antenna_drive.machines.servo.rounds import Effort, lacking, plain
+from antenna_drive.machines.servo.rounds import FitEffort, lacking, plain
 from antenna_drive.workers import workers
 import numpy as np
 
@@ -90,7 +90,7 @@ def directions(tests: Sequence[ServoLog], splits: Iterable[str] = tuple(SPLITS),
     return found
 
 
-def compared(tests: Sequence[ServoLog], direction: Direction, effort: Effort,
+def compared(tests: Sequence[ServoLog], direction: Direction, effort: FitEffort,
              without: Sequence[str] = ()) -> dict[str, Any]:
     """
     Compare the models in one direction; return plain data.
@@ -136,7 +136,7 @@ def _model(fit: Fit, fitted: Sequence[ServoLog], withheld: Sequence[ServoLog],
             'per_recording_mrad': errors, 'values': plain(fit.values)}
 
 
-def study(tests: Sequence[ServoLog], chosen: Sequence[Direction], effort: Effort,
+def study(tests: Sequence[ServoLog], chosen: Sequence[Direction], effort: FitEffort,
           without: Sequence[str] = (), jobs: int = 1, keep: Path | None = None,
           progress: Progress = lambda share, doing: None,
           scheduler: str | None = None) -> dict[str, Any]:
@@ -201,7 +201,7 @@ def study(tests: Sequence[ServoLog], chosen: Sequence[Direction], effort: Effort
 class _KeptResults:
     """Results of directions, each in a file with a digest of the data and code it came from."""
 
-    def __init__(self, folder: Path | None, tests: Sequence[ServoLog], effort: Effort,
+    def __init__(self, folder: Path | None, tests: Sequence[ServoLog], effort: FitEffort,
                  without: Sequence[str]) -> None:
         self._folder = folder
         digest = hashlib.sha256(repr((effort, sorted(without))).encode())

@@ -24,7 +24,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from antenna_drive.trial.cases import (
-    case_name, even_sizes, kinds_of, MIX, SMALLEST_IN_PAIR, Truth, turns,
+    case_name, even_sizes, kinds_of, MIX, round_robin, SMALLEST_IN_PAIR, Truth,
 )
 from antenna_drive.trial.imperfections import draw_recorder, kept_rows, recorder_noise
 from antenna_drive.trial.others.machines import Cause, Kind, kind_of
@@ -80,8 +80,8 @@ class _Queues:
     def __init__(self, kind: Kind, random: np.random.Generator) -> None:
         catalogue = list(kind.catalogue.values())
         self._singles, self._firsts, self._seconds = (
-            turns(catalogue, random) for _ in range(3))
-        self._outside: Iterator[Cause] = turns(list(kind.outside.values()), random)
+            round_robin(catalogue, random) for _ in range(3))
+        self._outside: Iterator[Cause] = round_robin(list(kind.outside.values()), random)
 
     def effects(self, kind: str, size: float,
                 random: np.random.Generator) -> list[tuple[Cause, float]]:

@@ -78,8 +78,8 @@ def reference(test: Test, times: FloatArray) -> FloatArray:
         # the frequency grows by the same factor in each second
         low, high = test['from_Hz'], test['to_Hz']
         growth = math.log(high / low) / test['duration_s']
-        turns = low * (np.exp(growth * since) - 1.0) / growth
-        return _amplitude(test, low * np.exp(growth * since)) * np.sin(2.0 * math.pi * turns)
+        cycles = low * (np.exp(growth * since) - 1.0) / growth
+        return _amplitude(test, low * np.exp(growth * since)) * np.sin(2.0 * math.pi * cycles)
     found = np.zeros_like(since)
     for frequency, phase in zip(test['frequencies_Hz'], test['phases_rad'], strict=True):
         size = _amplitude(test, np.full_like(since, frequency)) / math.sqrt(TONES)
