@@ -55,7 +55,6 @@ import argparse
 import os
 from pathlib import Path
 import shlex
-from typing import Any
 
 from antenna_drive.cli.output import check_options, Progress
 from antenna_drive.cli.sharing import add_diagnosis_options, add_worker_options
@@ -64,7 +63,7 @@ from antenna_drive.parameters.schema import Entry
 from antenna_drive.trial import batch, sealing
 from antenna_drive.trial.family import FAMILIES
 from antenna_drive.trial.others.machines import MACHINES
-from antenna_drive.trial.scored_cases import identity, read_scored
+from antenna_drive.trial.scored_cases import read_scored_of
 
 RATES_HZ = (50.0, 500.0)
 USUAL_RATE_HZ = 200.0
@@ -116,7 +115,8 @@ def run(arguments: argparse.Namespace) -> int:
         family=arguments.family, machines=_others(arguments))
     print(f'{folder}: {arguments.cases} truths sealed, manifest '
           f'{sealing.manifest_seal(manifest)}', flush=True)
-    skipped = set() if arguments.skip is None else _scored(arguments.skip, folder, manifest)
+    skipped = set() if arguments.skip is None else {
+        case.truth['case'] for case in read_scored_of(arguments.skip, folder)}
     count = arguments.cases - len(skipped)
     with Progress('recordings', count, quiet=arguments.quiet) as progress:
         batch.make_cases(folder, manifest, arguments.jobs,
@@ -137,20 +137,6 @@ def run(arguments: argparse.Namespace) -> int:
         print(f'{folder}: {failures} diagnoses failed, see {batch.FAILURE} in their folders; '
               'run the same command to try them again')
     return 1 if failures else 0
-
-
-def _scored(path: Path, folder: Path, manifest: dict[str, Any]) -> set[str]:
-    """Return the names of the cases that a file holds; refuses cases of another trial."""
-    here = {name: identity(sealing.open_truth(folder, name, manifest))
-            for name in manifest['seals']}
-    names = set()
-    for case in read_scored(path):
-        name = case.truth['case']
-        if identity(case.truth) != here.get(name):
-            raise UserError(f'{path}: {name}: is no case of this trial; give the cases, the seed '
-                            'and the options with which the file was made')
-        names.add(name)
-    return names
 
 
 def _others(arguments: argparse.Namespace) -> list[str]:

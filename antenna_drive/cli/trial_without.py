@@ -24,6 +24,7 @@ The exit code is 1 if no case could be diagnosed.
 
 For example:
   antenna-drive trial-without wild7 --cases 20
+  antenna-drive trial-without wild7 --scored wild7.jsonl
 """
 
 from __future__ import annotations
@@ -43,6 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('trial', type=Path, metavar='DIR', help='folder of a diagnosed trial')
     parser.add_argument('--cases', type=int, default=20, metavar='N',
                         help='how many cases, in their order (default: %(default)s)')
+    parser.add_argument('--scored', type=Path, metavar='FILE',
+                        help='take the first answers from this file of `antenna-drive score '
+                             '--cases`, of a trial that was drawn again in DIR')
     add_batch_options(parser, 'diagnoses')
 
 
@@ -52,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     with Progress('without', arguments.cases, quiet=arguments.quiet) as progress:
         found = run_trial(arguments.trial, arguments.cases, arguments.jobs, arguments.time_limit,
                           shlex.split(arguments.diagnose_options),
-                          lambda done, total: progress.update(done))
+                          lambda done, total: progress.update(done), arguments.scored)
     lines = [f'{"case":10s} {"left out":34s} {"unknown before, after":>22s}  named now']
     lines += [f'{row["case"]:10s} {row["effect"]:34s} {row["unknown_before"]:13.2f} '
               f'{row["unknown_after"]:8.2f}  {" + ".join(row["named"])}, {row["probability"]:.2f}'

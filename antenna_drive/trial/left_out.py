@@ -29,6 +29,7 @@ from antenna_drive.errors import UserError
 from antenna_drive.trial.batch import diagnose_recordings, Done, model_options
 from antenna_drive.trial.programme import RECORDINGS
 from antenna_drive.trial.scorecard import Case, rate, read_cases
+from antenna_drive.trial.scored_cases import read_scored_of
 from antenna_drive.trial.verdict import read_verdict, UNKNOWN, VerdictError
 from antenna_drive.workers import workers
 import numpy as np
@@ -39,14 +40,15 @@ SURE = 0.9                  # probability above which something else is named wr
 
 
 def run_trial(folder: Path, wanted: int, jobs: int, limit: float, options: Sequence[str] = (),
-              done: Done = lambda part, total: None) -> dict[str, Any]:
+              done: Done = lambda part, total: None,
+              scored: Path | None = None) -> dict[str, Any]:
     """
     Diagnose the first cases of a trial again without their true effects.
 
     Parameters
     ----------
     folder
-        of the trial, diagnosed at least in part
+        of the trial, diagnosed at least in part, or drawn again
     wanted
         number of cases; fewer if there are no more
     jobs
@@ -57,6 +59,8 @@ def run_trial(folder: Path, wanted: int, jobs: int, limit: float, options: Seque
         further options for each diagnosis, as in the trial
     done
         called with the number of cases that are complete, and their total
+    scored
+        file of `antenna-drive score --cases` with the first answers; None: those in the folder
 
     Returns
     -------
@@ -68,11 +72,13 @@ def run_trial(folder: Path, wanted: int, jobs: int, limit: float, options: Seque
 
     Raises
     ------
-    UserError : no case of the trial has a single effect that was named first
+    UserError : no case of the trial has a single effect that was named first; a file of other
+        cases
     SealError : a truth is missing or was changed
 
     """
-    cases = [case for case in read_cases(folder)[0]
+    answered = read_cases(folder)[0] if scored is None else read_scored_of(scored, folder)
+    cases = [case for case in answered
              if case.truth['kind'] == 'single' and case.right][:wanted]
     if not cases:
         raise UserError(f'{folder}: no case with a single effect that was named first; '

@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Any
 
 from antenna_drive.errors import one_line, UserError
+from antenna_drive.trial import sealing
 from antenna_drive.trial.cases import Truth
 from antenna_drive.trial.scorecard import Case
 from antenna_drive.trial.verdict import content_of, parse_verdict
@@ -71,6 +72,28 @@ def read_scored(path: Path) -> list[Case]:
                                     'FILE writes such a file') from None
     except (OSError, UnicodeDecodeError) as error:
         raise UserError(f'{path}: cannot be read, {one_line(error, 200)}') from error
+    return cases
+
+
+def read_scored_of(path: Path, folder: Path) -> list[Case]:
+    """
+    Read the cases of a file, and check that they are cases of a trial.
+
+    Raises
+    ------
+    UserError : the file cannot be read, or holds a case that is not in the trial
+    SealError : a truth of the trial is missing or was changed
+
+    """
+    manifest = sealing.read_manifest(folder)
+    here = {name: identity(sealing.open_truth(folder, name, manifest))
+            for name in manifest['seals']}
+    cases = read_scored(path)
+    for case in cases:
+        name = case.truth.get('case', '')
+        if identity(case.truth) != here.get(name):
+            raise UserError(f'{path}: {name}: is no case of this trial; give the cases, the seed '
+                            'and the options with which the file was made')
     return cases
 
 

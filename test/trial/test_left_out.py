@@ -24,6 +24,8 @@ from antenna_drive.cli import main
 from antenna_drive.errors import UserError
 from antenna_drive.trial import batch, sealing
 from antenna_drive.trial.left_out import run_trial
+from antenna_drive.trial.scorecard import read_cases
+from antenna_drive.trial.scored_cases import case_lines
 import pytest
 
 
@@ -33,11 +35,13 @@ def verdict_of(**answers: float) -> dict[str, Any]:
 
 
 FRICTION, OFFSET = 'axis.coulomb_friction', 'motor_1.amplifier_offset'
+NUMBERS = {FRICTION: {'factor': 2.0}, OFFSET: {'voltage': 1.0}}
 
 
 def truth_of(name: str, kind: str, *effects: str) -> dict[str, Any]:
     return {'case': name, 'kind': kind, 'seed': [1, 2],
-            'effects': [{'id': effect, 'size': 0.5, 'parameters': {}} for effect in effects]}
+            'effects': [{'id': effect, 'size': 0.5, 'parameters': NUMBERS[effect]}
+                        for effect in effects]}
 
 
 @pytest.fixture
@@ -96,6 +100,21 @@ def test_right_single_effects_are_left_out_in_their_cases(
     assert run_trial(trial, 10, 1, 60.0) == found and len(diagnoses.words) == 2
     # the first answers stay as they were
     assert 'axis.coulomb_friction' in (trial / 'case_0001/verdict.json').read_text()
+
+
+def test_first_answers_may_come_from_a_file(
+        trial: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Diagnoses(monkeypatch)
+    published = tmp_path / 'published.jsonl'
+    published.write_text(''.join(case_lines(read_cases(trial)[0])))
+    for name in ('case_0001', 'case_0005'):
+        (trial / name / 'verdict.json').unlink()
+    found = run_trial(trial, 10, 1, 60.0, scored=published)
+    assert [row['case'] for row in found['cases']] == ['case_0001', 'case_0005']
+    assert found['cases'][0]['unknown_before'] == pytest.approx(0.05)
+    published.write_text(published.read_text().replace('case_0001', 'case_0006'))
+    with pytest.raises(UserError, match='case_0006: is no case of this trial'):
+        run_trial(trial, 10, 1, 60.0, scored=published)
 
 
 def test_a_diagnosis_that_fails_is_counted_and_made_again(
