@@ -94,14 +94,40 @@ def test_a_jump_among_missing_rows_may_come_at_any_time_between() -> None:
     value = np.where(np.searchsorted(true, time, side='right') % 2, 1e-3, 0.0)
     there = (time < 5.05) | (time > 5.25)
     command = RecordedCommand.of(time[there], value[there])
-    np.testing.assert_array_equal(command.slack > 0.0, [0, 0, 0, 1, 0, 0])
-    assert abs(command.jumps[3] - true[3]) < command.slack[3]
+    off = true - command.jumps
+    # one of them jumps on a sample
+    assert (command.slack[:, 0] < off).all() and (off < command.slack[:, 1] + 1e-8).all()
+    np.testing.assert_array_equal(np.ptp(command.slack, axis=1) > 2.0 * PERIOD,
+                                  [0, 0, 0, 1, 0, 0])
     moved = command.with_jump(3, float(true[3] - command.jumps[3]))
     places = np.linspace(0.5, 11.9, 4999)
     beside = np.abs(places[:, np.newaxis] - true).min(axis=1) > PERIOD
     beside |= np.abs(places - true[3]) < PERIOD
     wanted = np.where(np.searchsorted(true, places, side='right') % 2, 1e-3, 0.0)
     np.testing.assert_allclose(moved(places)[beside], wanted[beside], rtol=0.0, atol=1e-12)
+
+
+def test_a_jump_into_a_motion_comes_later_and_the_motion_does_not() -> None:
+    true, size = 3.1234, 1e-3
+
+    def multisine(time: FloatArray) -> FloatArray:
+        return np.where(time < true, 0.0, size * (
+            1.0 + 0.5 * np.sin(2.0 * np.pi * 0.7 * (time - true))
+            + 0.2 * np.sin(2.0 * np.pi * 2.3 * (time - true))))
+
+    time = np.arange(0.0, 12.0, PERIOD)
+    command = RecordedCommand.of(time, multisine(time))
+    assert command.jumps.size == 1
+    off = float(true - command.jumps[0])
+    assert command.slack[0, 0] < off < command.slack[0, 1]
+    assert np.ptp(command.slack[0]) == pytest.approx(PERIOD, rel=1e-4)
+    moved = command.with_jump(0, off)
+    places = np.linspace(0.5, 11.9, 9999)
+    # from the jump to the next sample it is taken as level
+    steepest = size * 2.0 * np.pi * (0.5 * 0.7 + 0.2 * 2.3)
+    np.testing.assert_allclose(moved(places), multisine(places), rtol=0.0,
+                               atol=steepest * PERIOD)
+    assert np.abs(command(places) - multisine(places)).max() > 0.9 * size
 
 
 def lacking(command: Callable[[FloatArray], FloatArray], begin: float,

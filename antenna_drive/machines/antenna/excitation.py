@@ -114,8 +114,8 @@ class RecordedCommand:
     time, value : of the samples, and of both sides of each jump, shape (n,) [s], [rad/s]
     slope : at the two ends of each interval between them, shape (n - 1, 2) [rad/s^2]
     jumps : times at which the command jumps, shape (k,) [s]
-    slack : by how much each jump may be off because rows are missing, shape (k,) [s]; 0 where
-        none are
+    slack : by how much each jump may come earlier (negative) and later, shape (k, 2) [s]: up to
+        the samples on its two sides
     holes : begin and end of each interval whose rows are missing and not told by those around
         it, shape (h, 2) [s]
     uncertainty : by how much the command may be off in the middle of each hole, shape (h,) [rad/s]
@@ -141,9 +141,9 @@ class RecordedCommand:
         uncertain = uncertainty > _UNCERTAIN * np.ptp(value)
         large &= np.isnan(uncertainty) | (uncertain & _level(time, value))
         k = np.flatnonzero(large)
-        jumps, regular = regular_times(time[k], time[k + 1])
-        width = time[k + 1] - time[k]
-        lacking = ~regular & (width > _LACKS_ROWS * np.median(np.diff(time)))
+        jumps, _ = regular_times(time[k], time[k + 1])
+        slack = np.column_stack([np.minimum(time[k] - jumps + _APART_S, 0.0),
+                                 np.maximum(time[k + 1] - jumps - _APART_S, 0.0)])
         # two extra samples at each jump keep the lines on their own sides
         times = np.r_[time, jumps - _APART_S, jumps + _APART_S]
         values = np.r_[value, value[k], value[k + 1]]
@@ -159,8 +159,7 @@ class RecordedCommand:
         open_[k] = False
         open_[_corners(time, value)[0]] = False
         h = np.flatnonzero(open_)
-        return cls(times[order], values[order], pieces, jumps,
-                   np.where(lacking, 0.5 * width - _APART_S, 0.0),
+        return cls(times[order], values[order], pieces, jumps, slack,
                    np.column_stack([time[h], time[h + 1]]),
                    uncertainty[h])._with_corners(time, value)
 
@@ -202,7 +201,7 @@ class RecordedCommand:
                                self.uncertainty[felt])
 
     def with_jump(self, number: int, later: float) -> RecordedCommand:
-        """Return the command with one of its jumps later [s], by less than its slack."""
+        """Return the command with one of its jumps later [s], within its slack."""
         time, jumps = self.time.copy(), self.jumps.copy()
         # the two sides of the jump
         right = int(np.searchsorted(time, jumps[number]))

@@ -460,8 +460,6 @@ class AntennaMachine(Machine):
                 modifier.apply_to_readings(readings, value)
         digit = readings.digit
         wanted = time + readings.clock_rate * (time - time[0])
-        for begin, end, late in readings.responses:
-            wanted[(time >= begin) & (time < end)] -= late
         values = read_at(self._tests[k].output_times, out, wanted, readings.late) * readings.gain
         for shape, parts in readings.waves.items():
             values[:, ENCODER] += shape.along(values[:, ENCODER], parts)

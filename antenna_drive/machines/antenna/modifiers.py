@@ -87,7 +87,6 @@ class SensorReadings:
     ----------
     gain, zero, late : of every channel; the last is by how much earlier it is read [s]; shape (6,)
     clock_rate : share by which the recorder's clock is slow
-    responses : begin and end of responses that come later, and by how much [s]
     digit : of the encoder [rad]; 0 for none
     turn : share of a digit by which the encoder's rounding is off its middle
     waves : parts of each wave of the encoder
@@ -98,7 +97,6 @@ class SensorReadings:
     zero: FloatArray = field(default_factory=lambda: np.zeros(len(CHANNELS)))
     late: FloatArray = field(default_factory=lambda: np.zeros(len(CHANNELS)))
     clock_rate: float = 0.0
-    responses: list[tuple[float, float, float]] = field(default_factory=list)
     digit: float = 0.0
     turn: float = 0.0
     waves: dict[WaveShape, list[float]] = field(default_factory=dict)
@@ -226,23 +224,12 @@ class ClockRate(ReadingModifier):
 
 
 @dataclass(frozen=True)
-class JumpTime(ReadingModifier):
+class UnrecordedJump(RunModifier):
     """
-    Lets the command jump later, and with it all that follows until the next jump.
+    Lets a jump of the command come later.
 
     Between the samples of a recorded command nobody knows when it jumped.
     """
-
-    begin: float
-    end: float
-
-    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.responses.append((self.begin, self.end, value))
-
-
-@dataclass(frozen=True)
-class UnrecordedJump(RunModifier):
-    """Lets a jump of the command come later, of which the recording lacks the rows."""
 
     number: int
 

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
-from itertools import pairwise
 import math
 
 from antenna_drive.machines.antenna.excitation import RecordedCommand
@@ -25,7 +24,7 @@ from antenna_drive.machines.antenna.field_test import (
     BIAS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, TACH_1, TACH_2,
 )
 from antenna_drive.machines.antenna.modifiers import (
-    add, AntennaParameter, ChannelDelay, ClockRate, ClockShift, JumpTime, Modifier, ReadingGain,
+    add, AntennaParameter, ChannelDelay, ClockRate, ClockShift, Modifier, ReadingGain,
     ReadingZero, scale, SupplyGain, UnrecordedJump, UnrecordedMean,
 )
 from antenna_drive.recording.sheet import Tolerances
@@ -152,15 +151,16 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
                            modifier=ClockShift())
 
     if isinstance(test.command, RecordedCommand):
-        half = 0.5 * test.period
         command = test.command
-        for i, (begin, end) in enumerate(pairwise([*command.jumps.tolist(), math.inf])):
-            name = f'jump:{test.name}:{begin:.3f}'
-            if command.slack[i]:
-                yield _within(name, 's', float(command.slack[i]), UnrecordedJump(i), k)
+        for i, begin in enumerate(command.jumps.tolist()):
             # of those before a window the last ones alone are still felt in it
-            elif test.time[0] - _FELT_S < begin < test.time[-1]:
-                yield _within(name, 's', half, JumpTime(begin - half, end - half), k)
+            if not test.time[0] - _FELT_S < begin < test.time[-1]:
+                continue
+            name = f'jump:{test.name}:{begin:.3f}'
+            earlier, later = command.slack[i].tolist()
+            half = 0.5 * (later - earlier)
+            yield AntennaParameter(name, 's', earlier, later, 0.3 * half, half / math.sqrt(3.0),
+                                   experiment=k, modifier=UnrecordedJump(i))
 
         for i, (begin, _) in enumerate(command.holes):
             yield _within(f'hole:{test.name}:{begin:.3f}', 'rad/s',
