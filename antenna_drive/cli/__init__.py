@@ -82,6 +82,7 @@ COMMANDS = {
     'trial': Command('trial', 'make sealed test cases with an independent antenna'),
     'trial-without': Command('trial_without', 'leave true effects out of the catalogue'),
     'trial-next': Command('trial_next', 'try designed tests on sealed cases'),
+    'trial-test': Command('trial_test', 'make one test more on a sealed antenna'),
     'twin-trial': Command('twin_trial', 'test the twin on sealed antennas that change'),
     'score': Command('score', 'score the verdicts of a trial against its truths'),
     'thresholds': Command('thresholds', "list the diagnosis' thresholds and what they decide"),

@@ -70,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose the machines, and write table and page; 1 if a diagnosis failed."""
-    from antenna_drive.fleet import diagnose_fleet, machines_of, FleetOptions, share, summary, text
+    from antenna_drive.fleet import diagnose_fleet, FleetOptions, machines_of, share, summary, text
     from antenna_drive.pages import render
     from antenna_drive.workers import workers
 

@@ -25,8 +25,8 @@ is designed, run and recorded. One page tells the story.
 The drive is one of five nodes, started for each test, with the configuration of --real and the
 parameters of --set. Noise and digits of the sheet's sensors are added to what they say. With --by
 a command of your own runs each test on any drive: it plays {sheet} for {duration} seconds and
-writes the recording to {out}, a bag or CSV. For a drive that runs already these are test_signal
-with -p sheet:={sheet} and the recorder with -p out:={out}.
+writes the recording to {out}, a bag or CSV; {number} counts the tests. For a drive that runs
+already these are test_signal with -p sheet:={sheet} and the recorder with -p out:={out}.
 
 --out holds a file for each step. The same command goes on where an interrupted one was. The exit
 code is 1 if nothing was decided.
@@ -74,7 +74,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='configuration of the five nodes that stand for the real drive')
     add_settings_option(parser)
     parser.add_argument('--by', metavar='COMMAND',
-                        help='runs a test on another drive: with {sheet}, {out} and {duration}')
+                        help='runs a test on another drive: with {sheet}, {out}, {duration} and '
+                             '{number}')
     parser.add_argument('--first', type=Path, metavar='FILE', help='test sheet of the first test')
     parser.add_argument('--sheet', type=Path, metavar='FILE',
                         help='what is known of every test: circuit, bias pot, sensors')
@@ -96,7 +97,7 @@ def run(arguments: argparse.Namespace) -> int:
     run_test = _run_test(arguments)
     from antenna_drive.machines.antenna.drive_limits import DriveLimits, read_limits
     from antenna_drive.machines.antenna.investigation import (
-        DECIDED, headline, Investigation, lines, InvestigationPlan,
+        DECIDED, headline, Investigation, InvestigationPlan, lines,
     )
     from antenna_drive.machines.antenna.planned_tests import BUILT_IN
     from antenna_drive.machines.antenna.sensors import SensorModel
@@ -165,13 +166,14 @@ class _TestsByCommand:
                 raise UserError(f'--by: {place} is missing in {" ".join(words)}')
         self._words = words
 
-    def __call__(self, sheet: TestSheet, duration: float, out: Path) -> None:
+    def __call__(self, number: int, sheet: TestSheet, duration: float, out: Path) -> None:
         """Run a test, see `RunTest`."""
         from antenna_drive.recording.sheet import dump_sheet
         path = out.with_name(f'{out.name}.yaml')
         path.write_text(dump_sheet(sheet), encoding='utf-8')
         words = [word.replace('{sheet}', str(path)).replace('{out}', str(out)).replace(
-            '{duration}', f'{duration:g}') for word in self._words]
+            '{duration}', f'{duration:g}').replace('{number}', str(number))
+            for word in self._words]
         try:
             found = subprocess.run(words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                                    stderr=subprocess.PIPE, text=True, check=False,

@@ -177,7 +177,7 @@ def _run_again(arguments: argparse.Namespace) -> dict[str, Mapping[str, float]]:
 
 def _diagnose_again(case: Path, options: list[str], machine: str | None) -> bool:
     return (case / VERDICT).exists() or diagnose_case(
-        case, [*model_options(machine), '--jobs', '1', *options], math.inf)
+        case, [*model_options(machine), *options], math.inf)
 
 
 def _linked(folder: Path, label: str, case: str) -> Path:

@@ -126,11 +126,7 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     with Progress('diagnoses', count, quiet=arguments.quiet) as progress:
         failures = batch.diagnose_cases(
-            folder, manifest, arguments.jobs,
-            # each diagnosis gets its share of the cores; a worker of a cluster has one
-            ['--jobs', str(1 if arguments.scheduler else
-                           max(1, (os.cpu_count() or 1) // arguments.jobs)),
-             *shlex.split(arguments.diagnose_options)],
+            folder, manifest, arguments.jobs, shlex.split(arguments.diagnose_options),
             arguments.time_limit, lambda done, total: progress.update(done),
             arguments.scheduler, skipped)
     if failures:

@@ -12,40 +12,53 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Try designed tests on sealed cases: a third test as proposed, against those of other rules.
+Try designed tests on sealed cases: a third test, or a whole investigation.
 
-Wild cases are drawn and sealed as by `antenna-drive trial --wild`, and their first two recordings
-are diagnosed. Cases that these leave open (best answer below 0.7, or a set of two or more) get a
-third test of 30 s by each rule: as `antenna-drive propose` designs it, D-optimal, at random, and
-the four kinds of the standard programme, of which the best counts in hindsight. All run on the
-independent antenna, which also tells whether a limit was exceeded.
+Wild cases are drawn and sealed as by `antenna-drive trial --wild`. All tests run on the
+independent antenna.
 
-A case takes about ten diagnoses. The same command resumes an interrupted trial:
+  --kind third        cases whose first two recordings leave the answer open (best answer below
+                      0.7, or a set of two or more) get a third test of 30 s by each rule: as
+                      `antenna-drive propose` designs it, D-optimal, at random, and the four kinds
+                      of the standard programme, of which the best counts in hindsight
+  --kind investigate  each case is investigated from nothing by `antenna-drive investigate`, with
+                      up to four tests of 30 s, beside a standard programme of three
 
+A case takes about ten diagnoses. The same command resumes an interrupted trial. What was found is
+in DIR/results.jsonl. To continue on another machine, put that file into a new DIR.
+
+For example:
   antenna-drive trial-next --cases 40 --pool 400 --seed 71 --out next71 --jobs 8
+  antenna-drive trial-next --kind investigate --cases 30 --seed 72 --out loops72 --jobs 8
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 import shlex
+from typing import Any
 
 from antenna_drive.cli.output import check_options, give, Progress
 from antenna_drive.cli.sharing import add_batch_options
+from antenna_drive.errors import UserError
 from antenna_drive.parameters.schema import Entry
-from antenna_drive.trial import batch, sealing
-from antenna_drive.trial.third_tests import RULES, run_trial
+from antenna_drive.trial import batch, investigations, sealing, third_tests
+from antenna_drive.trial.third_tests import RULES
 
 _TOLERANCE = 0.02
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
+    parser.add_argument('--kind', choices=('third', 'investigate'), default='third',
+                        help='what is tried (default: %(default)s)')
     parser.add_argument('--cases', type=int, required=True, metavar='N',
-                        help='number of open cases that are wanted')
-    parser.add_argument('--pool', type=int, required=True, metavar='N',
-                        help='number of sealed cases that they are looked for among')
+                        help='number of cases; of --kind third, of open ones')
+    parser.add_argument('--pool', type=int, metavar='N',
+                        help='number of sealed cases that open ones are looked for among '
+                             '(default: ten times --cases)')
     parser.add_argument('--seed', type=int, required=True, metavar='S', help='of the cases')
     parser.add_argument('--out', type=Path, required=True, metavar='DIR',
                         help='folder of the trial')
@@ -58,22 +71,54 @@ def run(arguments: argparse.Namespace) -> int:
     """Make the trial, or go on with it, and print what it has shown so far."""
     check_options(arguments, cases=Entry('', 1, whole=True), pool=Entry('', 1, whole=True),
                   seed=Entry('', 0, whole=True), jobs=Entry('', 1, whole=True))
-    manifest = batch.prepare(arguments.out, arguments.pool, arguments.seed, _TOLERANCE, 200.0,
+    third = arguments.kind == 'third'
+    if not third and arguments.pool is not None:
+        raise UserError('--pool: does not go with --kind investigate, which takes every case; '
+                        'leave it out')
+    drawn = (arguments.pool or 10 * arguments.cases) if third else arguments.cases
+    manifest = batch.prepare(arguments.out, drawn, arguments.seed, _TOLERANCE, 200.0,
                              batch.DURATION_S, wild=True)
-    print(f'{arguments.out}: {arguments.pool} truths sealed, manifest '
+    print(f'{arguments.out}: {drawn} truths sealed, manifest '
           f'{sealing.manifest_seal(manifest)}', flush=True)
-    with Progress('third tests', arguments.cases, quiet=arguments.quiet) as progress:
-        found = run_trial(arguments.out, manifest, arguments.cases, arguments.jobs,
-                          arguments.time_limit, shlex.split(arguments.diagnose_options),
-                          arguments.rules, lambda done, total: progress.update(done))
+    options = shlex.split(arguments.diagnose_options)
+    with Progress('cases', arguments.cases, quiet=arguments.quiet) as progress:
+        def show(done: int, total: int) -> None:
+            progress.update(done)
+
+        if third:
+            found = third_tests.run_trial(
+                arguments.out, manifest, arguments.cases, arguments.jobs, arguments.time_limit,
+                options, arguments.rules, show)
+        else:
+            found = investigations.run_trial(
+                arguments.out, manifest, arguments.jobs, arguments.time_limit, options, show)
+    give(found, arguments.json, '\n'.join((_of_rules if third else _of_ways)(found)))
+    return 0
+
+
+def _of_rules(found: Mapping[str, Any]) -> list[str]:
     lines = [f'{found["diagnosed"]} cases diagnosed, {found["open"]} of them open',
              'rule            cases  exact top-1         set before, after  limits exceeded']
     for rule, item in found['rules'].items():
         if item['cases']:
-            low, high = item['ci95']
-            lines.append(f'{rule:15s} {item["cases"]:5d}  {100.0 * item["top1"]:3.0f} % '
-                         f'({100.0 * low:3.0f} to {100.0 * high:3.0f})    '
+            lines.append(f'{rule:15s} {item["cases"]:5d}  {_share(item["top1"], item["ci95"])}    '
                          f'{item["median_set_before"]:g}, {item["median_set"]:g}               '
                          f'{item["violations"]}')
-    give(found, arguments.json, '\n'.join(lines))
-    return 0
+    return lines
+
+
+def _of_ways(found: Mapping[str, Any]) -> list[str]:
+    lines = ['tests     cases  0.9 sure and right  sure and wrong  median until sure and right']
+    for way, item in found.items():
+        if item['cases']:
+            until = ('most never' if item['median_tests'] is None else
+                     f'{item["median_tests"]:g} tests, {item["median_seconds"]:g} s')
+            lines.append(f'{way:9s} {item["cases"]:5d}  '
+                         f'{_share(item["sure_and_right"], item["ci95"])}  '
+                         f'{item["sure_and_wrong"]:14d}  {until}')
+    return lines
+
+
+def _share(value: float, ci95: Sequence[float]) -> str:
+    low, high = ci95
+    return f'{100.0 * value:3.0f} % ({100.0 * low:3.0f} to {100.0 * high:3.0f})'

@@ -20,8 +20,9 @@ Make a trial of the twin: sealed antennas of an independent program, played to i
 
 The antennas have the tolerances and the imperfections of wild cases (docs/trial.md). The twin is
 played in simulated time, as fast as the computer goes. Truths are sealed in DIR before anything
-is simulated, as by `antenna-drive trial`; DIR/case_0001.json is what the twin said. The same
-command resumes an interrupted trial.
+is simulated, as by `antenna-drive trial`; DIR/results.jsonl is what the twin said. The same
+command resumes an interrupted trial. To continue on another machine, put that file into a new
+DIR.
 
 For example:
   antenna-drive twin-trial --kind onset --cases 20 --seed 7 --out onsets
@@ -33,7 +34,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-import json
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -43,6 +43,7 @@ from antenna_drive.cli.sharing import add_worker_options
 from antenna_drive.errors import UserError
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.trial import cases, onset, sealing
+from antenna_drive.trial.results import TrialResults
 from antenna_drive.workers import workers
 
 TOLERANCE = 0.02
@@ -82,7 +83,8 @@ def run(arguments: argparse.Namespace) -> int:
     folder, names = arguments.out, list(manifest['seals'])
     print(f'{folder}: {len(names)} truths sealed, manifest {sealing.manifest_seal(manifest)}',
           flush=True)
-    wanted = [name for name in names if not (folder / f'{name}.json').exists()]
+    results = TrialResults(folder, manifest)
+    wanted = [name for name in names if not results[name]]
     tasks = [(sealing.open_truth(folder, name, manifest), manifest['settings'])
              for name in wanted]
     with Progress('cases', len(names), quiet=arguments.quiet) as progress, workers(
@@ -90,14 +92,11 @@ def run(arguments: argparse.Namespace) -> int:
         done = len(names) - len(wanted)
         progress.update(done)
         for number, result in hands.each(outcome, tasks):
-            sealing.write_whole(folder / f'{wanted[number]}.json',
-                                json.dumps(result(), indent=1) + '\n')
+            results.put(wanted[number], **result())
             done += 1
             progress.update(done)
-    results = [json.loads((folder / f'{name}.json').read_text(encoding='utf-8'))
-               for name in names]
     print('\n'.join({'onset': of_onsets, 'healthy': of_healthy, 'verdict': of_verdicts}[
-        arguments.kind](results)))
+        arguments.kind]([results[name] for name in results])))
     return 0
 
 

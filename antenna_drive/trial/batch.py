@@ -401,7 +401,7 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
     complete, failures = len(names) - len(wanted), 0
     done(complete, len(names))
     if scheduler is None:
-        # more threads than cores only take turns
+        # each diagnosis gets its share of the cores; a worker of a cluster has one
         options = ['--jobs', str(max(1, (os.cpu_count() or 1) // jobs)), *options]
     late = [(here, here / name, options, limit, path) for name, path in kept.items()
             if path is not None and _unpredicted(folder / name)]

@@ -17,8 +17,7 @@ A trial of designed tests: what a third test tells where two have left several a
 Of sealed wild cases those are kept whose first two recordings leave the answer open. Each gets a
 third test by every rule: as `antenna-drive propose` designs it, D-optimal, at random, and the
 kinds of the standard programme. All are recorded on the independent antenna, and the three
-recordings are diagnosed. Everything lies in the folder of the case, so that a trial that was
-interrupted goes on.
+recordings are diagnosed. An interrupted trial goes on, see `results`.
 """
 
 from __future__ import annotations
@@ -32,20 +31,19 @@ from typing import Any
 from antenna_drive.errors import one_line
 from antenna_drive.subcommand import run_command
 from antenna_drive.trial import programme, sealing
-from antenna_drive.trial.batch import (
-    diagnose_recordings, Done, FORMATS, make_case, write_csv,
+from antenna_drive.trial.batch import diagnose_recordings, Done, make_case
+from antenna_drive.trial.cases import Truth
+from antenna_drive.trial.further_tests import (
+    DURATION_S, known, reached, record_test, with_test,
 )
-from antenna_drive.trial.cases import build_machine, make_recording, sheet_of, Truth
-from antenna_drive.trial.real_antenna import simulate
+from antenna_drive.trial.results import TrialResults
 from antenna_drive.trial.scorecard import Case, rate
-from antenna_drive.trial.sensors import COLUMNS
 from antenna_drive.trial.verdict import read_verdict, Verdict, VerdictError
 from antenna_drive.workers import workers
 import numpy as np
 import yaml
 
 FIRST = ('rec_a', 'rec_b')
-DURATION_S = 30.0
 # An answer is open below this probability; a set holds every answer with the second one or more.
 OPEN, IN_SET = 0.7, 0.05
 DESIGNED: Mapping[str, Sequence[str]] = {
@@ -55,7 +53,7 @@ BUILT_IN: Mapping[str, Callable[[np.random.Generator], dict[str, Any]]] = {
     'multisine': programme.multisine,
     'chirp': lambda random: programme.chirp(DURATION_S, random)}
 RULES = (*DESIGNED, *BUILT_IN)
-OPEN_FILE, RESULT = 'open.json', 'third_tests.json'
+TWO = 'two.json'
 
 
 def run_trial(folder: Path, manifest: dict[str, Any], wanted: int, jobs: int, limit: float,
@@ -86,25 +84,25 @@ def run_trial(folder: Path, manifest: dict[str, Any], wanted: int, jobs: int, li
     as `summary`
 
     """
-    names = list(manifest['seals'])
+    names, results = list(manifest['seals']), TrialResults(folder, manifest)
     found: list[str] = []
     done(0, wanted)
     for first in range(0, len(names), jobs):
         part = names[first:first + jobs]
-        tasks = [(folder, sealing.open_truth(folder, name, manifest), limit, options)
+        tasks = [(folder, sealing.open_truth(folder, name, manifest), results, limit, options)
                  for name in part]
         with workers(jobs, threads=True) as pool:
             opened = {part[number]: result() for number, result in pool.each(_is_open, tasks)}
         found += [name for name in part if opened[name]]
         if len(found) >= wanted:
             break
-    tasks_of_cases = [(folder, sealing.open_truth(folder, name, manifest), rules, limit, options)
-                      for name in found[:wanted]]
+    tasks_of_cases = [(folder, sealing.open_truth(folder, name, manifest), results, rules, limit,
+                       options) for name in found[:wanted]]
     with workers(jobs, threads=True) as pool:
         for complete, (_, result) in enumerate(pool.each(third_tests, tasks_of_cases), 1):
             result()
             done(complete, wanted)
-    return summary(folder, manifest)
+    return summary(results)
 
 
 def is_open(verdict: Verdict) -> bool:
@@ -120,31 +118,39 @@ def set_of(verdict: Verdict) -> int:
                *(len(verdict.confusable_with(effect)) for effect in verdict.which[0].effects))
 
 
-def _is_open(folder: Path, truth: Truth, limit: float, options: Sequence[str]) -> bool:
-    """Diagnose the first two recordings of a case, and say whether they leave it open."""
+def _of_two(folder: Path, truth: Truth, limit: float, options: Sequence[str]) -> Verdict | None:
+    """Return the verdict on the first two recordings of a case, made if there is none."""
     case = folder / truth['case']
     if not case.is_dir():
         make_case(folder, truth)
-    if not (case / OPEN_FILE).exists():
-        diagnose_recordings(case, FIRST, 'two.json', limit, options)
-        try:
-            verdict = is_open(read_verdict(case / 'two.json'))
-        except VerdictError:
-            verdict = False
-        sealing.write_whole(case / OPEN_FILE, json.dumps(verdict) + '\n')
-    return bool(json.loads((case / OPEN_FILE).read_text(encoding='utf-8')))
+    diagnose_recordings(case, FIRST, TWO, limit, options)
+    try:
+        return read_verdict(case / TWO)
+    except VerdictError:
+        return None
 
 
-def third_tests(folder: Path, truth: Truth, rules: Sequence[str], limit: float,
-                options: Sequence[str] = ()) -> None:
+def _is_open(folder: Path, truth: Truth, results: TrialResults, limit: float,
+             options: Sequence[str]) -> bool:
+    """Return whether the first two recordings of a case leave its answer open."""
+    name = truth['case']
+    if 'open' not in results[name]:
+        verdict = _of_two(folder, truth, limit, options)
+        results.put(name, open=verdict is not None and is_open(verdict),
+                    set_before=None if verdict is None else set_of(verdict))
+    return bool(results[name]['open'])
+
+
+def third_tests(folder: Path, truth: Truth, results: TrialResults, rules: Sequence[str],
+                limit: float, options: Sequence[str] = ()) -> None:
     """Give an open case its third tests, those that it has not had."""
-    case = folder / truth['case']
-    result = case / RESULT
-    known = json.loads(result.read_text(encoding='utf-8')) if result.exists() else {}
+    name = truth['case']
     for rule in rules:
-        if rule not in known:
-            known[rule] = _third_test(case, truth, rule, limit, options)
-            sealing.write_whole(result, json.dumps(known, indent=2) + '\n')
+        tests = results[name].get('tests', {})
+        if rule not in tests:
+            _of_two(folder, truth, limit, options)
+            told = _third_test(folder / name, truth, rule, limit, options)
+            results.put(name, tests={**tests, rule: told})
 
 
 def _third_test(case: Path, truth: Truth, rule: str, limit: float,
@@ -153,62 +159,32 @@ def _third_test(case: Path, truth: Truth, rule: str, limit: float,
     name = f'rec_{rule}'
     if rule in BUILT_IN:
         random = np.random.default_rng([*truth['seed'], 100 + RULES.index(rule)])
-        sheet = {**truth['sheets'][0], 'waveform': BUILT_IN[rule](random), 'bias': {
-            'type': 'circuit', 'bias_pot': _pot(truth), 'start': 'steady'}}
+        sheet = {**known(truth), 'waveform': BUILT_IN[rule](random)}
         proposal: dict[str, Any] = {}
     else:
-        said = run_command(['propose', str(case / 'two.json'), '--duration', f'{DURATION_S:g}',
+        said = run_command(['propose', str(case / TWO), '--duration', f'{DURATION_S:g}',
                             '--jobs', '1', '--out', str(case / f'{name}.yaml'),
                             '--json', str(case / f'{rule}.json'), *DESIGNED[rule]], limit)
         if not (case / f'{rule}.json').exists():
             return {'failure': one_line(said, 300)}
         proposal = json.loads((case / f'{rule}.json').read_text(encoding='utf-8'))
         if proposal['test'] is None:
-            return {'nothing_helps': True, **_told(case / 'two.json', truth)}
-        # what the tester does not know is as in the other tests of the case
-        sheet = {**truth['sheets'][0], **proposal['test'],
-                 'sensors': truth['sheets'][0]['sensors']}
+            return {'nothing_helps': True, **answer_of(case / TWO, truth)}
+        sheet = {**known(truth), **proposal['test']}
     whole, number = with_test(truth, sheet, RULES.index(rule))
-    write_csv(case / f'{name}.csv', {key: values for key, values in make_recording(
-        whole, number).items() if key in COLUMNS}, FORMATS)
+    record_test(whole, number, case / f'{name}.csv')
     sealing.write_whole(case / f'{name}.yaml', yaml.safe_dump(
         {key: value for key, value in sheet.items() if key != 'sensors'}, sort_keys=False))
     said = diagnose_recordings(case, (*FIRST, name), f'three_{rule}.json', limit, options)
-    told = _told(case / f'three_{rule}.json', truth)
-    if not told:
+    answer = answer_of(case / f'three_{rule}.json', truth)
+    if not answer:
         return {'failure': one_line(said, 300)}
-    return {**told, 'reached': reached(whole, number),
+    return {**answer, 'reached': reached(whole, number),
             'limits': proposal.get('limits', {}), 'family': proposal.get('family', rule),
             'expected': (proposal.get('expected') or {}).get('right_after')}
 
 
-def _pot(truth: Truth) -> float:
-    return float(next((sheet['bias']['bias_pot'] for sheet in truth['sheets']
-                       if 'bias_pot' in sheet['bias']), 0.7))
-
-
-def with_test(truth: Truth, sheet: Mapping[str, Any], place: int) -> tuple[Truth, int]:
-    """Return a truth with one test more, and the number of its recording."""
-    # each rule has its own noise: recordings are numbered apart
-    number = len(truth['sheets']) + place
-    filler = [truth['sheets'][0]] * place
-    return {**truth, 'sheets': [*truth['sheets'], *filler, dict(sheet)],
-            'durations_s': [*truth['durations_s'], *([DURATION_S] * (place + 1))]}, number
-
-
-def reached(truth: Truth, number: int) -> dict[str, float]:
-    """Return what a test reaches on the independent antenna, in the units of the limits."""
-    sheet = sheet_of(truth, number)
-    times = np.linspace(0.0, DURATION_S, int(500 * DURATION_S) + 1)
-    history = simulate(build_machine(truth, number), sheet, times)
-    acceleration = np.gradient(history.axis_rate, times)
-    return {'rate_deg_s': math.degrees(float(np.abs(history.axis_rate).max())),
-            'acceleration_deg_s2': math.degrees(float(np.abs(acceleration).max())),
-            'travel_deg': math.degrees(float(np.ptp(history.axis_angle))),
-            'current_A': float(np.abs(history.current).max())}
-
-
-def _told(path: Path, truth: Truth) -> dict[str, Any]:
+def answer_of(path: Path, truth: Truth) -> dict[str, Any]:
     """Return what a verdict told of a truth; empty if there is none."""
     try:
         verdict = read_verdict(path)
@@ -220,7 +196,7 @@ def _told(path: Path, truth: Truth) -> dict[str, Any]:
             'probability': verdict.which[0].probability}
 
 
-def summary(folder: Path, manifest: Mapping[str, Any]) -> dict[str, Any]:
+def summary(results: TrialResults) -> dict[str, Any]:
     """
     Return what the third tests of a trial told, as far as it has got.
 
@@ -228,20 +204,20 @@ def summary(folder: Path, manifest: Mapping[str, Any]) -> dict[str, Any]:
     `violations`, tests that exceeded a limit on the independent antenna. `best_built_in` takes in
     each case the best of the standard kinds, in hindsight.
     """
-    results = {name: json.loads((folder / name / RESULT).read_text(encoding='utf-8'))
-               for name in manifest['seals'] if (folder / name / RESULT).exists()}
-    before = {name: set_of(read_verdict(folder / name / 'two.json')) for name in results}
+    tests: dict[str, dict[str, Any]] = {
+        name: results[name]['tests'] for name in results if 'tests' in results[name]}
+    before = {name: results[name]['set_before'] for name in tests}
     rows: dict[str, list[tuple[str, dict[str, Any]]]] = {
-        rule: [(name, told[rule]) for name, told in results.items() if rule in told]
+        rule: [(name, told[rule]) for name, told in tests.items() if rule in told]
         for rule in RULES}
     rows['best_built_in'] = [
         (name, max((told[rule] for rule in BUILT_IN if 'right' in told.get(rule, {})),
                    key=lambda item: (item['right'], -item['set'])))
-        for name, told in results.items()
+        for name, told in tests.items()
         if any('right' in told.get(rule, {}) for rule in BUILT_IN)]
     found: dict[str, Any] = {
-        'diagnosed': sum((folder / name / OPEN_FILE).exists() for name in manifest['seals']),
-        'open': len(results), 'rules': {}}
+        'diagnosed': sum('open' in results[name] for name in results),
+        'open': sum(results[name].get('open', False) for name in results), 'rules': {}}
     for rule, items in rows.items():
         judged = [(name, item) for name, item in items if 'right' in item]
         share = rate(item['right'] for _, item in judged)

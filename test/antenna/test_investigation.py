@@ -59,9 +59,9 @@ class Laboratory:
     def note(self, what: str) -> None:
         self.done.append(what)
 
-    def run_test(self, sheet: TestSheet, duration: float, out: Path) -> None:
+    def run_test(self, number: int, sheet: TestSheet, duration: float, out: Path) -> None:
         out.write_text('time_s,rate_command_rad_s,encoder_rad\n0.0,0.0,0.0\n0.01,0.0,0.0\n')
-        self.note(f'test for {duration:g} s')
+        self.note(f'test {number} for {duration:g} s')
 
     def diagnose(self, recordings: Mapping[str, Any], *rest: Any) -> Any:
         self.note(f'diagnosis of {len(recordings)}')
@@ -89,8 +89,9 @@ def investigate(folder: Path, lab: Laboratory, **changes: Any) -> dict[str, Any]
     return Investigation(folder, DRIVE, LIMITS, BUILT_IN['square'], lab.run_test, plan).run()
 
 
-WHOLE = ['detect 0 at 1', 'test for 20 s', 'diagnosis of 1', 'separate 2 at 1.5', 'test for 20 s',
-         'diagnosis of 2', 'separate 2 at 1.5', 'test for 20 s', 'diagnosis of 3']
+WHOLE = ['detect 0 at 1', 'test 1 for 20 s', 'diagnosis of 1', 'separate 2 at 1.5',
+         'test 2 for 20 s', 'diagnosis of 2', 'separate 2 at 1.5', 'test 3 for 20 s',
+         'diagnosis of 3']
 
 
 def test_it_tests_until_an_answer_is_sure(
@@ -198,6 +199,8 @@ def test_a_command_runs_the_tests(
     (tmp_path / 'recorded.csv').write_text(
         'time_s,rate_command_rad_s,encoder_rad\n0.0,0.0,0.0\n0.01,0.0,0.0\n')
     assert main(['investigate', '--out', str(tmp_path / 'found'), '--by',
-                 f"sh -c 'test -s {{sheet}} && cp {tmp_path / 'recorded.csv'} {{out}}'"]) == 0
+                 f"sh -c 'test -s {{sheet}} && cp {tmp_path / 'recorded.csv'} {{out}} && "
+                 f"echo {{number}} >> {tmp_path / 'numbers'}'"]) == 0
+    assert (tmp_path / 'numbers').read_text().split() == ['1', '2', '3']
     assert 'decided after 3 tests, 90 s of testing' in capsys.readouterr().out
     assert (tmp_path / 'found/story.html').exists()

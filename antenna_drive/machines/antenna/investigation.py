@@ -50,8 +50,8 @@ DECIDED, NO_MORE, NOTHING_HELPS = 'decided', 'no more tests', 'nothing helps'
 
 # Of a recording with added errors of sensors [Hz].
 _RATE_HZ = 200.0
-# Runs a test on the drive: from its sheet and its length [s] to a recording at a path.
-RunTest = Callable[[TestSheet, float, Path], None]
+# Runs a test on the drive: from its number, its sheet and its length [s] to a recording at a path.
+RunTest = Callable[[int, TestSheet, float, Path], None]
 Progress = Callable[[str, float], None]
 
 
@@ -200,7 +200,7 @@ class Investigation:
         for old in self._folder.glob('.test_*'):
             _remove(old)
         try:
-            self._run_test(whole, self._plan.duration, draft)
+            self._run_test(number, whole, self._plan.duration, draft)
             suffix = '' if draft.is_dir() else '.csv'
             os.replace(draft, self._path('test', number, suffix))
         finally:
