@@ -14,7 +14,7 @@
 """
 Figures by name: those that the article publishes and those that a calibration aims at.
 
-A `Reading` is taken from a weighted sum of one experiment's signals. A `Trend` compares several
+A `Readout` is taken from a weighted sum of one experiment's signals. A `Trend` compares several
 figures in order. A `ModelFigure` needs no run. `Results` runs each experiment only once.
 """
 

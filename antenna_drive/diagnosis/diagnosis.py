@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import fmean
 import time
 from typing import Any
@@ -35,9 +35,11 @@ from antenna_drive.diagnosis.elimination import (
 )
 from antenna_drive.diagnosis.evidence import Evidence
 from antenna_drive.diagnosis.full_fits import FullFits
-from antenna_drive.diagnosis.held_out import held_out, refuted
+from antenna_drive.diagnosis.held_out import held_out, refuted, shows_no_gap
 from antenna_drive.diagnosis.hypothesis import Hypothesis
-from antenna_drive.diagnosis.intervals import inflation, jackknife, values_with_intervals
+from antenna_drive.diagnosis.intervals import (
+    deviations, inflation, jackknife, unsure, values_with_intervals,
+)
 from antenna_drive.diagnosis.interventions import (
     interventions, lines as lines_of_labels, simplified,
 )
@@ -127,6 +129,8 @@ def _closed(result: Mapping[str, Any]) -> list[str]:
 
 
 def _why_small(item: Mapping[str, Any]) -> str:
+    if item['unsure']:
+        return 'not surely beyond its tolerance'
     if item['within_tolerance']:
         return 'within its tolerance'
     return f'explains {100.0 * item["share"]:.2g} % of the gap'
@@ -216,9 +220,25 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         reach = held_out(problem, none, best, threads)
     inflated = dict(zip((p.name for p in best.state.parameters),
                         inflation(problem, best.state).tolist(), strict=True))
-    deviations = _deviations(reach)
-    evidence = _evidence(problem, hypotheses, best, reach['explained_fraction']['ci95'][1],
-                         fmean([inflated[p.name] for p, _ in best.values] or [1.0]))
+    usual = fmean([inflated[p.name] for p, _ in best.values] or [1.0])
+    between_tests = _between_tests(reach)
+    beyond = (settings.interval.sure_of_all if shows_no_gap(reach, settings)
+              else settings.interval.sure)
+
+    def deviating(hypothesis: Hypothesis) -> dict[str, float]:
+        return deviations(
+            hypothesis, lambda name: inflated.get(name, usual), settings.interval,
+            between_tests if hypothesis.effects == best.effects else {})
+
+    def judged(hypothesis: Hypothesis) -> Hypothesis:
+        return replace(hypothesis, unsure=unsure(hypothesis, deviating(hypothesis), beyond))
+
+    hypotheses, best = [judged(h) for h in hypotheses], judged(best)
+    if best.unsure:
+        notes.append(f'{" + ".join(sorted(best.unsure))}: not surely beyond the tolerance, and '
+                     'therefore not named')
+    evidence = _evidence(
+        problem, hypotheses, best, reach['explained_fraction']['ci95'][1], usual)
     decision = evidence.decide(settings)
     lack = decision.lack
     places: Sequence[unknown_input.Place] = ()
@@ -233,8 +253,7 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         'statements': verdict.statements(decision, best),
         'where': list(located),
         'which': verdict.which(decision, settings.verdict, lambda answer: values_with_intervals(
-            answer, lambda name: inflated.get(name, evidence.inflation), settings.interval,
-            deviations if answer.effects == best.effects else {})),
+            answer, deviating(answer))),
         'also_seen': verdict.also_seen(hypotheses, settings, evidence.inflation),
         'confusable': decision.confusable,
         'how_far': reach,
@@ -256,7 +275,7 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
     return Diagnosis(result, problem.machine, none, best)
 
 
-def _deviations(reach: Mapping[str, Any]) -> dict[str, float]:
+def _between_tests(reach: Mapping[str, Any]) -> dict[str, float]:
     """Return how much the effects' numbers depend on the tests, by name."""
     values: dict[str, list[float]] = {}
     for fold in reach['folds']:

@@ -54,7 +54,8 @@ class Evidence:
 
     def as_data(self) -> list[dict[str, Any]]:
         """Return the evidence as plain data, for the JSON."""
-        return [{'effects': list(h.effects), 'cost': h.cost, 'inflation': self.inflation,
+        return [{'effects': list(h.effects), 'unsure': sorted(h.unsure), 'cost': h.cost,
+                 'inflation': self.inflation,
                  'forms': [_form_data(form, h.state.point()) for form in h.forms],
                  'lack_of_fit': asdict(lack)}
                 for h, lack in zip(self.hypotheses, self.lacks, strict=True)]
@@ -91,4 +92,5 @@ def _hypothesis(data: Mapping[str, Any]) -> Hypothesis:
     none = np.zeros(0)
     return Hypothesis(tuple(data['effects']), forms, FitState(
         tuple(p for form in forms for p in form.parameters), np.array(values), none,
-        np.zeros((0, len(values)), np.float32), none, data['cost']))
+        np.zeros((0, len(values)), np.float32), none, data['cost']),
+        frozenset(data.get('unsure', ())))

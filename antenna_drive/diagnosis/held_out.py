@@ -41,6 +41,7 @@ import numpy as np
 
 _TURNS = ('each recording in turn, with the effect as the others have it; offsets within the '
           'tolerance were fitted to it, with the effect and without')
+_NO_GAP = 'each recording alone shows no gap: offsets within the tolerance account for it'
 _HALVES = 'the second half of the recording, predicted from the first'
 _INTERVAL = ("a bootstrap over blocks of time, each with a draw of the effect's numbers from "
              'their Gaussian posterior in the training data, carried over linearly')
@@ -113,16 +114,18 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads:
     known = counted[0].after is not None
     before = [fold.before for fold in counted]
     after = [_after(fold) for fold in counted]
+    reason = (_reason(folds) if not known else
+              _NO_GAP if _no_gap(_rms(before), _rms(after), problem.settings) else None)
     fraction: float | None = None
     interval: list[float | None] = [None, None]
-    if known:
+    if reason is None:
         fraction, interval = _bootstrapped(counted, problem)
     return {
         'before': _rms(before), 'noise_floor': 1.0,
         'after': _rms(after) if known or not best.effects else None,
         'explained_fraction': {
             'value': fraction, 'ci95': interval, 'bounds': list(BOUNDS),
-            'reason': None if known else _reason(folds), 'interval': _INTERVAL},
+            'reason': reason, 'interval': _INTERVAL},
         'per_signal': _per_signal(problem, counted, known or not best.effects),
         'held_out': _HALVES if single else what,
         'folds': [{'withheld': fold.name, 'judged': list(fold.judged),
@@ -132,6 +135,17 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads:
             {'effect': effect, 'form': form.name, 'values': form.start}
             for effect, form in zip(best.effects, best.forms, strict=True)
             if not form.is_course]}
+
+
+def shows_no_gap(reach: Mapping[str, Any], settings: Settings) -> bool:
+    """Return whether each withheld test alone is as the model says, with effects or without."""
+    return reach['after'] is not None and _no_gap(reach['before'], reach['after'], settings)
+
+
+def _no_gap(before: float, after: float, settings: Settings) -> bool:
+    """Return whether rms residuals are noise without effects, and hardly more with them."""
+    return (before ** 2 < 1.0 + settings.lack_of_fit.least_gap
+            and after ** 2 < 1.0 + settings.held_out.no_harm)
 
 
 def refuted(reach: Mapping[str, Any]) -> bool:
@@ -454,7 +468,9 @@ def _changes(fold: _Fold, block_s: float, random: np.random.Generator,
     first = summed(np.einsum('nc,ncm->nm', residual, slope))
     number = slope.shape[2]
     second = summed(np.einsum('nci,ncj->nij', slope, slope).reshape(rows, -1))
-    draws = random.multivariate_normal(fold.values, fold.covariance, count, method='eigh')
+    # rounding may leave the least variance just below zero
+    draws = random.multivariate_normal(fold.values, fold.covariance, count, method='eigh',
+                                       check_valid='ignore')
     steps = np.clip(draws, fold.low, fold.high) - fold.values
     squares = np.einsum('di,dj->dij', steps, steps).reshape(count, number ** 2)
     # the slope is that of the prediction: a residual falls as the prediction rises

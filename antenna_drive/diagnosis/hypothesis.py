@@ -34,12 +34,14 @@ class Hypothesis:
     effects : their ids; none for the nuisances alone
     forms : one for each effect
     state : where the fit ended
+    unsure : those of its effects whose intervals reach into their tolerances
 
     """
 
     effects: tuple[str, ...]
     forms: tuple[Form, ...]
     state: FitState
+    unsure: frozenset[str] = frozenset()
 
     @property
     def cost(self) -> float:
@@ -54,10 +56,11 @@ class Hypothesis:
 
     @property
     def named(self) -> tuple[str, ...]:
-        """Return the effects that are larger than a machine in good order may have."""
+        """Return the effects that are surely larger than a machine in good order may have."""
         point = self.state.point()
         return tuple(effect for effect, form in zip(self.effects, self.forms, strict=True)
-                     if any(abs(point[p.name]) > p.tolerance for p in form.sizes))
+                     if effect not in self.unsure
+                     and any(abs(point[p.name]) > p.tolerance for p in form.sizes))
 
     def parameters_of(self, effects: Collection[str]) -> set[str]:
         """Return the names of the parameters of some of its effects."""

@@ -147,12 +147,11 @@ def jackknife(values: Sequence[float]) -> float:
     return math.sqrt((count - 1) * float(np.var(values))) if count > 1 else 0.0
 
 
-def values_with_intervals(hypothesis: Hypothesis, inflated: Callable[[str], float],
-                          settings: IntervalSettings,
-                          deviations: Mapping[str, float] = MappingProxyType({}),
-                          ) -> dict[str, Any]:
+def deviations(hypothesis: Hypothesis, inflated: Callable[[str], float],
+               settings: IntervalSettings,
+               between_tests: Mapping[str, float] = MappingProxyType({})) -> dict[str, float]:
     """
-    Return the values of a hypothesis' effects with 95 percent intervals, for the JSON.
+    Return the standard deviations of the values of a hypothesis' effects, by name.
 
     Parameters
     ----------
@@ -162,8 +161,8 @@ def values_with_intervals(hypothesis: Hypothesis, inflated: Callable[[str], floa
         returns the variance of a parameter over that with independent noise
     settings
         thresholds
-    deviations
-        by the jackknife, of some of the values by name
+    between_tests
+        deviations by the jackknife, of some of the values by name
 
     """
     state = hypothesis.state
@@ -173,14 +172,52 @@ def values_with_intervals(hypothesis: Hypothesis, inflated: Callable[[str], floa
     for parameter, value in hypothesis.values:
         place = names.index(parameter.name)
         variance = _covariance(state, known / inflated(parameter.name))[place, place]
-        deviation = max(float(variance) ** 0.5, deviations.get(parameter.name, 0.0))
-        half_width = TWO_SIDED_95 * math.hypot(
-            deviation, same_number(parameter, value), settings.model_error * value)
-        found[parameter.name] = {
-            'value': value, 'ci95': [max(value - half_width, parameter.low),
-                                     min(value + half_width, parameter.high)],
-            'unit': parameter.unit}
+        found[parameter.name] = math.hypot(
+            max(float(variance) ** 0.5, between_tests.get(parameter.name, 0.0)),
+            same_number(parameter, value), settings.model_error * value)
     return found
+
+
+def values_with_intervals(hypothesis: Hypothesis,
+                          deviating: Mapping[str, float]) -> dict[str, Any]:
+    """
+    Return the values of a hypothesis' effects with 95 percent intervals, for the JSON.
+
+    Parameters
+    ----------
+    hypothesis
+        whose fit has converged
+    deviating
+        standard deviations of its values, from `deviations`
+
+    """
+    return {p.name: {'value': value, 'unit': p.unit, 'ci95': [
+        max(value - TWO_SIDED_95 * deviating[p.name], p.low),
+        min(value + TWO_SIDED_95 * deviating[p.name], p.high)]} for p, value in hypothesis.values}
+
+
+def unsure(hypothesis: Hypothesis, deviating: Mapping[str, float],
+           beyond: float) -> frozenset[str]:
+    """
+    Return the effects of a hypothesis that are larger than their tolerances, and not surely.
+
+    None of such an effect's sizes exceeds its tolerance by enough of its own deviations. A course
+    over time is judged as a whole, elsewhere.
+
+    Parameters
+    ----------
+    hypothesis, deviating
+        as in `values_with_intervals`
+    beyond
+        by how many deviations a size must exceed its tolerance
+
+    """
+    point = hypothesis.state.point()
+    return frozenset(
+        effect for effect, form in zip(hypothesis.effects, hypothesis.forms, strict=True)
+        if effect in hypothesis.named and not form.is_course and not any(
+            abs(point[p.name]) - p.tolerance > beyond * deviating[p.name]
+            for p in form.sizes))
 
 
 def same_number(parameter: Parameter, value: float) -> float:

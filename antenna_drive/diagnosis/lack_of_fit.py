@@ -44,11 +44,12 @@ def lack_of_fit(problem: LeastSquares, raw: FloatArray, best: Hypothesis,
 
     """
     loudest, fast, fast_left = _fast(problem, raw, best)
+    signal, regular = _regular(problem, best.state)
     point = best.state.point()
     implausibility = max((form.implausibility(point) for form in best.forms), default=0.0)
     return LackOfFit(_slow_excess(problem, best.state), _left(problem, raw, best), fast,
                      fast_left, implausibility, explained, loudest, _enough(problem),
-                     bool(best.named))
+                     bool(best.named), regular, signal)
 
 
 def _slow_excess(problem: LeastSquares, state: FitState) -> float:
@@ -74,6 +75,28 @@ def _slow_excess(problem: LeastSquares, state: FitState) -> float:
     return float(np.mean(np.maximum(found, settings.least_excess))) if found else 0.0
 
 
+def _regular(problem: LeastSquares, state: FitState) -> tuple[str, float]:
+    """
+    Return the signal whose residual repeats itself most in a test, and by how much.
+
+    A hum, a ripple or a resonance may be no louder than a sensor's noise may be. But what is left
+    of noise is white, because its colour is known. What is quieter than noise counts less.
+    """
+    settings = problem.settings.lack_of_fit
+    signal, greatest = '', 0.0
+    for k, experiment in enumerate(problem.experiments):
+        z = problem.residuals_of(state, k)
+        for c, channel in enumerate(experiment.channels):
+            if channel in experiment.quantised or (
+                    np.isfinite(z[:, c]).sum() <= settings.least_samples):
+                continue
+            found = statistics.autocorrelation(z[:, c], settings) * min(
+                1.0, statistics.power(z[:, c], settings))
+            if found > greatest:
+                signal, greatest = channel, found
+    return signal, greatest
+
+
 def _enough(problem: LeastSquares) -> bool:
     """Return whether a signal has so many samples that its residual can be judged."""
     least = problem.settings.lack_of_fit.least_samples
@@ -97,7 +120,9 @@ def _left(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> float:
             energy += [min(float(np.nanmean(z[:, c] ** 2)), greatest) - white,
                        min(float(np.mean(first[:, c] ** 2)), greatest) - white]
             noise += white
-    return float(np.clip(energy[0] / max(energy[1], settings.least_gap * noise), 0.0, 1.0))
+    # where all signals are quantised, there is nothing to judge
+    gap = max(energy[1], settings.least_gap * noise, 1e-30)
+    return float(np.clip(energy[0] / gap, 0.0, 1.0))
 
 
 def _fast(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> tuple[str, float, float]:

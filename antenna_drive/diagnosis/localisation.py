@@ -69,8 +69,8 @@ def of_the_unknown(problem: LeastSquares, none: FitState,
     none
         where the fit ended without any effect
     lack
-        what the best hypothesis leaves: what is too fast for a pulse shows in one reading, and
-        is put there
+        what the best hypothesis leaves: what is too fast for a pulse, or repeats itself, shows
+        in one reading, and is put there
 
     """
     settings = problem.settings
@@ -80,6 +80,8 @@ def of_the_unknown(problem: LeastSquares, none: FitState,
         parts = unknown_input.components(found, settings.localisation.caution)
     elif lack.fast > settings.verdict.fast:
         parts = {lack.loudest: 1.0}
+    elif lack.regular > settings.verdict.regular:
+        parts = {lack.most_regular: 1.0}
     else:
         return [], found
     return _located(problem, parts, lambda k: problem.residuals_of(none, k) ** 2 - 1.0), found

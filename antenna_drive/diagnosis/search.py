@@ -279,7 +279,8 @@ class Search:
         return self._with_better(hypotheses, self._pool.map(
             lambda item: self._moved(best, *item),
             [(place, *item) for place in range(len(best.effects))
-             for item in self._relatives(best.effects[place])]))
+             for item in self._relatives(best.effects[place])
+             if item[0].id not in best.effects]))
 
     def _relatives(self, ident: str) -> Iterator[tuple[Effect, float]]:
         """Yield an effect in other places, with the factor of its size that does as much."""

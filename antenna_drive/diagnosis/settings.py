@@ -33,6 +33,8 @@ TRIAL_2 = 'trial 2'
 TRIAL_6 = 'trial 6'
 TRIAL_7 = 'trial 7'
 TRIAL_9 = 'trial 9'
+TRIAL_11 = 'trial 11'
+TRIALS_9_TO_11 = 'trials 9 to 11'
 WILD = 'wild practice cases'
 
 
@@ -191,6 +193,9 @@ class VerdictSettings:
     fast_left: float = _setting(
         0.3, '1', 'share of that residual left that tips the scales to unknown', TRIAL_0)
     fast_left_slope: float = _setting(3.0, '1', 'how sharply', TRIAL_0)
+    regular: float = _setting(
+        0.73, '1', 'autocorrelation of a residual that tips the scales to unknown', TRIAL_11)
+    regular_slope: float = _setting(25.0, '1', 'how sharply', TRIAL_11)
     implausible_slope: float = _setting(
         6.0, '1', 'how sharply implausible values of an effect speak for unknown', PRACTICE)
     held_out: float = _setting(
@@ -257,6 +262,12 @@ class IntervalSettings:
         0.1, '1', 'share of a derivative that may be wrong', WILD)
     model_error: float = _setting(
         3e-3, '1', 'standard deviation that every value has, as a share of itself', WILD)
+    sure: float = _setting(
+        1.645, 'standard deviations', 'by how much an effect that is named exceeds its tolerance: '
+        '95 percent, one-sided', TRIALS_9_TO_11)
+    sure_of_all: float = _setting(
+        2.33, 'standard deviations', 'the same where no test alone shows a gap: 99 percent',
+        TRIALS_9_TO_11)
 
 
 @dataclass(frozen=True)
@@ -285,6 +296,9 @@ class HeldOutSettings:
         1, '1', 'greatest number of fresh Jacobians of a fit to the training data')
     no_gap: float = _setting(
         1e-3, '1', 'gap, as a share of the energy before, below which nothing is to be explained')
+    no_harm: float = _setting(
+        0.2, 'noise variance', 'residual beyond noise that effects may leave where there is none '
+        'without them; what leaves more is refuted', TRIAL_11)
     resamples: int = _setting(400, '1', 'resamples of the block bootstrap')
 
 

@@ -181,9 +181,11 @@ def trained(part: Part, parameters: Sequence[Parameter], point: Mapping[str, flo
         if number == 1:
             # what was taken for the place in a gap may have been the effect
             at = with_initial_conditions(problem, at)
-        given = slopes[min(number, len(slopes) - 1)]
-        state = problem.fit(problem.start(parameters, at, given / np.float32(scale)),
-                            options.iterations)
+        given = slopes[min(number, len(slopes) - 1)] / np.float32(scale)
+        if scale > 1.0:
+            # far from the sizes, a shape would be turned the wrong way: the order of a ripple
+            given[:, [p.is_shape for p in parameters]] = 0.0
+        state = problem.fit(problem.start(parameters, at, given), options.iterations)
         at = state.point()
         number += 1
     return settled(problem, state, search, options.passes, options.iterations)

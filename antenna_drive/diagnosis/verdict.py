@@ -52,6 +52,8 @@ class LackOfFit:
     loudest : signal whose fast part is the loudest
     enough : False if no signal has samples enough to be judged
     named : False if the hypothesis names nothing that could have closed the gap
+    regular : greatest autocorrelation of a signal's residual, less if it is quieter than noise
+    most_regular : signal that it is of
 
     """
 
@@ -64,6 +66,8 @@ class LackOfFit:
     loudest: str = ''
     enough: bool = True
     named: bool = True
+    regular: float = 0.0
+    most_regular: str = ''
 
 
 @dataclass(frozen=True)
@@ -232,10 +236,13 @@ def also_seen(hypotheses: Sequence[Hypothesis], settings: Settings,
         if without is None:
             continue  # nothing tells what the effect gains beside those that are named
         gain = (without - hypothesis.cost) / inflation
+        if not top.named and effect in hypothesis.named:
+            continue  # a rival of an effect that is not sure is no surer
         if gain > settings.penalty.effect and gain > found.get(effect, {}).get('gain', 0.0):
             found[effect] = {'effect': effect, 'gain': gain,
                              'share': min(inflation * gain / gap, 1.0) if gap > 0.0 else 0.0,
-                             'within_tolerance': effect not in hypothesis.named}
+                             'within_tolerance': effect not in hypothesis.named,
+                             'unsure': effect in hypothesis.unsure}
     return sorted(found.values(), key=lambda item: -float(item['gain']))
 
 
@@ -244,10 +251,10 @@ def unknown_probability(lack: LackOfFit, settings: VerdictSettings) -> float:
     def logit(value: float, tipping: float, slope: float) -> float:
         return slope * math.log(max(value / tipping, 1e-3))
 
-    slow = _logistic(
-        logit(lack.slow_excess, settings.slow, settings.slow_slope)
-        # an effect of another form than the true one leaves little; no effect has no such excuse
-        + (logit(lack.left, settings.left, settings.left_slope) if lack.named else 0.0))
+    # an effect of another form than the true one leaves little; no effect has no such excuse
+    left = logit(lack.left, settings.left, settings.left_slope) if lack.named else 0.0
+    slow = _logistic(logit(lack.slow_excess, settings.slow, settings.slow_slope) + left)
+    regular = _logistic(logit(lack.regular, settings.regular, settings.regular_slope) + left)
     # a sensor may be noisier than its sheet says; but noise does not shrink with an effect
     fast = (_logistic(logit(lack.fast, settings.fast, settings.fast_slope))
             * _logistic(logit(lack.fast_left, settings.fast_left, settings.fast_left_slope)))
@@ -257,7 +264,7 @@ def unknown_probability(lack: LackOfFit, settings: VerdictSettings) -> float:
     failed = 0.0 if lack.explained is None else _logistic(
         settings.held_out_slope * (settings.held_out - lack.explained)) * _logistic(
         logit(lack.slow_excess, settings.noise_only, settings.noise_only_slope))
-    passed = (1.0 - slow) * (1.0 - fast) * (1.0 - implausible) * (1.0 - failed)
+    passed = (1.0 - slow) * (1.0 - fast) * (1.0 - regular) * (1.0 - implausible) * (1.0 - failed)
     return settings.most_unknown - (settings.most_unknown - settings.least_unknown) * passed
 
 

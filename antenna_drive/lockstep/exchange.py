@@ -101,7 +101,7 @@ class FrameChannel(Protocol):
 
 @cache
 def _compiled(name: str, advance: Any, folder: Path) -> Any:
-    """Return the compiled loop for a `Form`: (state, memory) -> reason."""
+    """Return the compiled loop for a `CompiledForm`: (state, memory) -> reason."""
     text = _LOOP.format(unit=name, step=Word.step, step_s=Time.step_s)
     names = {'advance': advance, 'gather': loop.gather, 'may_step': loop.may_step,
              'read_inputs': loop.read_inputs, 'put_out': loop.put_out}

@@ -21,7 +21,7 @@ from typing import Any
 
 from antenna_drive.diagnosis import Form, Hypothesis, Parameter
 from antenna_drive.diagnosis.intervals import (
-    covariance, inflation, jackknife, values_with_intervals,
+    covariance, deviations, inflation, jackknife, unsure, values_with_intervals,
 )
 from antenna_drive.diagnosis.least_squares import FitState
 from antenna_drive.diagnosis.settings import DEFAULT
@@ -103,7 +103,8 @@ def test_a_change_and_a_tolerance_of_one_number_are_told_apart_by_nothing(
     tolerant = replace(CHANGE, unit=unit, tolerance=0.02)
     fitted = Hypothesis(('part.effect',), (Form('', (tolerant,)),), state(
         [1e6 * np.random.default_rng(4).normal(size=4000)], (tolerant,)))
-    low, high = values_with_intervals(fitted, lambda name: 1.0, SETTINGS)[tolerant.name]['ci95']
+    low, high = values_with_intervals(
+        fitted, deviations(fitted, lambda name: 1.0, SETTINGS))[tolerant.name]['ci95']
     assert high - low == pytest.approx(2.0 * 1.96 * 0.02 / 3.0 ** 0.5 * share, rel=0.01)
 
 
@@ -111,7 +112,8 @@ def test_no_value_is_surer_than_the_model() -> None:
     random = np.random.default_rng(2)
     fitted = Hypothesis(('part.effect',), (Form('', (CHANGE,)),),
                         state([1e6 * random.normal(size=4000)], (CHANGE,)))
-    low, high = values_with_intervals(fitted, lambda name: 1.0, SETTINGS)[CHANGE.name]['ci95']
+    low, high = values_with_intervals(
+        fitted, deviations(fitted, lambda name: 1.0, SETTINGS))[CHANGE.name]['ci95']
     assert high - low == pytest.approx(2.0 * 1.96 * SETTINGS.model_error * 0.01, rel=0.01)
 
 
@@ -127,15 +129,16 @@ def test_an_interval_is_as_wide_as_the_values_of_the_tests_differ() -> None:
     random = np.random.default_rng(2)
     fitted = Hypothesis(('part.effect',), (Form('', (CHANGE,)),),
                         state([1e6 * random.normal(size=4000)], (CHANGE,)))
-    low, high = values_with_intervals(fitted, lambda name: 1.0, SETTINGS,
-                                      {CHANGE.name: 0.2})[CHANGE.name]['ci95']
+    low, high = values_with_intervals(fitted, deviations(
+        fitted, lambda name: 1.0, SETTINGS, {CHANGE.name: 0.2}))[CHANGE.name]['ci95']
     assert high - low == pytest.approx(2.0 * 1.96 * 0.2, rel=0.01)
 
 
 def test_what_the_data_do_not_tell_may_be_anything_within_its_bounds() -> None:
     unseen = state([np.zeros(100)], (CHANGE,))
     fitted = Hypothesis(('part.effect',), (Form('', (CHANGE,)),), unseen)
-    low, high = values_with_intervals(fitted, lambda name: 1.0, SETTINGS)[CHANGE.name]['ci95']
+    low, high = values_with_intervals(
+        fitted, deviations(fitted, lambda name: 1.0, SETTINGS))[CHANGE.name]['ci95']
     assert low < -0.85
     assert high == CHANGE.high
 
@@ -150,3 +153,24 @@ def test_a_nuisance_that_is_held_adds_nothing_to_the_intervals_of_others() -> No
     bare = replace(held, prior_sigma=0.0)
     assert np.isfinite(covariance(
         state([column, np.zeros(4000)], (CHANGE, bare)), 1.0, SETTINGS)).all()
+
+
+@pytest.mark.parametrize('size, tolerance, beyond, expected', [
+    (0.5, 0.1, 1.645, False), (0.5, 0.1, 4.1, True), (-0.5, 0.1, 3.9, False),
+    (0.25, 0.1, 1.645, True)])
+def test_an_effect_is_sure_if_its_size_exceeds_the_tolerance_by_enough_deviations(
+        size: float, tolerance: float, beyond: float, expected: bool) -> None:
+    number = replace(CHANGE, tolerance=tolerance)
+    fitted = Hypothesis(('part.effect',), (Form('', (number,)),),
+                        replace(state([np.ones(4)], (number,)), x=np.array([size])))
+    assert unsure(fitted, {number.name: 0.1}, beyond) == (
+        frozenset(['part.effect']) if expected else frozenset())
+    named = replace(fitted, unsure=unsure(fitted, {number.name: 0.1}, beyond)).named
+    assert named == (() if expected else ('part.effect',))
+
+
+def test_what_is_within_its_tolerance_is_no_matter_of_being_sure() -> None:
+    number = replace(CHANGE, tolerance=0.1)
+    fitted = Hypothesis(('part.effect',), (Form('', (number,)),),
+                        replace(state([np.ones(4)], (number,)), x=np.array([0.05])))
+    assert unsure(fitted, {number.name: 0.1}, 1.645) == frozenset()

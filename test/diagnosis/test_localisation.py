@@ -125,6 +125,10 @@ def test_what_is_too_fast_for_a_pulse_lies_in_its_reading() -> None:
         0.0, 1.0, fast=50.0, loudest='seen right'))
     assert places[0].evidence < 20.0
     assert {item['component'] for item in found} == {'seen right'}
+    # no louder than noise, but regular
+    found, _ = of_the_unknown(problem, none, LackOfFit(
+        0.0, 1.0, regular=0.9, most_regular='seen left'))
+    assert {item['component'] for item in found} == {'seen left'}
 
 
 def test_where_nothing_is_nothing_is_located() -> None:

@@ -95,6 +95,20 @@ def test_a_member_of_a_pair_is_tried_in_its_other_places() -> None:
     assert pairs[0].effects == ('right.pull', 'drift')
 
 
+def test_no_pair_has_one_effect_twice() -> None:
+    """The other place of a member may be where its partner is."""
+    machine = Springs(0.5, 0.2)
+    problem = LeastSquares(machine)
+    search = Search(problem, lambda share, doing: None)
+    forms = tuple(machine.effects[key].forms[0] for key in ('left.pull', 'right.pull'))
+    start = problem.start([*machine.nuisances, *(p for form in forms for p in form.parameters)],
+                          {'left.pull.pull': 0.5, 'right.pull.pull': 0.2})
+    pairs = search._with_relatives([Hypothesis(('left.pull', 'right.pull'), forms,
+                                               problem.fit(start, 5))])
+    assert {h.effects for h in pairs} == {
+        ('left.pull', 'right.pull'), ('both.pull', 'right.pull'), ('left.pull', 'both.pull')}
+
+
 class Tilted(Machine):
     """A weight that is pushed at three tilts, where only one of two pushes depends on the tilt."""
 

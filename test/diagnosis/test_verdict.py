@@ -69,12 +69,13 @@ def test_effect_within_a_tolerance_is_dear(value: float) -> None:
 @settings(max_examples=200)
 @given(st.floats(0.0, 100.0), shares, st.floats(0.5, 100.0), shares, st.floats(0.0, 5.0),
        st.floats(-5.0, 1.0), st.sampled_from(['slow_excess', 'left', 'fast', 'fast_left',
-                                              'implausibility']), st.floats(1.0, 5.0))
+                                              'implausibility', 'regular']),
+       st.floats(1.0, 5.0), shares)
 def test_more_of_anything_left_is_never_less_unknown(
         excess: float, left: float, loud: float, loud_left: float, strange: float,
-        explained: float, which: str, times: float) -> None:
+        explained: float, which: str, times: float, regular: float) -> None:
     """The probability of the unknown is one, and rises with all that speaks for it."""
-    remains = LackOfFit(excess, left, loud, loud_left, strange, explained)
+    remains = LackOfFit(excess, left, loud, loud_left, strange, explained, regular=regular)
     more = replace(remains, **{which: times * getattr(remains, which)})
     assert 0.0 <= unknown(remains) <= unknown(more) + 1e-12 <= 1.0 + 1e-9
 
@@ -144,7 +145,8 @@ def test_an_effect_within_its_tolerance_is_not_named() -> None:
     decision = decide([none, small], LackOfFit(0.0, 0.0), DEFAULT)
     assert decision.word == 'no_gap'
     assert also_seen([none, small], DEFAULT) == [
-        {'effect': 'motor.gain', 'gain': 1000.0, 'share': 1.0, 'within_tolerance': True}]
+        {'effect': 'motor.gain', 'gain': 1000.0, 'share': 1.0, 'within_tolerance': True,
+         'unsure': False}]
 
 
 def test_a_partner_within_its_tolerance_leaves_the_first_effect_alone() -> None:
@@ -168,6 +170,7 @@ def test_a_small_partner_is_listed_apart() -> None:
     assert rank([none, single, pair], 0.0, DEFAULT)[0].effects == ('axis.inertia',)
     [seen] = also_seen([none, single, pair], DEFAULT)
     assert seen == {'effect': 'motor.gain', 'gain': 100.0, 'within_tolerance': False,
+                    'unsure': False,
                     'share': pytest.approx(100.0 / 19000.0)}
 
 

@@ -44,7 +44,11 @@ FULL: dict[str, Any] = {
         {'effects': ['unknown'], 'probability': 0.1, 'parameters': {}},
         {'effects': ['none'], 'probability': 0.0, 'parameters': {}}],
     'confusable': [['motors.friction', 'dial.gain']],
-    'also_seen': [{'effect': HOSTILE, 'gain': 40.0, 'share': 0.012, 'within_tolerance': False}],
+    'also_seen': [
+        {'effect': HOSTILE, 'gain': 40.0, 'share': 0.012, 'within_tolerance': False,
+         'unsure': False},
+        {'effect': 'dial.gain', 'gain': 30.0, 'share': 0.2, 'within_tolerance': False,
+         'unsure': True}],
     'could_hide': [{'effect': HOSTILE, 'size': 0.00317, 'unit': 'V'},
                    {'effect': 'dial.gain', 'size': None, 'unit': '1'}],
     'remains': {HOSTILE: {'unit': 'V', 'rms': 0.0456, 'noise': 0.01, 'beyond_noise': 0.0445,
@@ -120,7 +124,8 @@ def test_everything_is_said_and_nothing_is_taken_for_html(browser: Page, tmp_pat
                   'Turn it by hand.', '3 s of computing', 'a bent needle',
                   f'data that was not fitted: {HOSTILE}.', 'matters',
                   'could be and still hide here', 'dial 12 samples: too few to judge',
-                  f'not worth a name: {HOSTILE} (1.2 % of the gap).'):
+                  f'not worth a name: {HOSTILE} (1.2 % of the gap), '
+                  'dial.gain (not surely beyond its tolerance).'):
         assert words in text, words
     assert 'Hold one rate.' not in text and '0.0 % none' not in text
     # every text of the made-up recording's that can be seen, and the script's data

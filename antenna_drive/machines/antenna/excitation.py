@@ -16,7 +16,7 @@ What a test did to the drive, from the test sheet or, failing that, from the rec
 
 A sheet's waveform is exact: its jumps are known to the microsecond. A recorded command is a set
 of samples. Between two that differ by more than their neighbours do, a jump is assumed: where the
-regular times of many jumps put it, or else halfway. Where rows are missing, that may be far off.
+regular times of many jumps put it, or else halfway. It may come anywhere between the two.
 """
 
 from __future__ import annotations
@@ -155,7 +155,7 @@ class RecordedCommand:
         # the three pieces of an interval with a jump: the middle one is the jump
         pieces = np.insert(
             np.where(large[:, np.newaxis], 0.0, slopes), np.repeat(k, 2), 0.0, axis=0)
-        open_ = np.nan_to_num(uncertainty) > _UNCERTAIN * np.ptp(value)
+        open_ = uncertain.copy()
         open_[k] = False
         open_[_corners(time, value)[0]] = False
         h = np.flatnonzero(open_)

@@ -159,13 +159,11 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
             name = f'jump:{test.name}:{begin:.3f}'
             earlier, later = command.slack[i].tolist()
             half = 0.5 * (later - earlier)
-            yield AntennaParameter(name, 's', earlier, later, 0.3 * half, half / math.sqrt(3.0),
-                                   experiment=k, modifier=UnrecordedJump(i))
+            yield replace(_within(name, 's', half, UnrecordedJump(i), k), low=earlier, high=later)
 
         for i, (begin, _) in enumerate(command.holes):
             yield _within(f'hole:{test.name}:{begin:.3f}', 'rad/s',
-                          2.0 * float(command.uncertainty[i]),
-                          UnrecordedMean(i), k)
+                          2.0 * float(command.uncertainty[i]), UnrecordedMean(i), k)
 
     given = allowed([test])
     if given.clock_ppm:
