@@ -35,7 +35,7 @@ ROWS = {
     'closed_held_back_median': 'closed on'}
 
 
-@pytest.mark.parametrize('number', [9, 10])
+@pytest.mark.parametrize('number', [9, 10, 11])
 @pytest.mark.parametrize('page', ['diagnosis.md', 'trials/README.md'])
 def test_figures_of_a_wild_trial_are_those_of_its_cases(page: str, number: int) -> None:
     cases = read_scored(DOCS / 'trials' / f'wild_{number}.jsonl')
