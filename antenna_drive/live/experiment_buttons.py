@@ -17,13 +17,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 import math
 from typing import Any, NamedTuple
 
 from antenna_drive.article.experiments import DriveExperiment, experiments
+from antenna_drive.article.measures import article_measures
 from antenna_drive.article.published import Claim, CLAIMS
 from antenna_drive.emulator.units import build
 from antenna_drive.emulator.wiring import UNITS
+from antenna_drive.parameters import load
 from antenna_drive.parameters.loading import check_waveform
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.schema import check_changes, Entry, Value
@@ -93,12 +96,17 @@ def claims(name: str) -> list[dict[str, str]]:
         test, _, figure = claim.measure.partition('.')
         if test.rstrip('ab' if name == 'T2' else '') != name:
             continue
-        says = claim.says
+        says, unit = claim.says, _units()[claim.measure]
         if isinstance(says, Mapping):
-            says = f'{says["analysis"]:g} (analysis), {says["field"]:g} (field)'
+            says = f'{says["analysis"]:g} {unit} (analysis), {says["field"]:g} {unit} (field)'
         found.append({'what': figure.replace('_', ' '), 'note': claim.note,
-                      'says': says if isinstance(says, str) else f'{says:g}'})
+                      'says': says if isinstance(says, str) else f'{says:g} {unit}'})
     return found
+
+
+@cache
+def _units() -> dict[str, str]:
+    return {name: measure.unit for name, measure in article_measures(load()).items()}
 
 
 class ExperimentChanges(NamedTuple):

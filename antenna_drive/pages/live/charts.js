@@ -185,27 +185,8 @@ class Chart {
     ctx.clip();
     ctx.lineWidth = scale;
     ctx.font = `${10 * scale}px system-ui, sans-serif`;
-    const faint = css('--faint');
-    for (const level of this.levels)
-      for (const [what, value] of [['analysis', level.analysis], ['field', level.field]]) {
-        if (value === null) continue;
-        const y = plot.valToPos(value * this.panel.factor, 'y', true);
-        ctx.strokeStyle = ctx.fillStyle = what === 'analysis' ? css('--ink') : faint;
-        ctx.setLineDash([6 * scale, 4 * scale]);
-        ctx.beginPath();
-        ctx.moveTo(bbox.left, y);
-        ctx.lineTo(bbox.left + bbox.width, y);
-        ctx.stroke();
-        const text = `${what} ${digits(value * this.panel.factor, 3)}`;
-        ctx.textAlign = what === 'analysis' ? 'left' : 'right';
-        const left = what === 'analysis', width = ctx.measureText(text).width;
-        const x = left ? bbox.left + 4 * scale : bbox.left + bbox.width - 4 * scale;
-        ctx.fillStyle = css('--paper');
-        ctx.fillRect(left ? x - 2 * scale : x - width - 2 * scale, y - 6 * scale,
-                     width + 4 * scale, 12 * scale);
-        ctx.fillStyle = ctx.strokeStyle;
-        ctx.fillText(text, x, y + 3.5 * scale);
-      }
+    this.drawLevels(plot, 'analysis', css('--ink'), 'left');
+    this.drawLevels(plot, 'field', css('--faint'), 'right');
     ctx.setLineDash([2 * scale, 3 * scale]);
     ctx.strokeStyle = css('--warn');
     const {samples} = this.charts;
@@ -219,6 +200,34 @@ class Chart {
       ctx.stroke();
     }
     ctx.restore();
+  }
+
+  // The levels of one kind; labels of levels that lie close together stand one below the other.
+  drawLevels({ctx, bbox, valToPos}, what, ink, side) {
+    const scale = devicePixelRatio, line = 12 * scale, left = side === 'left';
+    const levels = this.levels.filter(level => level[what] !== null).map(
+      level => level[what] * this.panel.factor).sort((a, b) => b - a);
+    ctx.strokeStyle = ink;
+    ctx.setLineDash([6 * scale, 4 * scale]);
+    for (const level of levels) {
+      const y = valToPos(level, 'y', true);
+      ctx.beginPath();
+      ctx.moveTo(bbox.left, y);
+      ctx.lineTo(bbox.left + bbox.width, y);
+      ctx.stroke();
+    }
+    ctx.textAlign = side;
+    const x = left ? bbox.left + 4 * scale : bbox.left + bbox.width - 4 * scale;
+    let above = bbox.top - line / 2;
+    for (const level of levels) {
+      const y = above = Math.max(valToPos(level, 'y', true), above + line);
+      const text = `${what} ${digits(level, 3)}`, width = ctx.measureText(text).width;
+      ctx.fillStyle = css('--paper');
+      ctx.fillRect(left ? x - 2 * scale : x - width - 2 * scale, y - line / 2,
+                   width + 4 * scale, line);
+      ctx.fillStyle = ink;
+      ctx.fillText(text, x, y + 3.5 * scale);
+    }
   }
 
   resize() {

@@ -6,6 +6,7 @@ const MOST = 12;
 
 export class Nodes {
   constructor() {
+    this.units = [];
     const holder = document.getElementById('nodes');
     make('h2', holder, 'What the nodes report');
     this.reports = make('table', holder);
@@ -24,6 +25,7 @@ export class Nodes {
 
   takes() {
     return {
+      hello: told => { this.units = told.units; },
       nodes: told => this.report(told.nodes),
       drive: told => {
         this.lost.textContent = `steps that this page’s reader has missed: ${told.lost ?? 0}`;
@@ -34,7 +36,9 @@ export class Nodes {
 
   report(nodes) {
     this.reports.replaceChildren();
-    for (const [unit, said] of Object.entries(nodes)) {
+    for (const unit of [...new Set([...this.units, ...Object.keys(nodes)])]) {
+      const said = nodes[unit];
+      if (!said) continue;
       const row = make('tr', this.reports);
       make('th', row, unit, {scope: 'row'});
       const cell = make('td', row);
