@@ -15,9 +15,8 @@
 
 from __future__ import annotations
 
-import math
-
 from antenna_drive.physics.compiling import inner
+from antenna_drive.physics.trigonometry import cosine, sine
 
 
 @inner
@@ -39,9 +38,9 @@ def wave(angle: float, amplitude: float, second: float, third: float, cycles: fl
 
     """
     turned = cycles * angle
-    return (amplitude * math.sin(turned + phase)
-            + second * math.sin(2.0 * turned + second_phase)
-            + third * math.sin(3.0 * turned + third_phase))
+    return (amplitude * sine(turned + phase)
+            + second * sine(2.0 * turned + second_phase)
+            + third * sine(3.0 * turned + third_phase))
 
 
 @inner
@@ -49,6 +48,6 @@ def wave_slope(angle: float, amplitude: float, second: float, third: float, cycl
                phase: float, second_phase: float, third_phase: float) -> float:
     """Return the derivative of `wave` by the angle, per rad; everything as there."""
     turned = cycles * angle
-    return cycles * (amplitude * math.cos(turned + phase)
-                     + 2.0 * second * math.cos(2.0 * turned + second_phase)
-                     + 3.0 * third * math.cos(3.0 * turned + third_phase))
+    return cycles * (amplitude * cosine(turned + phase)
+                     + 2.0 * second * cosine(2.0 * turned + second_phase)
+                     + 3.0 * third * cosine(3.0 * turned + third_phase))

@@ -61,12 +61,13 @@ def _axis_angle(u: FloatArray, t: float) -> float:
 @inner
 def _gear(
         t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: MotorDrive,
-) -> tuple[float, float]:
-    """Return twist rate [rad/s] and gear torque [N m] at t."""
+) -> tuple[float, float, float]:
+    """Return twist [rad], its rate [rad/s] and the gear torque [N m] at t."""
     angle = twist(x[STATE.angle], _axis_angle(u, t), p.gear_ratio, p.gearbox)
     rate = twist_rate(x[STATE.angle], x[STATE.rate], held(u, INPUT.axis_rate, t), p.gear_ratio,
                       p.gearbox)
-    return rate, gear_torque(mode[MODE.side], angle, rate, x[STATE.presliding], p.gearbox)
+    return angle, rate, gear_torque(
+        mode[MODE.side], angle, rate, x[STATE.presliding], p.gearbox)
 
 
 @inner
@@ -106,7 +107,7 @@ def _demand(
     error = rate_error(x[STATE.voltage], tach_rate, bias_command, p.amplifier)
     if p.amplifier.delay > 0.0:
         # the error of a little while ago, to first order
-        _, torque = _gear(t, x, mode, u, p)
+        _, _, torque = _gear(t, x, mode, u, p)
         error -= p.amplifier.delay * _error_slope(
             t, x, u, error, _acceleration(x, mode, torque, p), p)
     return error, error + x[STATE.integral], limit_centre(x[STATE.rate], p.amplifier, p.armature)
@@ -134,7 +135,7 @@ def rates(
 ) -> None:
     """Write the time derivatives of the states."""
     error, demand, centre = _demand(t, x, mode, u, p)
-    rate, torque = _gear(t, x, mode, u, p)
+    _, rate, torque = _gear(t, x, mode, u, p)
     dx[STATE.voltage] = _voltage_rate(t, x, u, p)
     acceleration = _acceleration(x, mode, torque, p)
     needed = _needed(t, x, u, error, acceleration, p) if mode[MODE.winding] == HELD else 0.0
@@ -154,20 +155,16 @@ def switch(
 ) -> bool:
     """Return whether the modes no longer hold; write the new ones if `commit`."""
     gear = p.gearbox
-    side = contact_side(
-        twist(x[STATE.angle], _axis_angle(u, t), p.gear_ratio, gear),
-        twist_rate(x[STATE.angle], x[STATE.rate], held(u, INPUT.axis_rate, t), p.gear_ratio, gear),
-        gear.half_gap, gear.stiffness, gear.contact_damping)
+    angle, rate, torque = _gear(t, x, mode, u, p)
+    side = contact_side(angle, rate, gear.half_gap, gear.stiffness, gear.contact_damping)
     error, demand, centre = _demand(t, x, mode, u, p)
     excess = (demand - centre if error > 0.0 else centre - demand) - p.motor.current_limit
     winding = mode[MODE.winding]
     if excess > 0.0 or winding != FREE:
-        _, torque = _gear(t, x, mode, u, p)
         needed = _needed(t, x, u, error, _acceleration(x, mode, torque, p), p)
         winding = next_winding(winding, error, excess, needed, p.amplifier)
     slip = mode[MODE.slip]
     if slip == 0 or slip * x[STATE.rate] <= p.motor.velocity_threshold:
-        _, torque = _gear(t, x, mode, u, p)
         applied = driving_torque(x[STATE.current], x[STATE.angle], p.motor) - torque
         level = friction_level(0.0, torque, p.motor)
         slip = next_slip(slip, x[STATE.rate], applied, level, p.motor.stiction_ratio * level,
@@ -188,7 +185,7 @@ def read(
         x: FloatArray, mode: IntArray, u: FloatArray, t: float, p: MotorDrive, y: FloatArray,
 ) -> None:
     """Write the outputs but for the missed impulse, which `end` knows."""
-    rate, torque = _gear(t, x, mode, u, p)
+    _, rate, torque = _gear(t, x, mode, u, p)
     acceleration = _acceleration(x, mode, torque, p)
     current_slope = _current_rate(x, p)
     torque_slope = contact_torque_rate(
@@ -229,7 +226,7 @@ def end(
 def _gear_torque(
         t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: MotorDrive,
 ) -> float:
-    return _gear(t, x, mode, u, p)[1]
+    return _gear(t, x, mode, u, p)[2]
 
 
 BLOCK = Block(

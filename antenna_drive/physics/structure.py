@@ -30,6 +30,7 @@ from antenna_drive.physics.block import Block, Equation, held, output_rows, put,
 from antenna_drive.physics.compiling import inner, shared
 from antenna_drive.physics.friction import drag, next_slip, slip_level
 from antenna_drive.physics.harmonics import wave
+from antenna_drive.physics.trigonometry import cosine
 
 STATE = rows('axis_angle', 'axis_rate')  # and two for each mode of the structure
 MODE = rows('slip')
@@ -58,13 +59,20 @@ def _mode_torque(x: FloatArray, j: int, p: Axis) -> float:
 
 
 @inner
-def _applied_torque(t: float, x: FloatArray, u: FloatArray, p: Axis) -> float:
-    """Return T_o of Eq. (8): every torque on the hub but friction [N m], at t."""
+def _driving_torque(t: float, x: FloatArray, u: FloatArray, p: Axis) -> float:
+    """Return every torque on the hub but those of friction and modes [N m], at t."""
     one, two = INPUT.gear_torque_1, INPUT.gear_torque_2
     torque = p.gear_ratio * (u[one, 0] + u[two, 0] + (u[one, 1] + u[two, 1]) * t)
     torque += held(u, INPUT.external_torque, t) + p.steady_wind_torque
     if p.gravity_torque != 0.0:
-        torque -= p.gravity_torque * math.cos(p.start_elevation + x[STATE.axis_angle])
+        torque -= p.gravity_torque * cosine(p.start_elevation + x[STATE.axis_angle])
+    return torque
+
+
+@inner
+def _applied_torque(t: float, x: FloatArray, u: FloatArray, p: Axis) -> float:
+    """Return T_o of Eq. (8): every torque on the hub but friction [N m], at t."""
+    torque = _driving_torque(t, x, u, p)
     for j in range(p.mode_inertias_count):
         torque += _mode_torque(x, j, p)
     return torque
@@ -86,12 +94,12 @@ def _friction_level(rate: float, angle: float, p: Axis) -> float:
 
 
 @inner
-def _acceleration(t: float, x: FloatArray, mode: IntArray, u: FloatArray, p: Axis) -> float:
-    """Return the hub's acceleration [rad/s^2] at t, Eq. (2)."""
+def _acceleration(x: FloatArray, mode: IntArray, torque: float, p: Axis) -> float:
+    """Return the hub's acceleration [rad/s^2] under an applied torque [N m], Eq. (2)."""
     if mode[MODE.slip] == 0:
         return 0.0
     friction = mode[MODE.slip] * _friction_level(x[STATE.axis_rate], x[STATE.axis_angle], p)
-    return (_applied_torque(t, x, u, p) - friction) / p.inertia_hub
+    return (torque - friction) / p.inertia_hub
 
 
 @shared
@@ -101,10 +109,13 @@ def rates(
     """Write the time derivatives of the states."""
     axis = p.axis
     dx[STATE.axis_angle] = x[STATE.axis_rate]
-    dx[STATE.axis_rate] = _acceleration(t, x, mode, u, axis)
+    torque = _driving_torque(t, x, u, axis)
     for j in range(axis.mode_inertias_count):
+        of_mode = _mode_torque(x, j, axis)
         dx[2 + 2 * j] = x[3 + 2 * j]
-        dx[3 + 2 * j] = -_mode_torque(x, j, axis) / axis.mode_inertias[j]
+        dx[3 + 2 * j] = -of_mode / axis.mode_inertias[j]
+        torque += of_mode
+    dx[STATE.axis_rate] = _acceleration(x, mode, torque, axis)
 
 
 @shared
@@ -157,7 +168,7 @@ def read(
     """Write the outputs of Fig. 4."""
     axis = p.axis
     angle, rate = x[STATE.axis_angle], x[STATE.axis_rate]
-    acceleration = _acceleration(t, x, mode, u, axis)
+    acceleration = _acceleration(x, mode, _applied_torque(t, x, u, axis), axis)
     put(y, OUTPUT.axis_angle, angle, rate)
     put(y, OUTPUT.axis_rate, rate, acceleration)
     put(y, OUTPUT.encoder, encoder(angle, p.encoder), rate)
