@@ -309,7 +309,10 @@ def _precision(rival: Rival, numbers: Sequence[Parameter], inflated: float) -> F
     places = [j for j, p in enumerate(numbers) if p.name in rival.names]
     known = rival.covariance_of([numbers[j].name for j in places])
     scale = np.sqrt(np.maximum(np.diag(known), 1e-30))
-    inverse = linalg.pinvh(known / np.outer(scale, scale)) / np.outer(scale, scale)
+    unit = np.outer(scale, scale)
+    # the digits of a file leave eigenvalues near zero of either sign: well known, not unknown
+    values, vectors = linalg.eigh(known / unit)
+    inverse = vectors / np.maximum(values, ROUNDING * values[-1]) @ vectors.T / unit
     # the costs are divided by the inflation in the end, which the covariance holds already
     precision[np.ix_(places, places)] = inverse * inflated
     return precision

@@ -16,6 +16,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 import math
 
 from antenna_drive.diagnosis import (
@@ -132,3 +133,26 @@ def test_a_rival_survives_its_file() -> None:
     assert back.named == one.named and back.names == one.names
     assert back.point == one.point
     assert back.covariance == pytest.approx(one.covariance)
+
+
+@pytest.mark.parametrize('seed', range(8))
+def test_the_digits_of_a_file_free_no_direction_and_hold_none(seed: int) -> None:
+    """
+    The parabola is known but for one direction; rounding makes its covariance indefinite.
+
+    Off by d, it follows along the one curve c that is free with deviation one.
+    """
+    x, s = np.linspace(-1.0, 1.0, 200), 0.3
+    free = np.random.default_rng(seed).uniform(0.3, 1.0, 3)
+    centre = np.array([1.0, 0.2, -1.8])
+    parabola = replace(rival('parabola', tuple(centre), 1.0),
+                       covariance=np.outer(free, free) + 1e-9 * np.eye(3))
+    machine = Curves(x, s)
+    waves = rival('waves', TRUE, 1e-6)
+    found = separation(machine, [waves, Rival.of_data(parabola.as_data())], 1.0)
+    powers = np.column_stack([np.ones_like(x), x, x ** 2])
+    d = machine.predict(waves.point, 0)[:, 0] - powers @ centre
+    c = powers @ free
+    step = (c @ d) / (c @ c + s ** 2)
+    lack = 0.5 * (np.sum((d - step * c) ** 2) / s ** 2 + step ** 2)
+    assert found.lack[0, 1] == pytest.approx(lack, rel=1e-2)
