@@ -32,6 +32,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from antenna_drive.diagnosis.blas import one_blas_thread
 from antenna_drive.diagnosis.confusability import confusability
 from antenna_drive.diagnosis.discrimination import (
     deviations, known_to, refitted, Separation, separation,
@@ -265,7 +266,7 @@ class TestDesign:
         effort = self._effort
         drawn = [Judged(family, self._space.draw(family, self._random), {})
                  for _ in range(effort.drawn) for family in self._space.families]
-        with ThreadPoolExecutor(self._threads) as pool:
+        with one_blas_thread(), ThreadPoolExecutor(self._threads) as pool:
             progress(0.0, 'tests within the limits')
             screened: list[Judged] = []
             for test in pool.map(self._screened, drawn):

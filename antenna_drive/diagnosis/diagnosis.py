@@ -20,13 +20,13 @@ It works on any `Machine`; the antenna's is in `machines.antenna`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from statistics import fmean
 import time
 from typing import Any
 
 from antenna_drive.diagnosis import localisation, unknown_input, verdict
+from antenna_drive.diagnosis.blas import one_blas_thread
 from antenna_drive.diagnosis.by_label import by_label
 from antenna_drive.diagnosis.check import check_machine
 from antenna_drive.diagnosis.confusability import could_hide
@@ -49,10 +49,6 @@ from antenna_drive.diagnosis.machine import Machine
 from antenna_drive.diagnosis.rivals import rivals_of
 from antenna_drive.diagnosis.search import Search
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
-try:
-    from threadpoolctl import threadpool_limits
-except ImportError:  # no ROS distribution names it: the results are the same, only slower
-    threadpool_limits = None
 
 Progress = Callable[[float, str], None]
 # An effect of more parameters than this is summed up instead of listed.
@@ -187,9 +183,8 @@ def diagnose(machine: Machine, progress: Progress = lambda share, doing: None, t
     MachineError : the machine breaks its contract; the message says where
 
     """
-    check_machine(machine)
-    # whole fits run side by side: their matrices need no threads of their own
-    with threadpool_limits(1, 'blas') if threadpool_limits else nullcontext():
+    with one_blas_thread():
+        check_machine(machine)
         return _diagnose(by_label(machine), progress, threads, settings, limits or {})
 
 

@@ -19,6 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from antenna_drive.diagnosis import verdict
+from antenna_drive.diagnosis.blas import one_blas_thread
 from antenna_drive.diagnosis.full_fits import FullFits
 from antenna_drive.diagnosis.least_squares import LeastSquares
 from antenna_drive.diagnosis.machine import Machine
@@ -48,6 +49,7 @@ def _untold(share: float, doing: str) -> None:
 
 def rank_hypotheses(machine: Machine, settings: Settings = DEFAULT) -> Ranking:
     """Search for the effects that a machine lacks, and rank what was found."""
-    whole = LeastSquares(machine, settings=settings)
-    found = FullFits(whole, _untold).compared(*Search(whole, _untold).run())
+    with one_blas_thread():
+        whole = LeastSquares(machine, settings=settings)
+        found = FullFits(whole, _untold).compared(*Search(whole, _untold).run())
     return Ranking(verdict.rank(found, 0.0, settings), verdict.confusable(found, settings))

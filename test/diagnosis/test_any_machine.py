@@ -15,13 +15,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from antenna_drive.diagnosis import (
-    diagnose, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point,
+    diagnose, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point, rank_hypotheses,
 )
 from antenna_drive.diagnosis.diagnosis import share_text
+from blas_threads import during, Look
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -207,3 +208,18 @@ def test_what_closes_nothing_of_withheld_data_is_not_named() -> None:
     assert {name for entry in result['which'] for name in entry['effects']} == {'none', 'unknown'}
     assert any(note.startswith('heater.step fits best') for note in result['notes'])
     assert result['statements']['named']['best_of_catalogue'] == []
+
+
+@pytest.mark.parametrize('work', [diagnose, rank_hypotheses])
+def test_linear_algebra_has_one_thread_because_fits_go_side_by_side(
+        work: Callable[[Machine], object]) -> None:
+    class Watched(Body):
+        def __init__(self, look: Look) -> None:
+            super().__init__({})
+            self.look = look
+
+        def predict(self, point: Point, experiment: int) -> FloatArray:
+            self.look()
+            return super().predict(point, experiment)
+
+    assert during(lambda look: work(Watched(look))) == {1}

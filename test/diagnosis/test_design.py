@@ -24,6 +24,7 @@ from antenna_drive.diagnosis import (
 )
 from antenna_drive.diagnosis.design import CRITERIA
 from antenna_drive.diagnosis.proposal import as_data, contents, lines
+from blas_threads import during, Look
 import numpy as np
 import pytest
 
@@ -166,3 +167,16 @@ def test_the_same_seed_proposes_the_same_test() -> None:
     one, other, third = (TestDesign(Loads(1.6), HARD, 1.0, effort=SMALL, seed=seed).run().tests[0]
                          for seed in (3, 3, 4))
     assert isinstance(one, Judged) and one.test == other.test != third.test
+
+
+def test_linear_algebra_has_one_thread_because_tests_are_judged_side_by_side() -> None:
+    class Watched(Loads):
+        def __init__(self, look: Look) -> None:
+            super().__init__(1.6)
+            self.look = look
+
+        def machine(self, test: Any) -> Lever:
+            self.look()
+            return super().machine(test)
+
+    assert during(lambda look: TestDesign(Watched(look), HARD, effort=SMALL).run()) == {1}
