@@ -31,8 +31,7 @@ from typing import Any
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.intervals import covariance, inflation
 from antenna_drive.diagnosis.least_squares import (
-    FitState, Jacobian, LeastSquares, prior_precision, settled, weighted_product,
-    with_initial_conditions,
+    FitState, LeastSquares, prior_precision, settled, weighted_product, with_initial_conditions,
 )
 from antenna_drive.diagnosis.machine import FloatArray, Form, Parameter
 from antenna_drive.diagnosis.settings import Settings
@@ -44,7 +43,7 @@ _TURNS = ('each recording in turn, with the effect as the others have it; offset
 _NO_GAP = 'each recording alone shows no gap: offsets within the tolerance account for it'
 _HALVES = 'the second half of the recording, predicted from the first'
 _INTERVAL = ("a bootstrap over blocks of time, each with a draw of the effect's numbers from "
-             'their Gaussian posterior in the training data, carried over linearly')
+             'their Gaussian posterior in the training data')
 BOUNDS = (-1.0, 1.0)
 
 
@@ -63,10 +62,8 @@ class _Fold:
     gap_after, after : with those effects that can be judged; None if none can
     judged : ids of these
     reasons : why the others cannot be judged, by id
-    jacobian : change of `after` with each of the judged effects' numbers, shape (n c, m)
-    names : of these numbers
-    values, low, high : of these numbers, and their bounds, shape (m,)
-    covariance : of these numbers, shape (m, m)
+    names, values : numbers of the judged effects
+    drawn : `after` with draws of these numbers, shape (draws, n, c); None if none can be judged
 
     """
 
@@ -78,12 +75,9 @@ class _Fold:
     after: FloatArray | None = None
     judged: tuple[str, ...] = ()
     reasons: Mapping[str, str] = field(default_factory=dict)
-    jacobian: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     names: tuple[str, ...] = ()
     values: FloatArray = field(default_factory=lambda: np.zeros(0))
-    low: FloatArray = field(default_factory=lambda: np.zeros(0))
-    high: FloatArray = field(default_factory=lambda: np.zeros(0))
-    covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    drawn: FloatArray | None = None
 
 
 def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads: int = 1,
@@ -304,17 +298,18 @@ class _Judge:
             again = self._fitted(testing, self._nuisances, held, {**bare.point(), **held},
                                  self._with)
             state = min(state, again, key=lambda fit: fit.cost)
-        # what a change of the effect leaves once the offsets have followed it
-        slope, jacobian = self._with.for_part(testing, judged), state.jacobian
-        cross = weighted_product(jacobian, state.weight, slope)
-        follow = np.linalg.lstsq(state.hessian + np.diag(prior_precision(state.parameters)),
-                                 cross, rcond=None)[0]
-        after, point = problem.residuals_of(state, 0), {**held, **state.point()}
-        unseen = self._unseen(problem, point, state.residual, reasons)
-        fold = replace(fold, gap_after=_gap(testing, point), after=after,
-                       reasons={**reasons, **unseen})
-        return self._with_jacobian(fold, judged, found, posterior,
-                                   slope - jacobian @ follow.astype(np.float32))
+        point = {**held, **state.point()}
+        fold = replace(fold, reasons={**reasons, **self._unseen(problem, point, state.residual,
+                                                                reasons)})
+        known = np.linalg.pinv(state.hessian + np.diag(prior_precision(state.parameters)))
+
+        def followed(drawn: FloatArray) -> FloatArray:
+            # what a draw leaves once the offsets have followed it
+            changes = (drawn - state.residual).T.astype(np.float32)
+            steps = known @ weighted_product(state.jacobian, state.weight, changes)
+            return drawn - (state.jacobian @ steps.astype(np.float32)).T
+
+        return self._completed(fold, problem, point, state.residual, found, posterior, followed)
 
     def second_half(self, k: int) -> _Fold:
         """Judge on the second half of a test what the first half has taught."""
@@ -340,11 +335,8 @@ class _Judge:
                     if effect in reasons for p in form.sizes}
         point = {**found.point(), **dict.fromkeys(left_out, 0.0)}
         residual = own.residuals(point)
-        unseen = self._unseen(own, point, residual, reasons)
-        fold = replace(fold, gap_after=_gap(testing, point), after=_shaped(own, residual),
-                       reasons={**reasons, **unseen})
-        return self._with_jacobian(fold, judged, found, posterior,
-                                   own.jacobian(point, judged, residual, False))
+        fold = replace(fold, reasons={**reasons, **self._unseen(own, point, residual, reasons)})
+        return self._completed(fold, own, point, residual, found, posterior)
 
     def _unseen(self, problem: LeastSquares, point: dict[str, float], residual: FloatArray,
                 reasons: Mapping[str, str]) -> dict[str, str]:
@@ -372,21 +364,45 @@ class _Judge:
         experiment = self._problem.experiments[k]
         return _Fold(experiment.name, experiment.time, gap, before)
 
-    def _with_jacobian(self, fold: _Fold, judged: Sequence[Parameter], found: FitState,
-                       posterior: FloatArray, slope: Jacobian) -> _Fold:
-        """Return a fold with the uncertainty of the numbers that can be judged."""
-        column = {p.name: j for j, p in enumerate(judged)}
+    def _completed(self, fold: _Fold, problem: LeastSquares, point: Mapping[str, float],
+                   residual: FloatArray, found: FitState, posterior: FloatArray,
+                   followed: Callable[[FloatArray], FloatArray] = lambda drawn: drawn) -> _Fold:
+        """
+        Return a fold with what is left, and with draws of the numbers that can be judged.
+
+        Parameters
+        ----------
+        fold
+            with the reasons why the others cannot
+        problem, point, residual
+            the withheld test, where it is judged, and the residual there, shape (n c,)
+        found, posterior
+            the fit to the training data, and the covariance of its numbers
+        followed
+            of residuals with draws, shape (draws, n c), those that are left once the nuisances
+            have followed
+
+        """
         judged = self._judged(fold.reasons)
         if not judged:
-            return replace(fold, gap_after=None, after=None)
+            return fold
         names = [p.name for p in found.parameters]
         places = [names.index(p.name) for p in judged]
+        # rounding may leave the least variance just below zero
+        draws = np.random.default_rng(0).multivariate_normal(
+            found.x[places], posterior[np.ix_(places, places)], self._settings.held_out.draws,
+            method='eigh', check_valid='ignore')
+        drawn = followed(problem.residuals_at([
+            {**point, **{p.name: min(max(value, p.low), p.high)
+                         for p, value in zip(judged, draw, strict=True)}}
+            for draw in draws.tolist()]))
+        [test] = problem.experiments
         return replace(
             fold, judged=tuple(e for e in self._best.effects if e not in fold.reasons),
-            jacobian=np.asarray(slope[:, [column[p.name] for p in judged]], np.float64),
+            gap_after=test.measured - problem.machine.predict(point, 0),
+            after=_shaped(problem, residual),
             names=tuple(p.name for p in judged), values=found.x[places],
-            low=np.array([p.low for p in judged]),
-            high=np.array([p.high for p in judged]), covariance=posterior[np.ix_(places, places)])
+            drawn=np.array([_shaped(problem, z) for z in drawn]))
 
     def _fitted(self, testing: Part, nuisances: Sequence[Parameter], held: Mapping[str, float],
                 begin: Mapping[str, float], slopes: Slopes) -> FitState:
@@ -421,17 +437,11 @@ def _deviations(form: Form, found: FitState, posterior: FloatArray) -> float:
 def block_sums(time_s: FloatArray, before: FloatArray, after: FloatArray,
                block_s: float) -> FloatArray:
     """Return the energy before, after and of the noise in each block, shape (blocks, 3)."""
-    return _in_blocks(time_s, block_s)(np.column_stack([
-        np.nansum(before ** 2, axis=1), np.nansum(after ** 2, axis=1),
-        np.isfinite(before).sum(axis=1)]))
-
-
-def _in_blocks(time_s: FloatArray, block_s: float) -> Callable[[FloatArray], FloatArray]:
-    """Return what sums the rows of each block, from shape (n, m) to (blocks, m)."""
     block = (time_s / block_s).astype(int)
-    count = int(block[-1]) + 1
-    return lambda columns: np.column_stack([
-        np.bincount(block, column, minlength=count) for column in columns.T])
+    return np.column_stack([
+        np.bincount(block, energy, minlength=int(block[-1]) + 1)
+        for energy in (np.nansum(before ** 2, axis=1), np.nansum(after ** 2, axis=1),
+                       np.isfinite(before).sum(axis=1))])
 
 
 def _bootstrapped(folds: Sequence[_Fold],
@@ -439,42 +449,26 @@ def _bootstrapped(folds: Sequence[_Fold],
     """Return the explained fraction with its 95 percent interval, see `_INTERVAL`."""
     settings, block_s = problem.settings.held_out, problem.machine.time_scales.block_s
     random = np.random.default_rng(0)
-    blocks = np.concatenate([block_sums(fold.time, fold.before, _after(fold), block_s)
-                             for fold in folds])
-    changes = np.concatenate([_changes(fold, block_s, random, settings.resamples)
-                              for fold in folds])
-    draws = []
-    for number in range(settings.resamples):
-        chosen = random.integers(0, len(blocks), len(blocks))
-        sums = blocks[chosen].sum(axis=0)
-        sums[1] += changes[chosen, number].sum()
-        draws.append(explained_fraction(sums, settings.no_gap))
-    return (explained_fraction(blocks.sum(axis=0), settings.no_gap),
-            [float(np.quantile(draws, 0.025)), float(np.quantile(draws, 0.975))])
+
+    def blocks(draw: int | None) -> FloatArray:
+        return np.concatenate([block_sums(
+            fold.time, fold.before,
+            _after(fold) if draw is None or fold.drawn is None else fold.drawn[draw], block_s)
+            for fold in folds])
+
+    drawn = [blocks(draw) for draw in range(settings.draws)]
+    count = len(drawn[0])
+    fractions = [
+        explained_fraction(drawn[number % settings.draws][
+            random.integers(0, count, count)].sum(axis=0), settings.no_gap)
+        for number in range(settings.resamples)]
+    return (explained_fraction(blocks(None).sum(axis=0), settings.no_gap),
+            [float(np.quantile(fractions, 0.025)), float(np.quantile(fractions, 0.975))])
 
 
 def _after(fold: _Fold) -> FloatArray:
     """Return what is left, which is everything if nothing can be judged."""
     return fold.before if fold.after is None else fold.after
-
-
-def _changes(fold: _Fold, block_s: float, random: np.random.Generator,
-             count: int) -> FloatArray:
-    """Return how the energy of each block changes with draws of the effect's numbers."""
-    residual = np.nan_to_num(_after(fold))
-    rows, channels = residual.shape
-    slope = fold.jacobian.reshape(rows, channels, -1)
-    summed = _in_blocks(fold.time, block_s)
-    first = summed(np.einsum('nc,ncm->nm', residual, slope))
-    number = slope.shape[2]
-    second = summed(np.einsum('nci,ncj->nij', slope, slope).reshape(rows, -1))
-    # rounding may leave the least variance just below zero
-    draws = random.multivariate_normal(fold.values, fold.covariance, count, method='eigh',
-                                       check_valid='ignore')
-    steps = np.clip(draws, fold.low, fold.high) - fold.values
-    squares = np.einsum('di,dj->dij', steps, steps).reshape(count, number ** 2)
-    # the slope is that of the prediction: a residual falls as the prediction rises
-    return np.asarray(-2.0 * first @ steps.T + second @ squares.T)
 
 
 def explained_fraction(sums: FloatArray, no_gap: float) -> float:

@@ -28,7 +28,7 @@ from functools import cached_property
 from types import MappingProxyType
 
 from antenna_drive.diagnosis.box_qp import box_constrained_step
-from antenna_drive.diagnosis.machine import FloatArray, Machine, Parameter
+from antenna_drive.diagnosis.machine import FloatArray, Machine, Parameter, Point
 from antenna_drive.diagnosis.noise import whitened
 from antenna_drive.diagnosis.settings import DEFAULT, FitSettings, SearchSettings, Settings
 import numpy as np
@@ -166,6 +166,10 @@ class LeastSquares:
         """Return the residuals at a point, shape (n,); of one experiment if it is named."""
         alone = self._alone if alone is None else alone
         return self._row(self.machine.simulate([point], None if alone is None else [alone])[0])
+
+    def residuals_at(self, points: Sequence[Point]) -> FloatArray:
+        """Return the residuals at several points, simulated together, shape (points, n)."""
+        return np.array([self._row(result) for result in self.machine.simulate(points)])
 
     def _row(self, result: Sequence[FloatArray | None]) -> FloatArray:
         return np.concatenate([self.standardised(k, values) for k, values in enumerate(result)])

@@ -300,6 +300,8 @@ class HeldOutSettings:
         0.2, 'noise variance', 'residual beyond noise that effects may leave where there is none '
         'without them; what leaves more is refuted', TRIAL_11)
     resamples: int = _setting(400, '1', 'resamples of the block bootstrap')
+    draws: int = _setting(
+        25, '1', "draws of an effect's numbers that are simulated in a withheld test")
 
 
 @dataclass(frozen=True)
