@@ -34,6 +34,9 @@ from std_msgs.msg import Float64, Float64MultiArray
 NAME = 'recording_player'
 _QOS = QoSProfile(depth=1000)
 _LOOK_S = 0.05
+# Publisher and subscription find each other one after the other. A publisher that has found its
+# reader waits for so long, or the reader may miss the first rows, in which the drive stands still.
+_MATCHED_S = 1.0
 _PACE = Entry('1', 1e-3, 1e3, 'pace as a multiple of real time')
 
 
@@ -77,6 +80,8 @@ def _play(node: Node, recording: Recording, real: str, pace: float, stop: Event)
     while not any(item.get_subscription_count() for item in (rows, *single)):
         if stop.wait(_LOOK_S):
             return
+    if stop.wait(_MATCHED_S):
+        return
     stamps = recording[names[0]].time_ns
     spans = [recording[name].time_ns for name in names]
     stamps = stamps[(stamps >= max(span[0] for span in spans))
