@@ -70,6 +70,11 @@ class Case:
         return str(self.truth.get('machine', 'antenna'))
 
     @property
+    def wild(self) -> bool:
+        """Return whether this antenna has faults that no sheet lists; others always have."""
+        return 'family' in self.truth
+
+    @property
     def effects(self) -> frozenset[str]:
         """Return the right answer: the effects, UNKNOWN outside the catalogue, or NONE."""
         if self.kind == 'outside':
@@ -345,6 +350,7 @@ def score(cases: Sequence[Case], pending: int = 0) -> dict[str, Any]:
         'size_coverage': rate(size.covered for size in sizes)}
     figures: dict[str, Any] = {
         'cases': len(cases),
+        'all_wild': bool(cases) and all(case.wild for case in cases),
         'failures': sum(case.verdict is None for case in cases),
         **{name: value.value for name, value in rates.items()},
         'auroc_unknown': auroc(_unknown(outside), _unknown(known)),

@@ -421,6 +421,20 @@ def test_command_scores_a_folder(scored_trial: Path, tmp_path: Path,
     assert '0.333' in told
 
 
+@pytest.mark.parametrize(('more', 'least'), [
+    ({}, '0.90'), ({'family': 'a'}, '0.85'), ({'machine': 'joint'}, '0.80')])
+def test_each_kind_of_trial_has_its_own_targets(
+        more: dict[str, str], least: str, tmp_path: Path,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    sealing.seal(tmp_path, {'cases': 1}, [
+        {'case': 'case_0001', **truth('none'), **more}])
+    (tmp_path / 'case_0001').mkdir()
+    (tmp_path / 'case_0001' / 'verdict.json').write_text(json.dumps(verdict(('none', 1.0))))
+    assert main(['score', str(tmp_path)]) == 0
+    [line] = [told for told in capsys.readouterr().out.splitlines() if told.startswith('top1 ')]
+    assert line.endswith(f'target >= {least}')
+
+
 def test_published_cases_score_as_their_folder(scored_trial: Path, tmp_path: Path,
                                                capsys: pytest.CaptureFixture[str]) -> None:
     stated = {'a.x.offset': {'value': 1.0, 'ci95': [0.5, 1.5], 'unit': 'V'}}
