@@ -143,9 +143,10 @@ def _check_effect(key: str, effect: Effect, machine: Machine, experiments: int) 
     name = f'effect {key}'
     if effect.id != key or '.' not in key or key in _RESERVED:
         raise MachineError(f'{name}: id: {effect.id!r} given, allowed is component.effect')
-    for part in effect.parts:
-        if part not in machine.effects:
-            raise MachineError(f'{name}: parts: {part}: no such effect')
+    for field in ('parts', 'simpler'):
+        for other in getattr(effect, field):
+            if other not in machine.effects:
+                raise MachineError(f'{name}: {field}: {other}: no such effect')
     if not effect.forms:
         raise MachineError(f'{name}: forms: there is none')
     taken = {p.name for p in machine.nuisances}

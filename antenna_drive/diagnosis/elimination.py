@@ -40,6 +40,12 @@ class Fits(Protocol):
     def without(self, hypothesis: Hypothesis, effect: str) -> Hypothesis:
         """Return a hypothesis without one of its effects, fitted until it has converged."""
 
+    def simpler(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
+        """Return which effects could be simpler ones that they become, each with such a one."""
+
+    def exchanged(self, hypothesis: Hypothesis, effect: str, other: str) -> Hypothesis:
+        """Return a hypothesis with another effect in the place of one, fitted to its end."""
+
     def joined(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """Return one effect in place of the same one in each of its places; None if not so."""
 
@@ -59,7 +65,8 @@ def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings:
     """
     Test each doubtful effect of the best hypothesis, until the best has none.
 
-    Where its effects are one effect in each of its places, this one is tried, too.
+    Where its effects are one effect in each of its places, this one is tried, too, and so is a
+    simpler effect that one of them becomes at an end of its range.
 
     Parameters
     ----------
@@ -88,6 +95,10 @@ def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings:
             converged.loss_without(effect)) < settings.search.doubtful * best.cost}
         simplified = [fits.without(converged, effect) for effect in doubtful]
         tried.update(doubtful.values())
+        for effect, other in fits.simpler(converged):
+            if (key := rests[effect] | {other}) not in tried:
+                tried.add(key)
+                simplified.append(fits.exchanged(converged, effect, other))
         if (key := frozenset(best.effects)) not in tried and (whole := fits.joined(converged)):
             tried.add(key)
             simplified.append(whole)
@@ -110,7 +121,7 @@ def settled_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesi
     Take fits close behind the best to their ends, too: only there can they be told apart.
 
     A rival may be close only together with a partner that is no larger than its tolerance. It is
-    then fitted without the partner.
+    then fitted without the partner, and so is the best itself.
 
     Parameters and what is returned are those of `forward_selection`.
     """
@@ -124,8 +135,7 @@ def settled_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesi
               and h.penalised(price) < first.penalised(price) + close]
     # a member that is no larger than its tolerance only helped the fit of the others along
     helped = [(h, effect) for h in hypotheses for effect in sorted(set(h.effects) - set(h.named))
-              if len(h.effects) == size + 1 > 1 and set(h.effects) - {effect} != set(best.effects)
-              and h.cost < first.cost + close]
+              if len(h.effects) == size + 1 > 1 and h.cost < first.cost + close]
     ends: list[tuple[float, Callable[[], Hypothesis]]] = [
         *((h.cost, partial(fits.converged, h)) for h in rivals),
         *((h.cost, partial(fits.without, h, effect)) for h, effect in helped)]

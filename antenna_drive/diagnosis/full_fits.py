@@ -161,7 +161,7 @@ class FullFits:
 
     def with_another(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         """Return a hypothesis whose fit has converged with each of a few more effects."""
-        state = hypothesis.state
+        state = hypothesis.with_jacobian(self.problem).state
         known = sensitivities(self.problem, state, self._pool.map)
         promising = [item for gain, item in screened(
             self.problem, state, known, hypothesis.effects)[:self.settings.partners]
@@ -198,6 +198,36 @@ class FullFits:
         rest = self.converged(replace(
             rest, state=self.problem.fit(state, self.settings.iterations)))
         return rest.without_jacobian(keep_hessian=True)
+
+    def simpler(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
+        """Return which effects could be simpler ones that they become, each with such a one."""
+        effects = self.problem.machine.effects
+        return [(effect, other) for effect in hypothesis.effects
+                for other in effects[effect].simpler if other not in hypothesis.effects]
+
+    def exchanged(self, hypothesis: Hypothesis, effect: str, other: str) -> Hypothesis:
+        """
+        Return a hypothesis with another effect in the place of one of its own.
+
+        The fit begins at the size that does most of what the former has done, and has converged.
+        """
+        machine = self.problem.machine
+        rest, form = self._dropped(hypothesis, effect), machine.effects[other].forms[0]
+        point = {**rest.state.point(), **form.start}
+        bare = self.problem.residuals(point)
+        done = bare - self.problem.residuals(hypothesis.state.point())
+        columns = self.problem.jacobian(point, form.parameters, bare, central=True)
+        sizes = np.linalg.lstsq(columns.astype(float), done, rcond=None)[0]
+        point.update({p.name: float(np.clip(size, p.low, p.high))
+                      for p, size in zip(form.parameters, sizes, strict=True) if not p.is_shape})
+        point, held = machine.take_over(point, [*rest.forms, form])
+        kept = [replace(p, low=0.0, high=0.0) if p.name in held else p
+                for p in rest.state.parameters]
+        state = self.problem.start((*kept, *form.parameters), point)
+        found = self.converged(Hypothesis(
+            (*rest.effects, other), (*rest.forms, form),
+            self.problem.fit(state, self.settings.iterations)))
+        return found.without_jacobian(keep_hessian=True)
 
     def joined(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """

@@ -154,6 +154,7 @@ class Effect:
     look : what it looks like in the signals, one sentence
     forms : alternatives; the best one counts
     parts : ids of the effects that act together in it, each in its own place
+    simpler : ids of the effects that it becomes at an end of its range
 
     """
 
@@ -163,6 +164,7 @@ class Effect:
     look: str
     forms: tuple[Form, ...]
     parts: tuple[str, ...] = ()
+    simpler: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -395,7 +397,10 @@ class Machine(ABC):
 
     def without(self, effects: Collection[str]) -> Machine:
         """
-        Return the machine with a catalogue that lacks some effects, and what they are parts of.
+        Return the machine with a catalogue that lacks some effects.
+
+        It also lacks their parts, what they are parts of, and what becomes one of them at an end
+        of its range.
 
         Raises
         ------
@@ -403,9 +408,12 @@ class Machine(ABC):
 
         """
         gone = {name for effect in effects for name in (effect, *self.effects[effect].parts)}
-        other = copy(self)
-        other.effects = {name: effect for name, effect in self.effects.items()
-                         if name not in gone and not gone.intersection(effect.parts)}
+        other, kept = copy(self), dict(self.effects)
+        while gone.intersection(kept):
+            kept = {name: effect for name, effect in kept.items() if name not in gone}
+            gone |= {name for name, effect in kept.items()
+                     if gone.intersection((*effect.parts, *effect.simpler))}
+        other.effects = kept
         return other
 
     def with_noise_at(self, point: Point) -> Machine:

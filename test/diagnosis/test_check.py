@@ -81,6 +81,7 @@ def holed(values: Any, value: float) -> Any:
     ({'effect': replace(PLAY, forms=())}, 'forms: there is none'),
     ({'effect': replace(PLAY, id='play')}, 'allowed is component.effect'),
     ({'effect': replace(PLAY, parts=('shaft.wear',))}, 'parts: shaft.wear: no such effect'),
+    ({'effect': replace(PLAY, simpler=('shaft.wear',))}, 'simpler: shaft.wear: no such effect'),
 ])
 def test_what_is_wrong_is_told_by_name(changes: Any, words: str) -> None:
     with pytest.raises(MachineError) as caught:

@@ -20,6 +20,7 @@ from dataclasses import replace
 from antenna_drive.diagnosis import (
     Effect, Experiment, FloatArray, Form, Hypothesis, LeastSquares, Machine, Parameter, Point,
 )
+from antenna_drive.diagnosis.full_fits import FullFits
 from antenna_drive.diagnosis.search import Search
 from antenna_drive.diagnosis.settings import DEFAULT
 from antenna_drive.diagnosis.training import begun, Part
@@ -107,6 +108,59 @@ def test_no_pair_has_one_effect_twice() -> None:
                                                problem.fit(start, 5))])
     assert {h.effects for h in pairs} == {
         ('left.pull', 'right.pull'), ('both.pull', 'right.pull'), ('left.pull', 'both.pull')}
+
+
+class Scale(Machine):
+    """A scale whose zero is off by five thousand standard deviations of its noise."""
+
+    zero, order = 50.0, 0.1
+
+    def __init__(self) -> None:
+        random = np.random.default_rng(6)
+        made = self.zero + NOISE * random.normal(size=(TIME.size, 1))
+        wave = (Parameter('scale.wave.sine', 'm', -2e3, 2e3, 1e-2),
+                Parameter('scale.wave.cosine', 'm', -2e3, 2e3, 1e-2))
+        super().__init__(
+            [Experiment('read', TIME, ('place',), ('m',), made, np.full_like(made, NOISE))],
+            [Parameter('drift', 'm/s', -0.02, 0.02, 1e-3, 0.01)],
+            [Effect('scale.wave', 'scale', '', '', (Form('', wave),), simpler=('scale.zero',)),
+             Effect('scale.zero', 'scale', '', '', (Form('', (
+                 Parameter('scale.zero.size', 'm', -2e3, 2e3, 1e-2),)),))])
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return what is read."""
+        return np.asarray(point.get('scale.wave.sine', 0.0) * np.sin(self.order * TIME)
+                          + point.get('scale.wave.cosine', 0.0) * np.cos(self.order * TIME)
+                          + point.get('scale.zero.size', 0.0) + point.get('drift', 0.0) * TIME)[
+                              :, np.newaxis]
+
+
+def of(problem: LeastSquares, ident: str, **at: float) -> Hypothesis:
+    """Return a hypothesis with one effect, fitted from a point."""
+    form = problem.machine.effects[ident].forms[0]
+    start = problem.start([*problem.machine.nuisances, *form.parameters],
+                          {f'{ident}.{name}': value for name, value in at.items()})
+    return Hypothesis((ident,), (form,), problem.fit(start, 10))
+
+
+def test_a_simpler_effect_begins_at_the_size_that_does_as_much() -> None:
+    """From zero, a robust loss would not lead there."""
+    problem = LeastSquares(Scale())
+    fits = FullFits(problem, lambda share, doing: None)
+    wave = of(problem, 'scale.wave', cosine=50.0)
+    assert fits.simpler(wave) == [('scale.wave', 'scale.zero')]
+    found = fits.exchanged(wave, 'scale.wave', 'scale.zero')
+    assert found.effects == ('scale.zero',)
+    # the noise of a mean, times three
+    assert found.values[0][1] == pytest.approx(50.0, abs=3.0 * NOISE)
+    assert found.cost < 0.6 * TIME.size
+    assert fits.simpler(found) == []
+
+
+def test_an_effect_that_is_left_out_takes_along_what_becomes_it() -> None:
+    assert list(Scale().without(['scale.zero']).effects) == []
+    assert list(Scale().without(['scale.wave']).effects) == ['scale.zero']
+    assert list(Springs(0.0, 1.0).without(['left.pull']).effects) == ['right.pull', 'drift']
 
 
 class Tilted(Machine):

@@ -189,6 +189,14 @@ class Ends:
         self.asked.append(rest)
         return fitted(rest, self.ends[rest])
 
+    def simpler(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
+        return [(effect, effect[:-1]) for effect in hypothesis.effects if effect.endswith("'")]
+
+    def exchanged(self, hypothesis: Hypothesis, effect: str, other: str) -> Hypothesis:
+        swapped = tuple(other if e == effect else e for e in hypothesis.effects)
+        self.asked.append(swapped)
+        return fitted(swapped, self.ends[swapped])
+
     def joined(self, hypothesis: Hypothesis) -> Hypothesis | None:
         whole = ('both',)
         return fitted(whole, self.ends[whole]) if (
@@ -245,6 +253,28 @@ def test_a_partner_that_is_nearly_nothing_is_let_go_if_the_fit_without_it_got_st
     for others in ([fitted(('a',), 60000.0)], []):
         hypotheses, end = backward_elimination(fits, [*known, *others], DEFAULT)
         assert end.effects == best(hypotheses, DEFAULT).effects == ('a',)
+
+
+@pytest.mark.parametrize('end, expected', [(16003.0, 'a'), (17000.0, "a'")])
+def test_a_simpler_effect_is_named_if_it_fits_as_well(end: float, expected: str) -> None:
+    fits = Ends({("a'",): 16000.0, ('a',): end, (): 90000.0})
+    form = fitted(("a'",), 16000.0).forms[0]
+    shapes = [replace(NUMBER, name=name, is_shape=True, tolerance=0.0)
+              for name in ('rate', 'order')]
+    flexible = replace(fitted(("a'",), 16000.0), forms=(
+        replace(form, parameters=(*form.parameters, *shapes)),))
+    hypotheses, found = backward_elimination(fits, [fitted((), 90000.0), flexible], DEFAULT)
+    assert found.effects == best(hypotheses, DEFAULT).effects == (expected,)
+
+
+def test_the_best_is_fitted_again_if_a_partner_of_no_size_helps_it_along() -> None:
+    fits = Ends({('a',): 15500.0})
+    hypotheses, end = settled_rivals(
+        fits, [fitted((), 90000.0), fitted(('a',), 15550.0),
+               within_tolerance(fitted(('a', 'b'), 15496.0), 'b')],
+        fitted(('a',), 15550.0), DEFAULT)
+    assert (end.effects, end.cost) == (('a',), 15500.0)
+    assert {h.effects: h.cost for h in hypotheses}['a',] == 15500.0
 
 
 def test_what_a_quadratic_fit_loses_without_an_effect() -> None:

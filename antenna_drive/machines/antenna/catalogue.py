@@ -54,11 +54,13 @@ EXTRA_MODE = 3
 class _Catalogue(dict[str, Effect]):
     """The entries as they are written down; names of parameters are relative to their effect."""
 
-    def add(self, component: str, name: str, cause: str, look: str, *forms: Form) -> None:
+    def add(self, component: str, name: str, cause: str, look: str, *forms: Form,
+            simpler: str = '') -> None:
         key = f'{component}.{name}'
         parts = tuple(f'{motor}.{name}' for motor in MOTORS['motors']) * (component == 'motors')
         self[key] = Effect(key, component, cause, look,
-                           tuple(_prefixed(form, key) for form in forms), parts)
+                           tuple(_prefixed(form, key) for form in forms), parts,
+                           (f'{component}.{simpler}',) * bool(simpler))
 
 
 def _prefixed(form: Form, key: str) -> Form:
@@ -105,7 +107,8 @@ def _motor_effects(into: _Catalogue, component: str, motors: tuple[str, ...]) ->
     into.add(component, 'stribeck_friction',
              'the lubricating film breaks down at creep and friction rises',
              'more current, and stick-slip, close to standstill',
-             *_stribeck((0.5, 2.0, 8.0), (20.0, 0.05), (0.02, 40.0), at('motor'), 0.05))
+             *_stribeck((0.5, 2.0, 8.0), (20.0, 0.05), (0.02, 40.0), at('motor'), 0.05),
+             simpler='coulomb_friction')
     into.add(component, 'coulomb_friction', 'bearings or brake rub harder or less than assumed',
              'current offset that changes sign with the direction',
              _form(_number('torque', 'A', -0.069, 3.0, 0.01, add(*at('motor.coulomb_torque')),
@@ -228,7 +231,8 @@ def _axis_effects(into: _Catalogue) -> None:
                            start=1.0)))
     into.add(component, 'stribeck_friction', 'the film of the axis bearing breaks down at creep',
              'stick-slip of the axis, both currents rise close to standstill',
-             *_stribeck((4e-5, 2e-4, 8e-4), (6e5, 1e3), (2e-6, 3e-3), [axis], 3e3))
+             *_stribeck((4e-5, 2e-4, 8e-4), (6e5, 1e3), (2e-6, 3e-3), [axis], 3e3),
+             simpler='coulomb_friction')
     into.add(component, 'position_dependent_friction', 'an uneven rail or bearing',
              'both currents vary with the elevation, against the direction of motion',
              wave('1', 0.9, 5e-3, WaveShape('friction_wave', (axis,), 'axis'), _RAIL_ORDERS,
@@ -299,7 +303,7 @@ def _sensor_effects(into: _Catalogue, encoder_digit: float) -> None:
     into.add('encoder', 'cyclic_error', 'eccentric scale or uneven interpolation',
              'the angle varies with itself',
              wave('rad', 1e-3, 1e-6, WaveShape('cyclic_error', ('plant.encoder',), 'axis'),
-                  _ENCODER_ORDERS, on_readings=True, healthy=2e-6))
+                  _ENCODER_ORDERS, on_readings=True, healthy=2e-6), simpler='offset')
     into.add('encoder', 'offset', 'the encoder was mounted or zeroed otherwise',
              'the angle shifted',
              _form(_number('offset', 'rad', -0.1, 0.1, 1e-6,
