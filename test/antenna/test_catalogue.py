@@ -32,6 +32,7 @@ from antenna_drive.parameters.sets import changed
 from antenna_drive.recording.sheet import Square
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 
 MOTOR_EFFECTS = (
     'viscous_friction stribeck_friction coulomb_friction friction_asymmetry '
@@ -112,6 +113,32 @@ def test_every_effect_but_a_gust_and_lost_bits_has_a_size_that_is_healthy(model:
     without = {effect.id for effect in model.effects.values()
                if not any(p.tolerance for form in effect.forms for p in form.sizes)}
     assert without == {'axis.wind_gust', 'encoder.quantisation'}
+
+
+@pytest.mark.parametrize('effect', [e for e in catalogue().values() if e.simpler],
+                         ids=lambda effect: effect.id)
+def test_effect_becomes_the_simpler_one_that_it_names(model: Any, effect: Any) -> None:
+    """At the end of its range, in a slow test, most of what it does is what the other does."""
+    form = model.effects[effect.id].forms[0]
+    if isinstance(form, Wave):
+        form = model._wave_at(form, form.orders[0])  # the longest wave
+        size, end = form.sizes[1], form.start        # a cosine does not vanish at the start
+    else:
+        [size] = form.sizes
+        end = {p.name: p.high for p in form.parameters if p.is_shape}
+    point = {**end, size.name: 4.0 * size.tolerance}
+    [simpler] = model.effects[effect.simpler[0]].forms[0].sizes
+
+    def change(point: dict[str, float]) -> Any:
+        [with_it, *_], [without, *_] = model.simulate([point, {}])
+        return np.ravel((with_it - without) / model.experiments[0].noise)
+
+    done, slope = change(point), change({simpler.name: simpler.step}) / simpler.step
+    guess = float(slope @ done / (slope @ slope))
+    found = minimize_scalar(
+        lambda value: np.linalg.norm(done - change({simpler.name: value})),
+        bounds=sorted((0.5 * guess, 2.0 * guess)), method='bounded')
+    assert found.fun < 0.2 * np.linalg.norm(done)
 
 
 def test_time_stamps_err_more_on_what_is_faster(model: Any) -> None:
