@@ -120,7 +120,7 @@ def _key(truth: Truth) -> str:
 
 def _lines(figures: dict[str, Any]) -> list[str]:
     lines = []
-    antenna, all_wild = set(figures['by_machine']) <= {'antenna'}, bool(figures['all_wild'])
+    antenna, all_wild = set(figures['by_machine']) <= {'antenna'}, figures['all_wild']
     targets = OTHER_TARGETS if not antenna else WILD_TARGETS if all_wild else TARGETS
     for name, target in targets.items():
         value = figures[name]

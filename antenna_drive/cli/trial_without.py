@@ -15,10 +15,10 @@
 Diagnose cases of a trial again, each without its true effect in the catalogue.
 
 A machine's fault may be on no list. So cases whose single effect was named first are diagnosed
-again with that effect, and the same effect in other places, left out. The probability of
-'unknown' must rise. `antenna-drive trial --diagnose` makes the cases; those that are not
-diagnosed yet, or were not right, are not used. The second verdict is DIR/case_0001/without.json.
-The same command resumes an interrupted trial.
+again without that effect, the same effect in other places, and what becomes it at an end of its
+range. The probability of 'unknown' must rise. `antenna-drive trial --diagnose` makes the cases;
+those that are not diagnosed yet, or were not right, are not used. The second verdict is
+DIR/case_0001/without.json. The same command resumes an interrupted trial.
 
 The exit code is 1 if no case could be diagnosed.
 

@@ -28,7 +28,9 @@ from statistics import fmean
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.least_squares import LeastSquares, settled
 from antenna_drive.diagnosis.noise import same_noise, with_estimated_noise
-from antenna_drive.diagnosis.refitting import dropped, refitted, shared_jacobian, SharedJacobian
+from antenna_drive.diagnosis.refitting import (
+    dropped, refitted, shared_jacobian, SharedJacobian, taken_over,
+)
 from antenna_drive.diagnosis.screening import screened, sensitivities, Sensitivity
 import numpy as np
 
@@ -220,9 +222,7 @@ class FullFits:
         sizes = np.linalg.lstsq(columns.astype(float), done, rcond=None)[0]
         point.update({p.name: float(np.clip(size, p.low, p.high))
                       for p, size in zip(form.parameters, sizes, strict=True) if not p.is_shape})
-        point, held = machine.take_over(point, [*rest.forms, form])
-        kept = [replace(p, low=0.0, high=0.0) if p.name in held else p
-                for p in rest.state.parameters]
+        point, kept = taken_over(machine, point, [*rest.forms, form], rest.state.parameters)
         state = self.problem.start((*kept, *form.parameters), point)
         found = self.converged(Hypothesis(
             (*rest.effects, other), (*rest.forms, form),

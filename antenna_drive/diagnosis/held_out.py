@@ -33,7 +33,7 @@ from antenna_drive.diagnosis.intervals import covariance, inflation
 from antenna_drive.diagnosis.least_squares import (
     FitState, LeastSquares, prior_precision, settled, weighted_product, with_initial_conditions,
 )
-from antenna_drive.diagnosis.machine import FloatArray, Form, Parameter
+from antenna_drive.diagnosis.machine import FloatArray, Form, Machine, Parameter
 from antenna_drive.diagnosis.settings import Settings
 from antenna_drive.diagnosis.training import begun, Part, Slopes, trained
 import numpy as np
@@ -396,10 +396,9 @@ class _Judge:
             {**point, **{p.name: min(max(value, p.low), p.high)
                          for p, value in zip(judged, draw, strict=True)}}
             for draw in draws.tolist()]))
-        [test] = problem.experiments
         return replace(
             fold, judged=tuple(e for e in self._best.effects if e not in fold.reasons),
-            gap_after=test.measured - problem.machine.predict(point, 0),
+            gap_after=_gap(problem.machine, point),
             after=_shaped(problem, residual),
             names=tuple(p.name for p in judged), values=found.x[places],
             drawn=np.array([_shaped(problem, z) for z in drawn]))
@@ -412,9 +411,9 @@ class _Judge:
                        self._settings)
 
 
-def _gap(part: Part, point: Mapping[str, float]) -> FloatArray:
+def _gap(machine: Machine, point: Mapping[str, float]) -> FloatArray:
     """Return measured minus predicted of a single test, shape (n, c)."""
-    return part.experiments[0].measured - part.predict(point, 0)
+    return machine.experiments[0].measured - machine.predict(point, 0)
 
 
 def _shaped(problem: LeastSquares, residual: FloatArray) -> FloatArray:

@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.least_squares import FitState, Jacobian, LeastSquares
-from antenna_drive.diagnosis.machine import Machine, Parameter
+from antenna_drive.diagnosis.machine import Form, Machine, Parameter, Point
 import numpy as np
 
 
@@ -54,15 +54,25 @@ def refitted(problem: LeastSquares, shared: SharedJacobian, iterations: int,
              hypothesis: Hypothesis) -> Hypothesis:
     """Fit a hypothesis to another problem, with shared derivatives."""
     courses = [form for form in hypothesis.forms if form.name in shared.courses]
-    point, held = problem.machine.take_over(hypothesis.state.point(), hypothesis.forms)
-    nuisances = [replace(p, low=0.0, high=0.0) if p.name in held else p
-                 for p in problem.machine.nuisances]
+    point, nuisances = taken_over(problem.machine, hypothesis.state.point(), hypothesis.forms,
+                                  problem.machine.nuisances)
     state = problem.start_from(
         (*nuisances, *(p for form in courses for p in form.parameters)),
         np.column_stack([shared.nuisances, *(shared.courses[f.name] for f in courses)]),
         [p for form in hypothesis.forms if form not in courses for p in form.parameters],
         point)
     return replace(hypothesis, state=problem.fit(state, iterations))
+
+
+def taken_over(machine: Machine, point: Point, forms: Sequence[Form],
+               parameters: Sequence[Parameter]) -> tuple[dict[str, float], list[Parameter]]:
+    """
+    Return a point at which effects alone stand for their numbers, and the parameters.
+
+    The nuisances that stand for the same numbers are held at zero.
+    """
+    at, held = machine.take_over(point, forms)
+    return at, [replace(p, low=0.0, high=0.0) if p.name in held else p for p in parameters]
 
 
 def dropped(machine: Machine, hypothesis: Hypothesis, effect: str) -> Hypothesis:

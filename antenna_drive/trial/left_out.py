@@ -15,8 +15,8 @@
 What is said of a case without its true effect in the catalogue: the answer must become 'unknown'.
 
 Of a diagnosed trial the cases with a single effect that was named first are diagnosed again, each
-with that effect left out, and its entries for other places. The catalogue is then wrong on
-purpose, as it is for a machine whose fault nobody listed.
+with that effect left out, its entries for other places, and what becomes it at an end of its
+range. The catalogue is then wrong on purpose, as it is for a machine whose fault nobody listed.
 """
 
 from __future__ import annotations
