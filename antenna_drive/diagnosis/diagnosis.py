@@ -38,7 +38,7 @@ from antenna_drive.diagnosis.full_fits import FullFits
 from antenna_drive.diagnosis.held_out import held_out, refuted, shows_no_gap
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.intervals import (
-    deviations, inflation, jackknife, unsure, values_with_intervals,
+    deviations, doubts, inflation, jackknife, values_with_intervals,
 )
 from antenna_drive.diagnosis.interventions import (
     interventions, lines as lines_of_labels, simplified,
@@ -226,7 +226,9 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
             between_tests if hypothesis.effects == best.effects else {})
 
     def judged(hypothesis: Hypothesis) -> Hypothesis:
-        return replace(hypothesis, unsure=unsure(hypothesis, deviating(hypothesis), beyond))
+        return replace(hypothesis, doubts=doubts(
+            hypothesis, deviating(hypothesis), (none.cost - hypothesis.cost) / usual,
+            settings.interval, beyond))
 
     hypotheses, best = [judged(h) for h in hypotheses], judged(best)
     if best.unsure:

@@ -43,6 +43,9 @@ class Fits(Protocol):
     def simpler(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
         """Return which effects could be simpler ones that they become, each with such a one."""
 
+    def elsewhere(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
+        """Return which effects could act in another place, each with the effect there."""
+
     def exchanged(self, hypothesis: Hypothesis, effect: str, other: str) -> Hypothesis:
         """Return a hypothesis with another effect in the place of one, fitted to its end."""
 
@@ -121,7 +124,8 @@ def settled_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesi
     Take fits close behind the best to their ends, too: only there can they be told apart.
 
     A rival may be close only together with a partner that is no larger than its tolerance. It is
-    then fitted without the partner, and so is the best itself.
+    then fitted without the partner, and so is the best itself. An effect in another place that the
+    search has given up is a rival, too: of two motors, far from its end, the wrong one may win.
 
     Parameters and what is returned are those of `forward_selection`.
     """
@@ -136,10 +140,14 @@ def settled_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesi
     # a member that is no larger than its tolerance only helped the fit of the others along
     helped = [(h, effect) for h in hypotheses for effect in sorted(set(h.effects) - set(h.named))
               if len(h.effects) == size + 1 > 1 and h.cost < first.cost + close]
-    ends: list[tuple[float, Callable[[], Hypothesis]]] = [
+    nearest: list[tuple[float, Callable[[], Hypothesis]]] = [
         *((h.cost, partial(fits.converged, h)) for h in rivals),
         *((h.cost, partial(fits.without, h, effect)) for h, effect in helped)]
-    for _, taken in sorted(ends, key=lambda item: item[0])[:options.rivals]:
+    ends = [taken for _, taken in sorted(nearest, key=lambda item: item[0])[:options.rivals]]
+    ends += [partial(fits.exchanged, best, effect, other)
+             for effect, other in fits.elsewhere(best)
+             if frozenset(best.effects) - {effect} | {other} not in found]
+    for taken in ends:
         end = taken()
         rival = found.get(frozenset(end.effects))
         if rival is None or end.cost + behind < rival.cost:

@@ -54,7 +54,7 @@ class Evidence:
 
     def as_data(self) -> list[dict[str, Any]]:
         """Return the evidence as plain data, for the JSON."""
-        return [{'effects': list(h.effects), 'unsure': sorted(h.unsure), 'cost': h.cost,
+        return [{'effects': list(h.effects), 'doubts': h.doubts, 'cost': h.cost,
                  'inflation': self.inflation,
                  'forms': [_form_data(form, h.state.point()) for form in h.forms],
                  'lack_of_fit': asdict(lack)}
@@ -93,4 +93,4 @@ def _hypothesis(data: Mapping[str, Any]) -> Hypothesis:
     return Hypothesis(tuple(data['effects']), forms, FitState(
         tuple(p for form in forms for p in form.parameters), np.array(values), none,
         np.zeros((0, len(values)), np.float32), none, data['cost']),
-        frozenset(data.get('unsure', ())))
+        data.get('doubts', {}))

@@ -207,6 +207,12 @@ class FullFits:
         return [(effect, other) for effect in hypothesis.effects
                 for other in effects[effect].simpler if other not in hypothesis.effects]
 
+    def elsewhere(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
+        """Return which effects could act in another place, each with the effect there."""
+        return [(effect, other.id) for effect in hypothesis.effects
+                for other, _ in self.problem.machine.relatives(effect)
+                if other.id not in hypothesis.effects]
+
     def exchanged(self, hypothesis: Hypothesis, effect: str, other: str) -> Hypothesis:
         """
         Return a hypothesis with another effect in the place of one of its own.

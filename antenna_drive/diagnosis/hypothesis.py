@@ -15,8 +15,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import compress, product
+import math
 
 from antenna_drive.diagnosis.least_squares import FitState, LeastSquares, proper_precision
 from antenna_drive.diagnosis.machine import Form, Parameter, Point
@@ -34,14 +36,15 @@ class Hypothesis:
     effects : their ids; none for the nuisances alone
     forms : one for each effect
     state : where the fit ended
-    unsure : those of its effects whose intervals reach into their tolerances
+    doubts : how probable it is that an effect is within its tolerance, by effect; those that are
+        not among them are not in doubt
 
     """
 
     effects: tuple[str, ...]
     forms: tuple[Form, ...]
     state: FitState
-    unsure: frozenset[str] = frozenset()
+    doubts: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def cost(self) -> float:
@@ -56,11 +59,30 @@ class Hypothesis:
 
     @property
     def named(self) -> tuple[str, ...]:
-        """Return the effects that are surely larger than a machine in good order may have."""
+        """Return the effects that are larger than a machine in good order may have."""
+        return tuple(effect for effect in self.beyond_tolerance if effect not in self.unsure)
+
+    @property
+    def beyond_tolerance(self) -> tuple[str, ...]:
+        """Return the effects whose fitted sizes are larger than that, surely or not."""
         point = self.state.point()
         return tuple(effect for effect, form in zip(self.effects, self.forms, strict=True)
-                     if effect not in self.unsure
-                     and any(abs(point[p.name]) > p.tolerance for p in form.sizes))
+                     if any(abs(point[p.name]) > p.tolerance for p in form.sizes))
+
+    @property
+    def unsure(self) -> frozenset[str]:
+        """Return the effects that are more probably within their tolerances than not."""
+        return frozenset(effect for effect, doubt in self.doubts.items() if doubt > 0.5)
+
+    def readings(self) -> Iterator[tuple[tuple[str, ...], float]]:
+        """Yield what it may name, with the probability of each: every effect may be in doubt."""
+        effects = self.beyond_tolerance
+        doubts = [self.doubts.get(effect, 0.0) for effect in effects]
+        for kept in product((True, False), repeat=len(effects)):
+            chance = math.prod(1.0 - doubt if keep else doubt
+                               for keep, doubt in zip(kept, doubts, strict=True))
+            if chance > 0.0:
+                yield tuple(compress(effects, kept)), chance
 
     def parameters_of(self, effects: Collection[str]) -> set[str]:
         """Return the names of the parameters of some of its effects."""

@@ -196,28 +196,43 @@ def values_with_intervals(hypothesis: Hypothesis,
         min(value + TWO_SIDED_95 * deviating[p.name], p.high)]} for p, value in hypothesis.values}
 
 
-def unsure(hypothesis: Hypothesis, deviating: Mapping[str, float],
-           beyond: float) -> frozenset[str]:
+def doubts(hypothesis: Hypothesis, deviating: Mapping[str, float], gained: float,
+           settings: IntervalSettings, beyond: float) -> dict[str, float]:
     """
-    Return the effects of a hypothesis that are larger than their tolerances, and not surely.
+    Return how probable it is that effects are within their tolerances after all, by effect.
 
-    None of such an effect's sizes exceeds its tolerance by enough of its own deviations. A course
-    over time is judged as a whole, elsewhere.
+    An effect is doubted that exceeds its tolerance by few of its own deviations, but not the
+    strongest one where the effects gain much. A weaker one beside it has to exceed its tolerance
+    by more: it may only mend the form of the strongest. A course over time is judged as a whole,
+    elsewhere.
 
     Parameters
     ----------
     hypothesis, deviating
         as in `values_with_intervals`
+    gained
+        gain of all its effects [half chi-square], over the inflation
+    settings
+        thresholds
     beyond
-        by how many deviations a size must exceed its tolerance
+        by how many deviations the strongest effect exceeds its tolerance that is as probably
+        within it as not
 
     """
     point = hypothesis.state.point()
-    return frozenset(
-        effect for effect, form in zip(hypothesis.effects, hypothesis.forms, strict=True)
-        if effect in hypothesis.named and not form.is_course and not any(
-            abs(point[p.name]) - p.tolerance > beyond * deviating[p.name]
-            for p in form.sizes))
+    excess = {effect: max((abs(point[p.name]) - p.tolerance) / deviating[p.name]
+                          for p in form.sizes)
+              for effect, form in zip(hypothesis.effects, hypothesis.forms, strict=True)
+              if effect in hypothesis.beyond_tolerance and not form.is_course}
+    strongest = max(excess.values(), default=0.0)
+
+    def certainty(value: float) -> float:
+        if value < strongest:
+            return value / max(beyond, settings.sure_of_partner)
+        return max(value / beyond, gained / settings.sure_by_gain)
+
+    return {effect: 1.0 / (1.0 + certainty(value) ** settings.sure_slope)
+            for effect, value in excess.items()}
 
 
 def same_number(parameter: Parameter, value: float) -> float:

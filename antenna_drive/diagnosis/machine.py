@@ -22,7 +22,7 @@ override, for speed or because you know your machine better.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 import math
@@ -465,6 +465,17 @@ class Machine(ABC):
             if form.name == name:
                 return form
         raise KeyError(f'{effect.id}: {name}')
+
+    def relatives(self, ident: str) -> Iterator[tuple[Effect, float]]:
+        """Yield an effect in other places, with the factor of its size that does as much."""
+        effect = self.effects[ident]
+        for part in effect.parts:
+            yield self.effects[part], float(len(effect.parts))
+        for whole in self.effects.values():
+            if effect.id in whole.parts:
+                yield whole, 1.0 / len(whole.parts)
+                yield from ((self.effects[part], 1.0) for part in whole.parts
+                            if part != effect.id)
 
     def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
         """Return the form of an effect's part that corresponds to a form of the effect."""

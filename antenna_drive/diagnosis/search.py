@@ -28,7 +28,7 @@ and compared (`full_fits`).
 from __future__ import annotations
 
 from bisect import insort
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -279,19 +279,8 @@ class Search:
         return self._with_better(hypotheses, self._pool.map(
             lambda item: self._moved(best, *item),
             [(place, *item) for place in range(len(best.effects))
-             for item in self._relatives(best.effects[place])
+             for item in self.machine.relatives(best.effects[place])
              if item[0].id not in best.effects]))
-
-    def _relatives(self, ident: str) -> Iterator[tuple[Effect, float]]:
-        """Yield an effect in other places, with the factor of its size that does as much."""
-        effects = self.machine.effects
-        effect = effects[ident]
-        for part in effect.parts:
-            yield effects[part], float(len(effect.parts))
-        for whole in effects.values():
-            if effect.id in whole.parts:
-                yield whole, 1.0 / len(whole.parts)
-                yield from ((effects[part], 1.0) for part in whole.parts if part != effect.id)
 
     def _exchanged(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """

@@ -35,6 +35,8 @@ TRIAL_7 = 'trial 7'
 TRIAL_9 = 'trial 9'
 TRIAL_11 = 'trial 11'
 TRIALS_9_TO_11 = 'trials 9 to 11'
+TRIALS_9_TO_12 = 'trials 9 to 12'
+TRIAL_12 = 'trial 12'
 WILD = 'wild practice cases'
 
 
@@ -205,7 +207,8 @@ class VerdictSettings:
         0.3, '1', 'slow excess below which an effect cannot have failed', PRACTICE)
     noise_only_slope: float = _setting(4.0, '1', 'how sharply', PRACTICE)
     least_unknown: float = _setting(0.05, 'probability', 'least probability of unknown', TRIAL_0)
-    most_unknown: float = _setting(0.88, 'probability', 'greatest probability of unknown', TRIAL_0)
+    most_unknown: float = _setting(
+        0.8, 'probability', 'greatest probability of unknown', TRIALS_9_TO_12)
     partly: float = _setting(
         0.3, 'probability', "probability of unknown from which the verdict is 'partly explained'")
     entries: int = _setting(12, '1', "greatest number of answers beside 'none' and 'unknown'")
@@ -268,6 +271,13 @@ class IntervalSettings:
     sure_of_all: float = _setting(
         2.33, 'standard deviations', 'the same where no test alone shows a gap: 99 percent',
         TRIALS_9_TO_11)
+    sure_of_partner: float = _setting(
+        3.5, 'standard deviations', 'the same for a weaker effect beside the strongest',
+        TRIALS_9_TO_12)
+    sure_by_gain: float = _setting(
+        400.0, 'half chi-square', 'gain from which the strongest effect is named anyway', TRIAL_12)
+    sure_slope: float = _setting(
+        3.0, '1', 'how sharply the doubt of an effect falls at these limits', TRIALS_9_TO_12)
 
 
 @dataclass(frozen=True)

@@ -73,11 +73,11 @@ class LackOfFit:
 @dataclass(frozen=True)
 class Answer:
     """
-    What hypotheses that name the same effects say.
+    What hypotheses that may name the same effects say.
 
     Attributes
     ----------
-    hypothesis : the one of them with the least score
+    hypothesis : the one with the least score that has these effects and no other, or may name them
     score : its score
     probability : of all of them
     effects : that it names: those that are larger than their tolerances
@@ -98,7 +98,7 @@ class Decision:
     Attributes
     ----------
     word : no_gap, too_few_to_judge, explained, partly_explained or unknown_effect
-    answers : the hypotheses by score, with probabilities that leave room for `unknown`
+    answers : the likeliest first, with probabilities that leave room for `unknown`
     unknown : probability of something outside the catalogue
     lack : what the best hypothesis leaves
     confusable : groups of effects that the data cannot tell apart
@@ -132,7 +132,7 @@ def decide(hypotheses: Sequence[Hypothesis], lack: LackOfFit, settings: Settings
     unknown = unknown_probability(lack, settings.verdict)
     answers = rank(hypotheses, unknown, settings, inflation)
     named = best(hypotheses, settings, inflation).named
-    top = max(answers, key=lambda answer: answer.probability)
+    top = answers[0]
     if unknown > top.probability:
         word = 'unknown_effect'
     elif not top.effects:
@@ -275,7 +275,9 @@ def _logistic(logit: float) -> float:
 def rank(hypotheses: Sequence[Hypothesis], unknown: float, settings: Settings,
          inflation: float = 1.0) -> list[Answer]:
     """
-    Return what the hypotheses name, by score, with probabilities.
+    Return what the hypotheses may name, the likeliest first, with probabilities.
+
+    A hypothesis whose effects are in doubt gives some of its probability to fewer of them.
 
     Parameters
     ----------
@@ -292,15 +294,19 @@ def rank(hypotheses: Sequence[Hypothesis], unknown: float, settings: Settings,
     score = _Scores(hypotheses, settings, inflation)
     scores = np.array([score(h) for h in hypotheses])
     weight = np.exp(-(scores - scores.min()) / settings.verdict.temperature)
-    weight /= weight.sum()
+    weight *= (1.0 - unknown) / weight.sum()
+    order = np.argsort(scores, kind='stable')
+    # an answer has the fit of what it names and of no more, where there is one
+    own = {frozenset(hypotheses[i].effects): i for i in reversed(order)}
     found: dict[frozenset[str], Answer] = {}
-    for i in np.argsort(scores, kind='stable'):
-        hypothesis, share = hypotheses[i], float(weight[i]) * (1.0 - unknown)
-        first = found.get(frozenset(hypothesis.named))
-        found[frozenset(hypothesis.named)] = (
-            Answer(hypothesis, float(scores[i]), share, hypothesis.named) if first is None
-            else replace(first, probability=first.probability + share))
-    return list(found.values())
+    for i in order:
+        for names, chance in hypotheses[i].readings():
+            key = frozenset(names)
+            fit = own.get(key, i)
+            answer = found.get(key, Answer(hypotheses[fit], float(scores[fit]), 0.0, names))
+            found[key] = replace(
+                answer, probability=answer.probability + float(weight[i]) * chance)
+    return sorted(found.values(), key=lambda answer: -answer.probability)
 
 
 def best(hypotheses: Sequence[Hypothesis], settings: Settings,

@@ -21,7 +21,7 @@ from typing import Any
 
 from antenna_drive.diagnosis import Form, Hypothesis, Parameter
 from antenna_drive.diagnosis.intervals import (
-    covariance, deviations, inflation, jackknife, unsure, values_with_intervals,
+    covariance, deviations, doubts, inflation, jackknife, values_with_intervals,
 )
 from antenna_drive.diagnosis.least_squares import FitState
 from antenna_drive.diagnosis.settings import DEFAULT
@@ -155,22 +155,45 @@ def test_a_nuisance_that_is_held_adds_nothing_to_the_intervals_of_others() -> No
         state([column, np.zeros(4000)], (CHANGE, bare)), 1.0, SETTINGS)).all()
 
 
-@pytest.mark.parametrize('size, tolerance, beyond, expected', [
-    (0.5, 0.1, 1.645, False), (0.5, 0.1, 4.1, True), (-0.5, 0.1, 3.9, False),
-    (0.25, 0.1, 1.645, True)])
-def test_an_effect_is_sure_if_its_size_exceeds_the_tolerance_by_enough_deviations(
-        size: float, tolerance: float, beyond: float, expected: bool) -> None:
-    number = replace(CHANGE, tolerance=tolerance)
-    fitted = Hypothesis(('part.effect',), (Form('', (number,)),),
-                        replace(state([np.ones(4)], (number,)), x=np.array([size])))
-    assert unsure(fitted, {number.name: 0.1}, beyond) == (
-        frozenset(['part.effect']) if expected else frozenset())
-    named = replace(fitted, unsure=unsure(fitted, {number.name: 0.1}, beyond)).named
-    assert named == (() if expected else ('part.effect',))
+def with_sizes(*sizes: float) -> tuple[Hypothesis, dict[str, float]]:
+    """Return a fit whose sizes exceed a tolerance of 0.1, with deviations of 0.1."""
+    numbers = tuple(replace(CHANGE, name=f'part_{k}.effect.size', tolerance=0.1)
+                    for k in range(len(sizes)))
+    fit = Hypothesis(tuple(f'part_{k}.effect' for k in range(len(sizes))),
+                     tuple(Form('', (number,)) for number in numbers),
+                     replace(state([np.ones(4)] * len(sizes), numbers), x=np.array(sizes)))
+    return fit, {number.name: 0.1 for number in numbers}
 
 
-def test_what_is_within_its_tolerance_is_no_matter_of_being_sure() -> None:
-    number = replace(CHANGE, tolerance=0.1)
-    fitted = Hypothesis(('part.effect',), (Form('', (number,)),),
-                        replace(state([np.ones(4)], (number,)), x=np.array([0.05])))
-    assert unsure(fitted, {number.name: 0.1}, 1.645) == frozenset()
+def doubted(*sizes: float, gained: float = 0.0) -> dict[str, float]:
+    fit, deviating = with_sizes(*sizes)
+    return doubts(fit, deviating, gained, SETTINGS, SETTINGS.sure)
+
+
+@pytest.mark.parametrize('size', [0.3, -0.3])
+def test_doubt_of_an_effect_falls_with_its_excess_over_the_tolerance(size: float) -> None:
+    """At the limit it is a half; from there its odds fall with a power of the excess."""
+    at_limit = 0.1 * (1.0 + SETTINGS.sure)
+    assert doubted(np.copysign(at_limit, size)) == {'part_0.effect': pytest.approx(0.5)}
+    [twice] = doubted(np.copysign(0.1 * (1.0 + 2.0 * SETTINGS.sure), size)).values()
+    assert twice / (1.0 - twice) == pytest.approx(2.0 ** -SETTINGS.sure_slope)
+
+
+def test_the_strongest_effect_of_those_that_gain_much_is_named_however_wide_its_interval() -> None:
+    assert doubted(0.2)['part_0.effect'] > 0.5
+    assert doubted(0.2, gained=2.0 * SETTINGS.sure_by_gain)['part_0.effect'] < 0.2
+    both = doubted(0.2, 0.15, gained=2.0 * SETTINGS.sure_by_gain)
+    assert both['part_0.effect'] < 0.2 and both['part_1.effect'] > 0.5
+
+
+def test_a_weaker_effect_must_exceed_its_tolerance_by_more() -> None:
+    between = 0.1 * (1.0 + 0.5 * (SETTINGS.sure + SETTINGS.sure_of_partner))
+    fit, deviating = with_sizes(2.0, between)
+    found = doubts(fit, deviating, 0.0, SETTINGS, SETTINGS.sure)
+    assert found['part_0.effect'] < 0.01 < 0.5 < found['part_1.effect']
+    assert doubted(between)['part_0.effect'] < 0.5
+    assert replace(fit, doubts=found).named == ('part_0.effect',)
+
+
+def test_what_is_within_its_tolerance_is_no_matter_of_doubt() -> None:
+    assert doubted(0.05) == {}

@@ -157,6 +157,29 @@ def test_a_partner_within_its_tolerance_leaves_the_first_effect_alone() -> None:
     assert first.probability == pytest.approx(0.95, abs=1e-3)
 
 
+@given(st.lists(shares, min_size=1, max_size=4))
+def test_what_a_fit_may_name_are_all_its_subsets_and_they_share_its_probability(
+        chances: list[float]) -> None:
+    """Each effect's probability, summed over the answers that name it, is that it is real."""
+    effects = tuple(f'part_{k}.gain' for k in range(len(chances)))
+    doubtful = replace(fitted(effects, 0.0), doubts=dict(zip(effects, chances, strict=True)))
+    answers = rank([fitted((), 1e6), doubtful], 0.1, DEFAULT)
+    assert sum(answer.probability for answer in answers) == pytest.approx(0.9)
+    for effect, doubt in zip(effects, chances, strict=True):
+        assert sum(answer.probability for answer in answers if effect in answer.effects
+                   ) == pytest.approx(0.9 * (1.0 - doubt), abs=1e-9)
+    assert [answer.probability for answer in answers] == sorted(
+        (answer.probability for answer in answers), reverse=True)
+
+
+def test_an_answer_has_the_fit_of_what_it_names() -> None:
+    none, single = fitted((), 20000.0), fitted(('axis.inertia',), 5000.0)
+    pair = replace(fitted(('axis.inertia', 'motor.gain'), 3000.0), doubts={'motor.gain': 0.4})
+    first, second = rank([none, single, pair], 0.0, DEFAULT)[:2]
+    assert first.hypothesis is pair and first.probability == pytest.approx(0.6)
+    assert second.hypothesis is single and second.probability == pytest.approx(0.4)
+
+
 def test_a_partner_of_nobody_who_was_fitted_alone_is_not_listed() -> None:
     none, other = fitted((), 20000.0), fitted(('axis.gain',), 15000.0)
     pair = within_tolerance(fitted(('axis.inertia', 'motor.gain'), 3000.0), 'motor.gain')
@@ -191,6 +214,10 @@ class Ends:
 
     def simpler(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
         return [(effect, effect[:-1]) for effect in hypothesis.effects if effect.endswith("'")]
+
+    def elsewhere(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
+        return [(effect, other) for effect, other in (('left', 'right'),)
+                if effect in hypothesis.effects]
 
     def exchanged(self, hypothesis: Hypothesis, effect: str, other: str) -> Hypothesis:
         swapped = tuple(other if e == effect else e for e in hypothesis.effects)
@@ -275,6 +302,18 @@ def test_the_best_is_fitted_again_if_a_partner_of_no_size_helps_it_along() -> No
         fitted(('a',), 15550.0), DEFAULT)
     assert (end.effects, end.cost) == (('a',), 15500.0)
     assert {h.effects: h.cost for h in hypotheses}['a',] == 15500.0
+
+
+def test_an_effect_in_another_place_that_was_given_up_is_tried_before_one_is_named() -> None:
+    fits = Ends({('left',): 15990.0, ('right',): 15900.0})
+    known = [fitted((), 90000.0), fitted(('left',), 16000.0)]
+    hypotheses, end = settled_rivals(fits, known, fitted(('left',), 15990.0), DEFAULT)
+    assert end.effects == best(hypotheses, DEFAULT).effects == ('right',)
+    assert fits.asked == [('right',)]
+    # where it is among the hypotheses, it is a rival as any other: far behind, it stays there
+    fits.asked.clear()
+    settled_rivals(fits, [*known, fitted(('right',), 50000.0)], end, DEFAULT)
+    assert fits.asked == []
 
 
 def test_what_a_quadratic_fit_loses_without_an_effect() -> None:
