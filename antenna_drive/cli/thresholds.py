@@ -118,10 +118,12 @@ def _decided_anew(folder: Path) -> dict[str, Mapping[str, float]]:
         if not path.exists():
             continue
         content = json.loads(path.read_text(encoding='utf-8'))
-        if 'fits' not in content:
-            raise UserError(f'{path}: fits: is missing; diagnose the trial anew with this version')
-        kept.append((sealing.open_truth(folder, name, manifest), content,
-                     Evidence.of_data(content['fits'])))
+        try:
+            evidence = Evidence.of_data(content['fits'])
+        except KeyError as error:
+            raise UserError(f'{path}: {error.args[0]}: is missing; diagnose the trial anew with '
+                            'this version') from None
+        kept.append((sealing.open_truth(folder, name, manifest), content, evidence))
     if not kept:
         raise UserError(f'{folder}: no case is diagnosed; antenna-drive trial --diagnose does it')
     return {name: _scored(kept, settings)

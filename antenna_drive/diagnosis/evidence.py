@@ -93,4 +93,4 @@ def _hypothesis(data: Mapping[str, Any]) -> Hypothesis:
     return Hypothesis(tuple(data['effects']), forms, FitState(
         tuple(p for form in forms for p in form.parameters), np.array(values), none,
         np.zeros((0, len(values)), np.float32), none, data['cost']),
-        data.get('doubts', {}))
+        data['doubts'])

@@ -36,8 +36,7 @@ class Hypothesis:
     effects : their ids; none for the nuisances alone
     forms : one for each effect
     state : where the fit ended
-    doubts : how probable it is that an effect is within its tolerance, by effect; those that are
-        not among them are not in doubt
+    doubts : the probability that an effect is within its tolerance, by effect; 0 if not given
 
     """
 
@@ -59,12 +58,12 @@ class Hypothesis:
 
     @property
     def named(self) -> tuple[str, ...]:
-        """Return the effects that are larger than a machine in good order may have."""
+        """Return the effects that exceed their tolerances and are not unsure."""
         return tuple(effect for effect in self.beyond_tolerance if effect not in self.unsure)
 
     @property
     def beyond_tolerance(self) -> tuple[str, ...]:
-        """Return the effects whose fitted sizes are larger than that, surely or not."""
+        """Return the effects that are larger, as fitted, than on a machine in good order."""
         point = self.state.point()
         return tuple(effect for effect, form in zip(self.effects, self.forms, strict=True)
                      if any(abs(point[p.name]) > p.tolerance for p in form.sizes))
@@ -74,8 +73,8 @@ class Hypothesis:
         """Return the effects that are more probably within their tolerances than not."""
         return frozenset(effect for effect, doubt in self.doubts.items() if doubt > 0.5)
 
-    def readings(self) -> Iterator[tuple[tuple[str, ...], float]]:
-        """Yield what it may name, with the probability of each: every effect may be in doubt."""
+    def may_name(self) -> Iterator[tuple[tuple[str, ...], float]]:
+        """Yield the sets of effects that may be real, each with its probability."""
         effects = self.beyond_tolerance
         doubts = [self.doubts.get(effect, 0.0) for effect in effects]
         for kept in product((True, False), repeat=len(effects)):

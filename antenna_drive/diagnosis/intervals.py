@@ -199,12 +199,12 @@ def values_with_intervals(hypothesis: Hypothesis,
 def doubts(hypothesis: Hypothesis, deviating: Mapping[str, float], gained: float,
            settings: IntervalSettings, beyond: float) -> dict[str, float]:
     """
-    Return how probable it is that effects are within their tolerances after all, by effect.
+    Return the probability that effects are within their tolerances after all, by effect.
 
-    An effect is doubted that exceeds its tolerance by few of its own deviations, but not the
-    strongest one where the effects gain much. A weaker one beside it has to exceed its tolerance
-    by more: it may only mend the form of the strongest. A course over time is judged as a whole,
-    elsewhere.
+    An effect is in doubt if it exceeds its tolerance by few of its own deviations. The strongest
+    one is not in doubt where the effects gain much. A weaker one has to exceed its tolerance by
+    more, because it may only mend the form of the strongest. A course over time is judged as a
+    whole, elsewhere.
 
     Parameters
     ----------
@@ -215,8 +215,7 @@ def doubts(hypothesis: Hypothesis, deviating: Mapping[str, float], gained: float
     settings
         thresholds
     beyond
-        by how many deviations the strongest effect exceeds its tolerance that is as probably
-        within it as not
+        excess of the strongest effect, in deviations, at which its doubt is a half
 
     """
     point = hypothesis.state.point()

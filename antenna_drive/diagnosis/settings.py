@@ -35,8 +35,8 @@ TRIAL_7 = 'trial 7'
 TRIAL_9 = 'trial 9'
 TRIAL_11 = 'trial 11'
 TRIALS_9_TO_11 = 'trials 9 to 11'
-TRIALS_9_TO_12 = 'trials 9 to 12'
 TRIAL_12 = 'trial 12'
+TRIALS_9_TO_12 = 'trials 9 to 12'
 WILD = 'wild practice cases'
 
 
@@ -266,8 +266,8 @@ class IntervalSettings:
     model_error: float = _setting(
         3e-3, '1', 'standard deviation that every value has, as a share of itself', WILD)
     sure: float = _setting(
-        1.645, 'standard deviations', 'by how much an effect that is named exceeds its tolerance: '
-        '95 percent, one-sided', TRIALS_9_TO_11)
+        1.645, 'standard deviations', 'excess of an effect over its tolerance at which it is as '
+        'probably within it: 95 percent, one-sided', TRIALS_9_TO_11)
     sure_of_all: float = _setting(
         2.33, 'standard deviations', 'the same where no test alone shows a gap: 99 percent',
         TRIALS_9_TO_11)

@@ -77,7 +77,7 @@ class Answer:
 
     Attributes
     ----------
-    hypothesis : the one with the least score that has these effects and no other, or may name them
+    hypothesis : the fit with these effects alone; if there is none, the best that may name them
     score : its score
     probability : of all of them
     effects : that it names: those that are larger than their tolerances
@@ -300,7 +300,7 @@ def rank(hypotheses: Sequence[Hypothesis], unknown: float, settings: Settings,
     own = {frozenset(hypotheses[i].effects): i for i in reversed(order)}
     found: dict[frozenset[str], Answer] = {}
     for i in order:
-        for names, chance in hypotheses[i].readings():
+        for names, chance in hypotheses[i].may_name():
             key = frozenset(names)
             fit = own.get(key, i)
             answer = found.get(key, Answer(hypotheses[fit], float(scores[fit]), 0.0, names))

@@ -87,3 +87,9 @@ def test_a_trial_without_kept_fits_is_told(tmp_path: Path,
     (tmp_path / 'case_0001' / 'verdict.json').write_text('{}')
     assert main(['thresholds', str(tmp_path)]) == 2
     assert 'fits: is missing' in capsys.readouterr().err
+    # those of an earlier version know of no doubt: the verdict would be another one
+    [none, *_] = diagnose(Ramp(0.05)).result['fits']
+    del none['doubts']
+    (tmp_path / 'case_0001' / 'verdict.json').write_text(json.dumps({'fits': [none]}))
+    assert main(['thresholds', str(tmp_path)]) == 2
+    assert 'doubts: is missing; diagnose the trial anew' in capsys.readouterr().err

@@ -195,5 +195,18 @@ def test_a_weaker_effect_must_exceed_its_tolerance_by_more() -> None:
     assert replace(fit, doubts=found).named == ('part_0.effect',)
 
 
+@pytest.mark.parametrize('size, tolerance, beyond, expected', [
+    (0.5, 0.1, 1.645, False), (0.5, 0.1, 4.1, True), (-0.5, 0.1, 3.9, False),
+    (0.25, 0.1, 1.645, True)])
+def test_an_effect_is_unsure_if_it_exceeds_its_tolerance_by_too_few_deviations(
+        size: float, tolerance: float, beyond: float, expected: bool) -> None:
+    number = replace(CHANGE, tolerance=tolerance)
+    fitted = Hypothesis(('part.effect',), (Form('', (number,)),),
+                        replace(state([np.ones(4)], (number,)), x=np.array([size])))
+    judged = replace(fitted, doubts=doubts(fitted, {number.name: 0.1}, 0.0, SETTINGS, beyond))
+    assert judged.unsure == (frozenset(['part.effect']) if expected else frozenset())
+    assert judged.named == (() if expected else ('part.effect',))
+
+
 def test_what_is_within_its_tolerance_is_no_matter_of_doubt() -> None:
     assert doubted(0.05) == {}

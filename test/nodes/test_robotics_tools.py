@@ -211,11 +211,14 @@ def test_joints_are_the_readings_of_the_same_time(live: LiveCommand, watch: Watc
         [sys.executable, '-m', 'antenna_drive.nodes.joint_states', '--ros-args',
          '-p', 'publish_rate:=100.0', '-p', 'joints:=[elevation, m1, m2]'],
         env={**os.environ, 'ROS_DOMAIN_ID': str(module_domain)})
+    axis, motors = states.values()
+
+    def moves() -> bool:
+        return len({state.position[0] for state in axis[-100:]}) > 50
+
     try:
-        axis, motors = states.values()
         # a drive that has just begun is at rest, and on a busy machine that may last
-        watch.until(lambda: len({state.position[0] for state in axis[-100:]}) > 50
-                    and len(last) == 7, 'joints that move')
+        watch.until(lambda: len(axis) > 100 and len(last) == 7 and moves(), 'joints that move')
         assert watch.call('test_signal/pause').success
         (ratio,) = watch.get('plant', 'gear_ratio')
 
@@ -229,6 +232,7 @@ def test_joints_are_the_readings_of_the_same_time(live: LiveCommand, watch: Watc
 
         watch.until(same, 'equal values while the drive is paused')
         assert (list(axis[-1].name), list(motors[-1].name)) == (['elevation'], ['m1', 'm2'])
+        assert moves()
         stamps = [state.header.stamp.sec * 10**9 + state.header.stamp.nanosec for state in axis]
         assert stamps == sorted({*stamps})
         assert all(stamp % 10_000_000 == 0 for stamp in stamps), 'every tenth step'
