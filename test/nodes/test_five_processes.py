@@ -234,11 +234,11 @@ def test_each_node_killed_is_missed_and_started_again_begins_a_new_run(
             neighbour = 'motor_1' if victim == 'test_signal' else 'test_signal'
             said = len(processes.log(neighbour))
             processes.kill(victim)
-            # Said since the kill, for what was said of the run before may name it too. A frame
-            # sent while its sender dies reaches some peers only: those it did not reach stand
-            # still as well, and the neighbour names them beside the one that is gone.
-            missing = re.compile(rf'waiting for ([a-z_0-9]+, )*{victim}\b.* at step')
-            watch.until(lambda: missing.search(processes.log(neighbour)[said:]) is not None,
+            # The last that was said, for an earlier wait may name it too: a drive that has just
+            # begun may wait for the recorder of this test. A frame sent while its sender dies
+            # reaches some peers only: those it did not reach stand still as well, and the
+            # neighbour names them beside the one that is gone.
+            watch.until(lambda: victim in _named(processes.log(neighbour)),
                         f'{neighbour} to say that it waits for {victim}')
             watch.until(lambda: _missed(watch, neighbour, victim),
                         f'{neighbour} to report that it waits for {victim}')
@@ -286,6 +286,13 @@ def _stands_still(watch: Watch) -> bool:
     step = watch.value('test_signal', 'step')
     return watch.value('test_signal', 'pace') == repr(STANDSTILL) and all(
         watch.value(unit, 'step') == str(int(step) + 1) for unit in UNITS[1:])
+
+
+def _named(log: str) -> list[str]:
+    """Return whom a node's log says that it waits for."""
+    said = re.findall(
+        r'going on at|run \d+ begins|waiting for ([a-z_0-9, ]+) (?:at step|to begin)', log)
+    return said[-1].split(', ') if said else []
 
 
 def _missed(watch: Watch, neighbour: str, victim: str) -> bool:
