@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from datetime import datetime
+import math
 from pathlib import Path
 import signal
 import time
@@ -32,6 +33,7 @@ from antenna_drive.lockstep.frame import FrameLayout
 from antenna_drive.lockstep.readings import CHANGES_QOS
 from antenna_drive.lockstep.ros_link import FrameLink
 from antenna_drive.lockstep.serving import Serving
+from antenna_drive.recording.mcap_format import SPLIT_S
 from antenna_drive.recording.recorder import RunRecorder
 from antenna_drive.recording.recording import RecordingError
 from antenna_drive.recording.sheet import load_sheet
@@ -69,12 +71,12 @@ def run(arguments: Sequence[str]) -> int:
         return _RecorderNode(node).spin()
 
 
-def _sync_s(node: Node) -> float | None:
-    given: Any = node.declare_parameter('sync', 0.0, ParameterDescriptor(
-        description='after how long the disk is made to hold what was written, 0: at the end [s]',
-        dynamic_typing=True)).value
+def _seconds(node: Node, name: str, default: float, description: str) -> float | None:
+    """Return a parameter that is a time [s]; None for 0."""
+    given: Any = node.declare_parameter(name, default, ParameterDescriptor(
+        description=f'{description} [s]', dynamic_typing=True)).value
     if isinstance(given, bool) or not isinstance(given, (int, float)) or not given >= 0.0:
-        raise UserError(f'sync: {given!r} given, allowed is a time in seconds, 0 or more')
+        raise UserError(f'{name}: {given!r} given, allowed is a time in seconds, 0 or more')
     return float(given) or None
 
 
@@ -87,9 +89,14 @@ class _RecorderNode:
         default = f'recording_{datetime.now():%Y-%m-%d_%H-%M-%S}'
         out = str(node.declare_parameter('out', default).value)
         sheet = str(node.declare_parameter('sheet', '').value or '')
+        sync_s = _seconds(node, 'sync', 0.0, 'after how long the disk is made to hold what was '
+                          'written, 0: at the end')
+        split_s = _seconds(node, 'split', SPLIT_S, 'after how long the next storage file begins, '
+                           '0: never')
         self._recorder = RunRecorder(
             out, {f'{unit}/{s.name}': s.unit for unit, own in OUTPUTS.items() for s in own},
-            load_sheet(Path(sheet)) if sheet else None, sync_s=_sync_s(node), recorded_by=NAME)
+            load_sheet(Path(sheet)) if sheet else None, sync_s=sync_s,
+            split_s=split_s or math.inf, recorded_by=NAME)
         layouts = {unit: FrameLayout(signals) for unit, signals in OUTPUTS.items()}
         self._follower = Follower({u: layout.length for u, layout in layouts.items()}, TEST_SIGNAL)
         self._own = FrameLayout(())

@@ -21,7 +21,8 @@ storage; nothing here needs ROS 2.
 
 A chunk is complete at least every half second, and a reader needs nothing behind it: whatever
 happens to the process that records, at most the last half second is lost. Should the power fail,
-what was synchronised is safe, see `sync_s`.
+what was synchronised is safe, see `sync_s`. The index of the chunks is held in memory until its
+file ends, so a long bag has several storage files, see `split_s`.
 """
 
 from __future__ import annotations
@@ -76,6 +77,7 @@ FORMAT_VERSION = '1'
 # older ones do not understand.
 ROSBAG2_VERSION = 8
 FLUSH_S = 0.5
+SPLIT_S = 600.0
 
 _CDR_FLOAT64 = struct.Struct('<4sd')  # encapsulation: little-endian CDR
 _CDR_HEADER = b'\x00\x01\x00\x00'
@@ -86,6 +88,30 @@ _MESSAGE = np.dtype([
 _MESSAGE_LENGTH = _MESSAGE.itemsize - 9
 _FEW = 1024  # messages that are looked at at first
 _FOOTER_TAIL = 12  # the summary's checksum and the magic
+
+
+@dataclass
+class _StorageFile:
+    """A file of a bag: when it was begun [s], its messages by topic, its time stamps [ns]."""
+
+    name: str
+    began_at: float
+    counts: list[int]
+    first_ns: int = 2**63 - 1
+    last_ns: int = -1
+
+    def reaches(self, time_ns: int) -> None:
+        """Note the time stamp of a sample."""
+        self.first_ns = min(time_ns, self.first_ns)
+        self.last_ns = max(time_ns, self.last_ns)
+
+    def span(self) -> dict[str, Any]:
+        """Return what rosbag2 says of it."""
+        count = sum(self.counts)
+        return {
+            'starting_time': {'nanoseconds_since_epoch': self.first_ns if count else 0},
+            'duration': {'nanoseconds': self.last_ns - self.first_ns if count else 0},
+            'message_count': count}
 
 
 class BagWriter:
@@ -108,7 +134,7 @@ class BagWriter:
                  configuration: Mapping[str, Any] | None = None, sheet: TestSheet | None = None,
                  notes: Mapping[str, Any] | None = None, stem: str | None = None,
                  flush_s: float = FLUSH_S, sync_s: float | None = None,
-                 clock: Callable[[], float] = time.monotonic) -> None:
+                 split_s: float = SPLIT_S, clock: Callable[[], float] = time.monotonic) -> None:
         """
         Create the folder and write everything that is known before the first sample.
 
@@ -126,7 +152,9 @@ class BagWriter:
             longest time between chunks, by `clock` and by the time stamps [s]
         sync_s
             after how long by `clock` the disk is made to hold what was written [s], at the end
-            of a chunk; None for at the end only
+            of a chunk; None for at the end of each storage file only
+        split_s
+            how long a storage file becomes, by `clock` or by the time stamps [s]
         clock
             a steady clock [s]
 
@@ -145,27 +173,33 @@ class BagWriter:
         self._clock = clock
         self._flushed_at = self._synced_at = clock()
         self._flushed_ns = 0
-        self._counts = [0] * len(self._signals)
-        self._first_ns, self._last_ns = 2**63 - 1, -1
+        self._split_s = split_s
+        self._files: list[_StorageFile] = []
+        self._stem = stem or self.path.name
         attachments = {
             CONFIGURATION: _as_json(configuration or {}), NOTES: _as_json(notes or {}),
             FILE_NAME: dump_sheet(sheet or TestSheet())}
         refuse_existing(self.path)
         try:
             self.path.mkdir(parents=True)
-            self._file_name = f'{stem or self.path.name}_0.mcap'
-            # not buffered: after a full disk nothing may be written that was held back
-            self._raw = (self.path / self._file_name).open('xb', buffering=0)
+            self._raw, self._writer = self._opened()
         except FileExistsError:
             raise RecordingError(f'{self.path}: exists already; choose another name') from None
         except OSError as error:
             raise refuse_io(self.path, error) from error
-        # the writer buffers a raw stream itself
-        self._writer: Writer | None = Writer(self._raw, enable_data_crcs=True)
         with self._guarded() as writer:
             self._topics = self._begin(writer, attachments)
             if sync_s is not None:
                 self._sync()
+
+    def _opened(self) -> tuple[io.FileIO, Writer | None]:
+        """Return the next storage file and what writes it."""
+        name = f'{self._stem}_{len(self._files)}.mcap'
+        # not buffered: after a full disk nothing may be written that was held back; the writer
+        # buffers a raw stream itself
+        raw = (self.path / name).open('xb', buffering=0)
+        self._files.append(_StorageFile(name, self._clock(), [0] * len(self._signals)))
+        return raw, Writer(raw, enable_data_crcs=True)
 
     def _begin(self, writer: Writer, attachments: Mapping[str, str]) -> list[int]:
         writer.start('ros2')
@@ -220,15 +254,16 @@ class BagWriter:
         if not 0 <= time_ns < 2**63 or any(map(math.isinf, values)):
             for i, value in enumerate(values):
                 self._check(i, time_ns, value)
-        pack, sequence = _CDR_FLOAT64.pack, step & 0xFFFFFFFF
+        if self._full:
+            self._split()
+        pack, sequence, file = _CDR_FLOAT64.pack, step & 0xFFFFFFFF, self._files[-1]
         with self._guarded() as writer:
             for i, value in enumerate(values):
                 if value == value:
                     writer.add_message(self._topics[i], time_ns, pack(_CDR_HEADER, value),
                                        time_ns, sequence)
-                    self._counts[i] += 1
-        self._first_ns = min(time_ns, self._first_ns)
-        self._last_ns = max(time_ns, self._last_ns)
+                    file.counts[i] += 1
+        file.reaches(time_ns)
         if (time_ns - self._flushed_ns >= self._flush_ns
                 or self._clock() - self._flushed_at >= self._flush_s):
             self.flush()
@@ -246,9 +281,8 @@ class BagWriter:
         with self._guarded() as writer:
             writer.add_message(self._topics[signal], time_ns,
                                _CDR_FLOAT64.pack(_CDR_HEADER, value), time_ns, step & 0xFFFFFFFF)
-        self._counts[signal] += 1
-        self._first_ns = min(time_ns, self._first_ns)
-        self._last_ns = max(time_ns, self._last_ns)
+        self._files[-1].counts[signal] += 1
+        self._files[-1].reaches(time_ns)
 
     def _check(self, signal: int, time_ns: int, value: float) -> None:
         if math.isinf(value) or not 0 <= time_ns < 2**63:
@@ -294,12 +328,35 @@ class BagWriter:
         """
         with self._guarded() as writer:
             writer.flush()
-        self.written_ns = self._last_ns
-        self._flushed_ns = max(self._last_ns, 0)
+        self.written_ns = max(file.last_ns for file in self._files)
+        self._flushed_ns = max(self.written_ns, 0)
         self._flushed_at = self._clock()
         if self._sync_s is not None and self._flushed_at - self._synced_at >= self._sync_s:
             with self._guarded():
                 self._sync()
+
+    @property
+    def _full(self) -> bool:
+        """Tell whether the storage file is long enough; looked at when a chunk is complete."""
+        file = self._files[-1]
+        return file.last_ns >= 0 and self.written_ns == file.last_ns and (
+            self._flushed_at - file.began_at >= self._split_s
+            or file.last_ns - file.first_ns >= self._split_s * NANOSECONDS)
+
+    def _split(self) -> None:
+        """Complete the storage file, and begin the next one."""
+        with self._guarded() as writer:
+            self._complete(writer)
+            self._raw.close()
+            self._raw, self._writer = self._opened()
+        with self._guarded() as writer:
+            self._topics = self._begin(writer, {})
+
+    def _complete(self, writer: Writer) -> None:
+        writer.finish()
+        writer.flush()
+        self.written_ns = max(file.last_ns for file in self._files)
+        self._sync()
 
     def _sync(self) -> None:
         os.fsync(self._raw.fileno())
@@ -319,33 +376,29 @@ class BagWriter:
         if self._writer is None:
             return
         with self._guarded() as writer:
-            writer.finish()
-            writer.flush()
-            self.written_ns = self._last_ns
-            self._sync()
+            self._complete(writer)
             with drafted(self.path / METADATA) as stream:
                 stream.write(self._metadata().encode())
             sync_folder(self.path)
         self._abandon()
 
     def _metadata(self) -> str:
-        count = sum(self._counts)
-        span = {
-            'starting_time': {'nanoseconds_since_epoch': self._first_ns if count else 0},
-            'duration': {'nanoseconds': self._last_ns - self._first_ns if count else 0},
-            'message_count': count}
+        whole = _StorageFile(
+            '', 0.0, [sum(own) for own in zip(*(f.counts for f in self._files), strict=True)],
+            min(f.first_ns for f in self._files), max(f.last_ns for f in self._files))
         topics = [
             {'topic_metadata': {
                 'name': f'/{name}', 'type': MESSAGE_TYPE, 'serialization_format': 'cdr',
                 'offered_qos_profiles': '', 'type_description_hash': MESSAGE_HASH},
              'message_count': number}
-            for name, number in zip(self._signals, self._counts, strict=True)]
+            for name, number in zip(self._signals, whole.counts, strict=True)]
         text: str = yaml.safe_dump({'rosbag2_bagfile_information': {
-            'version': ROSBAG2_VERSION, 'storage_identifier': 'mcap', **span,
+            'version': ROSBAG2_VERSION, 'storage_identifier': 'mcap',
+            **whole.span(),
             'topics_with_message_count': topics,
             'compression_format': '', 'compression_mode': '',
-            'relative_file_paths': [self._file_name],
-            'files': [{'path': self._file_name, **_copy(span)}],
+            'relative_file_paths': [file.name for file in self._files],
+            'files': [{'path': file.name, **file.span()} for file in self._files],
             'custom_data': {}, 'ros_distro': 'unknown'}}, sort_keys=False)
         return text
 
@@ -374,11 +427,6 @@ def _as_json(content: Mapping[str, Any], prefix: str = '') -> str:
         return to_json(freeze(dict(content)))
     except PlainDataError as error:
         raise RecordingError(f'{prefix}{error}') from None
-
-
-def _copy(tree: Mapping[str, Any]) -> dict[str, Any]:
-    # YAML would write a reference where an object is used twice
-    return {key: dict(item) if isinstance(item, dict) else item for key, item in tree.items()}
 
 
 def write_bag(recording: Recording, path: str | Path) -> None:
@@ -437,6 +485,10 @@ class _Storage:
     changes: list[Any] = field(default_factory=list)
     messages: int = 0
     unpacked: int = 0
+
+    def begin_file(self) -> None:
+        """Forget the numbers of types and topics: each file has its own."""
+        self.schemas, self.topics = {}, {}
 
     def take(self, record: object) -> None:
         """Take in one record of a file."""
@@ -625,6 +677,7 @@ def _read_storage(path: Path, storage: _Storage) -> None:
         file = path.open('rb')
     except OSError as error:
         raise RecordingError(f'{path}: {error.strerror}') from error
+    storage.begin_file()
     before = storage.messages
     count: int | None = None
     with file:
@@ -715,7 +768,7 @@ def _files(path: Path) -> tuple[list[Path], dict[str, int] | None]:
     if path.is_file():
         return [path], None
     if not (path / METADATA).is_file():
-        found = sorted(path.glob('*.mcap'))
+        found = sorted(path.glob('*.mcap'), key=lambda file: (len(file.name), file.name))
         if not found:
             raise RecordingError(f'{path}: no bag, there is neither {METADATA} nor a file .mcap')
         return found, {}

@@ -27,7 +27,7 @@ from typing import Any
 
 from antenna_drive.lockstep.changes import CHANGES, is_record, SETTINGS
 from antenna_drive.recording.atomic import refuse_existing
-from antenna_drive.recording.mcap_format import BagWriter
+from antenna_drive.recording.mcap_format import BagWriter, SPLIT_S
 from antenna_drive.recording.recording import nanoseconds
 from antenna_drive.recording.runs import STEP
 from antenna_drive.recording.sheet import TestSheet
@@ -51,7 +51,7 @@ class RunRecorder:
 
     def __init__(self, path: str | Path, signals: Mapping[str, str],
                  sheet: TestSheet | None = None, *, sync_s: float | None = None,
-                 **notes: Any) -> None:
+                 split_s: float = SPLIT_S, **notes: Any) -> None:
         """
         Prepare to record.
 
@@ -63,7 +63,7 @@ class RunRecorder:
             name -> unit of every signal, in the order in which `step` gives them
         sheet, notes
             see Recording
-        sync_s
+        sync_s, split_s
             see BagWriter
 
         Raises
@@ -76,7 +76,7 @@ class RunRecorder:
         self.refused = 0
         self._signals = dict(signals)
         self._sheet = sheet
-        self._sync_s = sync_s
+        self._sync_s, self._split_s = sync_s, split_s
         self._notes = notes
         self._bag: BagWriter | None = None
         self._count = 0
@@ -106,6 +106,7 @@ class RunRecorder:
         self._run, self.steps = run, 0
         self._step_s = step_s
         self._bag = BagWriter(self.path, self._signals, sheet=self._sheet, sync_s=self._sync_s,
+                              split_s=self._split_s,
                               notes={**self._notes, STEP: step_s, 'run': run})
         self._catch_up()
 

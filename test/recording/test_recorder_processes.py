@@ -198,13 +198,15 @@ def test_a_recorder_joins_a_running_drive_and_keeps_every_step(
     with Drive(pace=0.0) as drive:
         drive.until(lambda: drive.step > 1500)  # longer than the nodes remember
         drive.change('test_signal', 'run.pace', PACE_FOR_A_GUEST)
-        with recorder(f'out:={tmp_path}/run', f'sheet:={tmp_path}/sheet.yaml') as process:
+        with recorder(f'out:={tmp_path}/run', f'sheet:={tmp_path}/sheet.yaml',
+                      'split:=0.4') as process:
             drive.until(lambda: process.said('recording from step'))
             drive.change('torque_share', 'bias_pot', 0.5)
             drive.until(lambda: drive.step > drive.changed_at[0] + 200)
             drive.until(lambda: drive.step > process.first_step + 1000)
             assert process.end() == 0, process.lines
             assert process.said('steps recorded to')
+    assert len(list((tmp_path / 'run').glob('*.mcap'))) > 1
     for topic, steps in steps_by_rosbags(tmp_path / 'run').items():
         assert len(steps) > 1000
         assert steps == list(range(steps[0], steps[-1] + 1)), topic
@@ -362,7 +364,8 @@ def test_a_player_without_a_recording_says_so() -> None:
 def test_wrong_arguments_are_refused_in_one_line(tmp_path: Path,
                                                  capsys: pytest.CaptureFixture[str]) -> None:
     for arguments, words in ((['--out', 'x'], 'ROS 2 arguments follow --ros-args'),
-                             (['--ros-args', '-p', f'sheet:={tmp_path}/no.yaml'], 'No such file')):
+                             (['--ros-args', '-p', f'sheet:={tmp_path}/no.yaml'], 'No such file'),
+                             (['--ros-args', '-p', 'split:=-1.0'], 'split: -1.0 given')):
         with RecorderProcess(*arguments) as process:
             assert process.wait() == 2
             assert len(process.lines) == 1
