@@ -34,7 +34,7 @@ from antenna_drive.campaign.rig import (
 from antenna_drive.campaign.starts import check_bag
 from antenna_drive.campaign.trials import Outcome
 from antenna_drive.emulator.wiring import UNITS
-from antenna_drive.recording.mcap_format import read_bag
+from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.recording import RecordingError, RecordingWarning
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter

@@ -35,8 +35,10 @@ from antenna_drive.campaign.starts import check_bag
 from antenna_drive.campaign.trials import Outcome
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.emulator.wiring import UNITS
+from antenna_drive.recording.bag import METADATA
+from antenna_drive.recording.bag_reader import read_bag
+from antenna_drive.recording.bag_writer import FLUSH_S
 from antenna_drive.recording.csv_format import read_csv, write_csv
-from antenna_drive.recording.mcap_format import FLUSH_S, METADATA, read_bag
 from antenna_drive.recording.recording import Recording, RecordingError, RecordingWarning
 from antenna_drive.recording.replay import twin
 import numpy as np

@@ -31,9 +31,10 @@ from antenna_drive.lockstep.frame import FrameLayout
 from antenna_drive.machines.servo.bam import read_bam
 from antenna_drive.parameters.files import config_dir
 from antenna_drive.parameters.loading import load
+from antenna_drive.recording.bag_reader import read_bag
+from antenna_drive.recording.bag_writer import write_bag
 from antenna_drive.recording.csv_format import read_csv, write_csv
 from antenna_drive.recording.import_map import import_file, load_map
-from antenna_drive.recording.mcap_format import read_bag, write_bag
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import load_sheet, parse_sheet
 from antenna_drive.trial.scorecard import score

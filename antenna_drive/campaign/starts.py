@@ -24,7 +24,7 @@ from typing import Any
 from antenna_drive.campaign.rig import OBSERVER, random_settings, RECORDER, Rig
 from antenna_drive.campaign.trials import Outcome
 from antenna_drive.emulator.wiring import UNITS
-from antenna_drive.recording.mcap_format import read_bag
+from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.recording import RecordingError
 
 STEP = 1000

@@ -38,9 +38,9 @@ import argparse
 from pathlib import Path
 
 from antenna_drive.cli.reading import warnings_in_one_line
+from antenna_drive.recording.bag_writer import write_bag
 from antenna_drive.recording.csv_format import read_csv
 from antenna_drive.recording.import_map import import_file, load_map
-from antenna_drive.recording.mcap_format import write_bag
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -33,7 +33,7 @@ from antenna_drive.lockstep.frame import FrameLayout
 from antenna_drive.lockstep.readings import CHANGES_QOS
 from antenna_drive.lockstep.ros_link import FrameLink
 from antenna_drive.lockstep.serving import Serving
-from antenna_drive.recording.mcap_format import SPLIT_S
+from antenna_drive.recording.bag_writer import SPLIT_S
 from antenna_drive.recording.recorder import RunRecorder
 from antenna_drive.recording.recording import RecordingError
 from antenna_drive.recording.sheet import load_sheet

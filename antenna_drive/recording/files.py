@@ -43,7 +43,7 @@ def read_recording(path: str | Path, *, partial: bool = False) -> Recording:
         raise RecordingError(f'{path}: no such file or folder')
     if path.is_dir() or path.suffix == '.mcap':
         # CSV needs no library: the one for MCAP is asked for only where it is used
-        from antenna_drive.recording.mcap_format import read_bag
+        from antenna_drive.recording.bag_reader import read_bag
         return read_bag(path, partial=partial)
     if path.suffix != '.csv':
         raise RecordingError(f'{path}: no recording; allowed are a bag (a folder, or .mcap) '

@@ -27,7 +27,7 @@ from typing import Any
 
 from antenna_drive.lockstep.changes import CHANGES, is_record, SETTINGS
 from antenna_drive.recording.atomic import refuse_existing
-from antenna_drive.recording.mcap_format import BagWriter, SPLIT_S
+from antenna_drive.recording.bag_writer import BagWriter, SPLIT_S
 from antenna_drive.recording.recording import nanoseconds
 from antenna_drive.recording.runs import STEP
 from antenna_drive.recording.sheet import TestSheet

@@ -21,7 +21,7 @@ from typing import Any
 
 from antenna_drive.limits import CHANGE
 from antenna_drive.lockstep.changes import CHANGES, read_record, SETTINGS, write_record
-from antenna_drive.recording.mcap_format import read_bag
+from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.recorder import RunRecorder
 from hypothesis import given, strategies as st
 import pytest

@@ -21,7 +21,7 @@ import random
 import tracemalloc
 
 from antenna_drive.lockstep.following import Follower
-from antenna_drive.recording.mcap_format import read_bag
+from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.recorder import RunRecorder
 from antenna_drive.recording.recording import Change, RecordingError
 from antenna_drive.recording.sheet import parse_sheet

@@ -23,9 +23,10 @@ from typing import Any
 
 from antenna_drive.errors import UserError
 from antenna_drive.limits import BAG, BAG_RECORD, CSV_LINE, Limit, LIMITS, SAMPLES, SIGNALS, TEXT
+from antenna_drive.recording.bag import MESSAGE_DEFINITION, MESSAGE_TYPE
+from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.csv_format import read_csv
 from antenna_drive.recording.import_map import import_file, load_map
-from antenna_drive.recording.mcap_format import MESSAGE_DEFINITION, MESSAGE_TYPE, read_bag
 from antenna_drive.recording.recording import RecordingError
 import lz4.frame
 from mcap.records import Chunk

@@ -20,7 +20,8 @@ import os
 from pathlib import Path
 import stat
 
-from antenna_drive.recording.mcap_format import BagWriter, read_bag
+from antenna_drive.recording.bag_reader import read_bag
+from antenna_drive.recording.bag_writer import BagWriter
 from antenna_drive.recording.recording import RecordingWarning
 from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader

@@ -30,9 +30,10 @@ import warnings
 from antenna_drive.campaign.mutating import mutations, POISON
 from antenna_drive.campaign.readers import MAP, one_recording, SHEET
 from antenna_drive.errors import UserError
+from antenna_drive.recording.bag_reader import read_bag
+from antenna_drive.recording.bag_writer import write_bag
 from antenna_drive.recording.csv_format import read_csv, write_csv
 from antenna_drive.recording.import_map import import_file, load_map
-from antenna_drive.recording.mcap_format import read_bag, write_bag
 from antenna_drive.recording.recording import RecordingError, RecordingWarning
 from antenna_drive.recording.sheet import load_sheet
 from hypothesis import given, HealthCheck, settings, strategies as st

@@ -19,7 +19,8 @@ import math
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.recording.mcap_format import BagWriter, read_bag
+from antenna_drive.recording.bag_reader import read_bag
+from antenna_drive.recording.bag_writer import BagWriter
 from antenna_drive.recording.recording import RecordingWarning
 import pytest
 from rosbags.highlevel import AnyReader

@@ -27,8 +27,9 @@ import sys
 from typing import Any
 
 from antenna_drive.emulator.wiring import signal_names
-from antenna_drive.recording import mcap_format
-from antenna_drive.recording.mcap_format import BagWriter, read_bag, write_bag
+from antenna_drive.recording import bag_writer
+from antenna_drive.recording.bag_reader import read_bag
+from antenna_drive.recording.bag_writer import BagWriter, write_bag
 from antenna_drive.recording.recording import (
     Change, Channel, Recording, RecordingError, RecordingWarning, unit_of,
 )
@@ -246,7 +247,7 @@ def test_an_error_of_the_caller_leaves_a_bag_that_is_safe_so_far(tmp_path: Path)
 
 WRITE_FOREVER = """
 import itertools, json, resource, signal, sys
-from antenna_drive.recording.mcap_format import BagWriter
+from antenna_drive.recording.bag_writer import BagWriter
 from antenna_drive.recording.recording import RecordingError
 path, limit = sys.argv[1], int(sys.argv[2])
 if limit:
@@ -401,7 +402,7 @@ def test_negative_time_stamps_are_refused_before_anything_is_written(tmp_path: P
 
 def test_a_newer_format_is_not_guessed_at(recording: Recording, tmp_path: Path,
                                           monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mcap_format, 'FORMAT_VERSION', '2')
+    monkeypatch.setattr(bag_writer, 'FORMAT_VERSION', '2')
     write_bag(recording.between(0, 0.01), tmp_path / 'run')
     monkeypatch.undo()
     with pytest.raises(RecordingError, match='newer version'):

@@ -1,0 +1,428 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Writes bags, step by step while the drive runs, or whole.
+
+A chunk is complete at least every half second, and a reader needs nothing behind it: whatever
+happens to the process that records, at most the last half second is lost. Should the power fail,
+what was synchronised is safe, see `sync_s`. The index of the chunks is held in memory until its
+file ends, so a long bag has several storage files, see `split_s`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+import io
+import math
+import os
+from pathlib import Path
+import struct
+import time
+from types import TracebackType
+from typing import Any
+
+from antenna_drive.drafts import drafted
+from antenna_drive.recording.atomic import new_folder, refuse_existing, refuse_io, sync_folder
+from antenna_drive.recording.bag import (
+    CDR_HEADER, CHANGE, CONFIGURATION, FORMAT, FORMAT_VERSION, MESSAGE_DEFINITION, MESSAGE_HASH,
+    MESSAGE_TYPE, METADATA, NOTES, ROSBAG2_VERSION,
+)
+from antenna_drive.recording.plain import freeze, PlainDataError, to_json
+from antenna_drive.recording.recording import NANOSECONDS, Recording, RecordingError
+from antenna_drive.recording.sheet import dump_sheet, FILE_NAME, TestSheet
+from mcap.writer import Writer
+import numpy as np
+import yaml
+
+FLUSH_S = 0.5
+SPLIT_S = 600.0
+
+_CDR_FLOAT64 = struct.Struct('<4sd')
+
+
+@dataclass
+class _StorageFile:
+    """A file of a bag: when it was begun [s], its messages by topic, its time stamps [ns]."""
+
+    name: str
+    began_at: float
+    counts: list[int]
+    first_ns: int = 2**63 - 1
+    last_ns: int = -1
+
+    def reaches(self, time_ns: int) -> None:
+        """Note the time stamp of a sample."""
+        self.first_ns = min(time_ns, self.first_ns)
+        self.last_ns = max(time_ns, self.last_ns)
+
+    def span(self) -> dict[str, Any]:
+        """Return what rosbag2 says of it."""
+        count = sum(self.counts)
+        return {
+            'starting_time': {'nanoseconds_since_epoch': self.first_ns if count else 0},
+            'duration': {'nanoseconds': self.last_ns - self.first_ns if count else 0},
+            'message_count': count}
+
+
+class BagWriter:
+    """
+    Writes a rosbag2 folder while the drive runs.
+
+    Use it as a context manager, or call `close`; without that the samples are safe up to the
+    last `flush`, but metadata.yaml is missing and `read_bag` wants to be told that a part is
+    enough.
+
+    Attributes
+    ----------
+    path : the folder
+    written_ns : time stamp of the last sample that is safe in the file [ns], -1 if none is
+    synced_ns : time stamp of the last sample that a failure of the power leaves [ns], -1 if none
+
+    """
+
+    def __init__(self, path: str | Path, signals: Mapping[str, str], *,
+                 configuration: Mapping[str, Any] | None = None, sheet: TestSheet | None = None,
+                 notes: Mapping[str, Any] | None = None, stem: str | None = None,
+                 flush_s: float = FLUSH_S, sync_s: float | None = None,
+                 split_s: float = SPLIT_S, clock: Callable[[], float] = time.monotonic) -> None:
+        """
+        Create the folder and write everything that is known before the first sample.
+
+        Parameters
+        ----------
+        path
+            folder that is not there yet
+        signals
+            name -> unit of each signal that will come
+        configuration, sheet, notes
+            see Recording
+        stem
+            first part of the storage file's name; the folder's name if not given
+        flush_s
+            longest time between chunks, by `clock` and by the time stamps [s]
+        sync_s
+            after how long by `clock` the disk is made to hold what was written [s], at the end
+            of a chunk; None for at the end of each storage file only
+        split_s
+            how long a storage file becomes, by `clock` or by the time stamps [s]
+        clock
+            a steady clock [s]
+
+        Raises
+        ------
+        RecordingError : the folder exists already or cannot be written, or an argument is no
+            plain data
+
+        """
+        self.path = Path(path)
+        self.written_ns = self.synced_ns = -1
+        self._sync_s = sync_s
+        self._signals = dict(signals)
+        self._flush_s = flush_s
+        self._flush_ns = flush_s * NANOSECONDS
+        self._clock = clock
+        self._flushed_at = self._synced_at = clock()
+        self._flushed_ns = 0
+        self._split_s = split_s
+        self._files: list[_StorageFile] = []
+        self._stem = stem or self.path.name
+        attachments = {
+            CONFIGURATION: _as_json(configuration or {}), NOTES: _as_json(notes or {}),
+            FILE_NAME: dump_sheet(sheet or TestSheet())}
+        refuse_existing(self.path)
+        try:
+            self.path.mkdir(parents=True)
+            self._raw, self._writer = self._opened()
+        except FileExistsError:
+            raise RecordingError(f'{self.path}: exists already; choose another name') from None
+        except OSError as error:
+            raise refuse_io(self.path, error) from error
+        with self._guarded() as writer:
+            self._topics = self._begin(writer, attachments)
+            if sync_s is not None:
+                self._sync()
+
+    def _opened(self) -> tuple[io.FileIO, Writer | None]:
+        """Return the next storage file and what writes it."""
+        name = f'{self._stem}_{len(self._files)}.mcap'
+        # not buffered: after a full disk nothing may be written that was held back; the writer
+        # buffers a raw stream itself
+        raw = (self.path / name).open('xb', buffering=0)
+        self._files.append(_StorageFile(name, self._clock(), [0] * len(self._signals)))
+        return raw, Writer(raw, enable_data_crcs=True)
+
+    def _begin(self, writer: Writer, attachments: Mapping[str, str]) -> list[int]:
+        writer.start('ros2')
+        writer.add_metadata(FORMAT, {'format': FORMAT_VERSION})
+        for name, text in attachments.items():
+            kind = 'application/yaml' if name.endswith('.yaml') else 'application/json'
+            writer.add_attachment(0, 0, name, kind, text.encode())
+        schema = writer.register_schema(MESSAGE_TYPE, 'ros2msg', MESSAGE_DEFINITION)
+        topics = [
+            writer.register_channel(f'/{name}', 'cdr', schema, {
+                'offered_qos_profiles': '', 'unit': unit, 'topic_type_hash': MESSAGE_HASH})
+            for name, unit in self._signals.items()]
+        writer.flush()
+        return topics
+
+    def __enter__(self) -> BagWriter:
+        """Return the writer."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        """Close the bag; after an error leave it as it is, safe up to the last chunk."""
+        if kind is None:
+            self.close()
+        else:
+            self._abandon()
+
+    @property
+    def closed(self) -> bool:
+        """Tell whether the bag was closed or given up after an error."""
+        return self._writer is None
+
+    def write(self, step: int, time_ns: int, values: Sequence[float]) -> None:
+        """
+        Write one sample of every signal.
+
+        Parameters
+        ----------
+        step
+            number of the macro-step
+        time_ns
+            simulated time [ns], not negative
+        values
+            one for each signal, in their order; NaN where there is no sample
+
+        Raises
+        ------
+        RecordingError : the disk is full or the file cannot be written, a value is infinite, or
+            the time is negative; what was written before stays readable
+
+        """
+        if not 0 <= time_ns < 2**63 or any(map(math.isinf, values)):
+            for i, value in enumerate(values):
+                self._check(i, time_ns, value)
+        if self._full:
+            self._split()
+        pack, sequence, file = _CDR_FLOAT64.pack, step & 0xFFFFFFFF, self._files[-1]
+        with self._guarded() as writer:
+            for i, value in enumerate(values):
+                if value == value:
+                    writer.add_message(self._topics[i], time_ns, pack(CDR_HEADER, value),
+                                       time_ns, sequence)
+                    file.counts[i] += 1
+        file.reaches(time_ns)
+        if (time_ns - self._flushed_ns >= self._flush_ns
+                or self._clock() - self._flushed_at >= self._flush_s):
+            self.flush()
+
+    def add(self, signal: int, step: int, time_ns: int, value: float) -> None:
+        """
+        Write one sample of one signal, given by its place in the order of the signals.
+
+        Raises
+        ------
+        RecordingError : see `write`
+
+        """
+        self._check(signal, time_ns, value)
+        with self._guarded() as writer:
+            writer.add_message(self._topics[signal], time_ns,
+                               _CDR_FLOAT64.pack(CDR_HEADER, value), time_ns, step & 0xFFFFFFFF)
+        self._files[-1].counts[signal] += 1
+        self._files[-1].reaches(time_ns)
+
+    def _check(self, signal: int, time_ns: int, value: float) -> None:
+        if math.isinf(value) or not 0 <= time_ns < 2**63:
+            name = list(self._signals)[signal]
+            raise RecordingError(f'{name}: {value} at {time_ns} ns cannot be recorded; allowed '
+                                 'are finite numbers and times that are not negative')
+
+    def know(self, configuration: Mapping[str, Any]) -> None:
+        """
+        Write down the configuration, in the place of what was known of it before.
+
+        Raises
+        ------
+        RecordingError : the file cannot be written, or it is no plain data
+
+        """
+        text = _as_json(configuration)
+        with self._guarded() as writer:
+            writer.add_attachment(0, 0, CONFIGURATION, 'application/json', text.encode())
+
+    def change(self, step: int, unit: str, values: Mapping[str, Any]) -> None:
+        """
+        Write down that tuning parameters changed and act from `step` on.
+
+        Raises
+        ------
+        RecordingError : the file cannot be written, or a value is no plain data
+
+        """
+        text = _as_json(values, f'{unit}: ')
+        with self._guarded() as writer:
+            writer.add_metadata(CHANGE, {'step': str(step), 'unit': unit, 'values': text})
+        self.flush()
+
+    def flush(self) -> None:
+        """
+        Complete the chunk, so that what was written so far survives this process.
+
+        Raises
+        ------
+        RecordingError : the disk is full or the file cannot be written
+
+        """
+        with self._guarded() as writer:
+            writer.flush()
+        self.written_ns = max(file.last_ns for file in self._files)
+        self._flushed_ns = max(self.written_ns, 0)
+        self._flushed_at = self._clock()
+        if self._sync_s is not None and self._flushed_at - self._synced_at >= self._sync_s:
+            with self._guarded():
+                self._sync()
+
+    @property
+    def _full(self) -> bool:
+        """Tell whether the storage file is long enough; looked at when a chunk is complete."""
+        file = self._files[-1]
+        return file.last_ns >= 0 and self.written_ns == file.last_ns and (
+            self._flushed_at - file.began_at >= self._split_s
+            or file.last_ns - file.first_ns >= self._split_s * NANOSECONDS)
+
+    def _split(self) -> None:
+        """Complete the storage file, and begin the next one."""
+        with self._guarded() as writer:
+            self._complete(writer)
+            self._raw.close()
+            self._raw, self._writer = self._opened()
+        with self._guarded() as writer:
+            self._topics = self._begin(writer, {})
+
+    def _complete(self, writer: Writer) -> None:
+        writer.finish()
+        writer.flush()
+        self.written_ns = max(file.last_ns for file in self._files)
+        self._sync()
+
+    def _sync(self) -> None:
+        os.fsync(self._raw.fileno())
+        sync_folder(self.path)
+        self.synced_ns = self.written_ns
+        self._synced_at = self._clock()
+
+    def close(self) -> None:
+        """
+        Complete the bag: the index, and metadata.yaml, which ROS 2 tools look for.
+
+        Raises
+        ------
+        RecordingError : the disk is full or the file cannot be written
+
+        """
+        if self._writer is None:
+            return
+        with self._guarded() as writer:
+            self._complete(writer)
+            with drafted(self.path / METADATA) as stream:
+                stream.write(self._metadata().encode())
+            sync_folder(self.path)
+        self._abandon()
+
+    def _metadata(self) -> str:
+        whole = _StorageFile(
+            '', 0.0, [sum(own) for own in zip(*(f.counts for f in self._files), strict=True)],
+            min(f.first_ns for f in self._files), max(f.last_ns for f in self._files))
+        topics = [
+            {'topic_metadata': {
+                'name': f'/{name}', 'type': MESSAGE_TYPE, 'serialization_format': 'cdr',
+                'offered_qos_profiles': '', 'type_description_hash': MESSAGE_HASH},
+             'message_count': number}
+            for name, number in zip(self._signals, whole.counts, strict=True)]
+        text: str = yaml.safe_dump({'rosbag2_bagfile_information': {
+            'version': ROSBAG2_VERSION, 'storage_identifier': 'mcap',
+            **whole.span(),
+            'topics_with_message_count': topics,
+            'compression_format': '', 'compression_mode': '',
+            'relative_file_paths': [file.name for file in self._files],
+            'files': [{'path': file.name, **file.span()} for file in self._files],
+            'custom_data': {}, 'ros_distro': 'unknown'}}, sort_keys=False)
+        return text
+
+    @contextmanager
+    def _guarded(self) -> Iterator[Writer]:
+        """Turn a full disk into one line that says how much is safe, and end the writing."""
+        if self._writer is None:
+            raise RecordingError(f'{self.path}: the bag is closed')
+        try:
+            yield self._writer
+        except OSError as error:
+            self._abandon()
+            safe = self.written_ns
+            so_far = (f'recorded up to {safe / NANOSECONDS:.3f} s' if safe >= 0
+                      else 'nothing recorded')
+            raise RecordingError(
+                f'{self.path}: cannot be written, {error.strerror or error}; {so_far}') from error
+
+    def _abandon(self) -> None:
+        self._writer = None
+        self._raw.close()
+
+
+def _as_json(content: Mapping[str, Any], prefix: str = '') -> str:
+    try:
+        return to_json(freeze(dict(content)))
+    except PlainDataError as error:
+        raise RecordingError(f'{prefix}{error}') from None
+
+
+def write_bag(recording: Recording, path: str | Path) -> None:
+    """
+    Write a recording as a rosbag2 folder, whole or not at all.
+
+    Raises
+    ------
+    RecordingError : the folder exists already or cannot be written, or a time stamp is negative,
+        which ROS 2 does not know (`Recording.shift` moves it)
+
+    """
+    path = Path(path)
+    if recording.start_ns < 0:
+        raise RecordingError(f'{path}: a time stamp of {recording.start_ns / NANOSECONDS:g} s is '
+                             'negative; a bag has none')
+    with new_folder(path) as folder:
+        with BagWriter(folder / 'bag', {n: recording[n].unit for n in recording},
+                       configuration=recording.configuration, sheet=recording.sheet,
+                       notes=recording.notes, stem=path.name, flush_s=math.inf) as bag:
+            for change in recording.changes:
+                bag.change(change.step, change.unit, change.values)
+            channels = list(recording.channels.values())
+            if channels:
+                which = np.repeat(np.arange(len(channels)), [len(c) for c in channels])
+                stamps = np.concatenate([c.time_ns for c in channels])
+                values = np.concatenate([c.values for c in channels])
+                steps = np.concatenate([np.arange(len(c)) for c in channels])
+                order = np.lexsort((which, stamps))
+                for signal, step, stamp, value in zip(
+                        which[order].tolist(), steps[order].tolist(), stamps[order].tolist(),
+                        values[order].tolist(), strict=True):
+                    bag.add(signal, step, stamp, value)
+        for file in (folder / 'bag').iterdir():
+            file.rename(folder / file.name)
+        (folder / 'bag').rmdir()
