@@ -21,7 +21,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from statistics import fmean
 import time
 from typing import Any
 
@@ -29,25 +28,14 @@ from antenna_drive.diagnosis import localisation, unknown_input, verdict
 from antenna_drive.diagnosis.blas import one_blas_thread
 from antenna_drive.diagnosis.by_label import by_label
 from antenna_drive.diagnosis.check import check_machine
+from antenna_drive.diagnosis.conclusion import concluded
 from antenna_drive.diagnosis.confusability import could_hide
-from antenna_drive.diagnosis.elimination import (
-    backward_elimination, forward_selection, settled_rivals,
-)
-from antenna_drive.diagnosis.evidence import Evidence
-from antenna_drive.diagnosis.full_fits import FullFits
-from antenna_drive.diagnosis.held_out import held_out, refuted, shows_no_gap
 from antenna_drive.diagnosis.hypothesis import Hypothesis
-from antenna_drive.diagnosis.intervals import (
-    deviations, doubts, inflation, jackknife, values_with_intervals,
-)
-from antenna_drive.diagnosis.interventions import (
-    interventions, lines as lines_of_labels, simplified,
-)
-from antenna_drive.diagnosis.lack_of_fit import lack_of_fit, remainders, residual_tests
-from antenna_drive.diagnosis.least_squares import LeastSquares
+from antenna_drive.diagnosis.intervals import values_with_intervals
+from antenna_drive.diagnosis.interventions import interventions, lines as lines_of_labels
+from antenna_drive.diagnosis.lack_of_fit import remainders, residual_tests
 from antenna_drive.diagnosis.machine import Machine
 from antenna_drive.diagnosis.rivals import rivals_of
-from antenna_drive.diagnosis.search import Search
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
 
 Progress = Callable[[float, str], None]
@@ -191,58 +179,20 @@ def diagnose(machine: Machine, progress: Progress = lambda share, doing: None, t
 def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Settings,
               limits: Mapping[str, float]) -> Diagnosis:
     began = time.monotonic()
-    whole = LeastSquares(machine, settings=settings)
-
-    def told(share: float, doing: str) -> None:
-        progress(0.9 * share, doing)
-
-    fits = FullFits(whole, told, threads)
-    found = fits.compared(*Search(whole, told, threads).run())
-    hypotheses, best = backward_elimination(fits, found, settings)
-    hypotheses, best = settled_rivals(fits, hypotheses, best, settings)
-    hypotheses, best = forward_selection(fits, hypotheses, best, settings)
-    # the noise is that of the motion that was found
-    problem = fits.problem
-    hypotheses, best = simplified(problem, hypotheses, best)
-    none, best = hypotheses[0], best.with_jacobian(problem)
-    progress(0.9, 'withheld data')
-    reach = held_out(problem, none, best, threads)
-    notes = list(machine.notes)
-    if refuted(reach):
-        notes.append(f'{" + ".join(best.effects)} fits best and closes nothing of the gap of '
-                     'withheld data: no effect is named')
-        hypotheses, best = [none], none.with_jacobian(problem)
-        reach = held_out(problem, none, best, threads)
-    inflated = dict(zip((p.name for p in best.state.parameters),
-                        inflation(problem, best.state).tolist(), strict=True))
-    usual = fmean([inflated[p.name] for p, _ in best.values] or [1.0])
-    between_tests = _between_tests(reach)
-    beyond = (settings.interval.sure_of_all if shows_no_gap(reach, settings)
-              else settings.interval.sure)
-
-    def deviating(hypothesis: Hypothesis) -> dict[str, float]:
-        return deviations(
-            hypothesis, lambda name: inflated.get(name, usual), settings.interval,
-            between_tests if hypothesis.effects == best.effects else {})
-
-    def judged(hypothesis: Hypothesis) -> Hypothesis:
-        return replace(hypothesis, doubts=doubts(
-            hypothesis, deviating(hypothesis), (none.cost - hypothesis.cost) / usual,
-            settings.interval, beyond))
-
-    hypotheses, best = [judged(h) for h in hypotheses], judged(best)
-    if best.unsure:
-        notes.append(f'{" + ".join(sorted(best.unsure))}: not surely beyond the tolerance, and '
-                     'therefore not named')
-    evidence = _evidence(
-        problem, hypotheses, best, reach['explained_fraction']['ci95'][1], usual)
-    decision = evidence.decide(settings)
-    lack = decision.lack
+    found = concluded(machine, progress, threads, settings)
+    if courses := found.implausible_courses:
+        progress(0.9, 'again without ' + ' and '.join(courses))
+        plain = concluded(machine.without(courses), lambda share, doing: None, threads, settings)
+        if plain.decision.word != 'unknown_effect':
+            found = replace(plain, notes=(
+                *plain.notes, f'{" + ".join(courses)} fits as no real one would, and what is '
+                'named explains the gap without it'))
+    problem, none, best, decision = found.problem, found.none, found.best, found.decision
     places: Sequence[unknown_input.Place] = ()
     located: Sequence[localisation.Located] = ()
     if decision.word in ('unknown_effect', 'partly_explained'):
         progress(0.95, 'where an unknown input may act')
-        located, places = localisation.of_the_unknown(problem, none.state, lack)
+        located, places = localisation.of_the_unknown(problem, none.state, decision.lack)
     if decision.word in ('explained', 'partly_explained'):
         located = localisation.of_effects(problem, decision.answers, none.state, best.state)
     result = {
@@ -250,42 +200,24 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         'statements': verdict.statements(decision, best),
         'where': list(located),
         'which': verdict.which(decision, settings.verdict, lambda answer: values_with_intervals(
-            answer, deviating(answer))),
-        'also_seen': verdict.also_seen(hypotheses, settings, evidence.inflation),
+            answer, found.deviating(answer))),
+        'also_seen': verdict.also_seen(
+            found.evidence.hypotheses, settings, found.evidence.inflation),
         'confusable': decision.confusable,
-        'how_far': reach,
+        'how_far': found.reach,
         'could_hide': could_hide(problem, none.state) if decision.word == 'no_gap' else [],
         'remains': remainders(problem, best.state, limits),
-        'residual_tests': residual_tests(problem, best.state, lack),
+        'residual_tests': residual_tests(problem, best.state, decision.lack),
         'may_enter_at': [vars(place) for place in places if place.evidence > 0.0],
-        'fits': evidence.as_data(),
+        'fits': found.evidence.as_data(),
         'planning': {
-            'inflation': evidence.inflation, **machine.planning,
+            'inflation': found.evidence.inflation, **machine.planning,
             'rivals': [rival.as_data() for rival in rivals_of(
-                problem, decision.answers, evidence.inflation, settings.planning)]},
+                problem, decision.answers, found.evidence.inflation, settings.planning)]},
         'seconds': time.monotonic() - began,
-        'notes': notes,
+        'notes': [*machine.notes, *found.notes],
     }
     if labels := interventions(problem, none, best, threads):
         result['labels'] = labels
     progress(1.0, 'done')
     return Diagnosis(result, problem.machine, none, best)
-
-
-def _between_tests(reach: Mapping[str, Any]) -> dict[str, float]:
-    """Return how much the effects' numbers depend on the tests, by name."""
-    values: dict[str, list[float]] = {}
-    for fold in reach['folds']:
-        for name, value in fold['values'].items():
-            values.setdefault(name, []).append(value)
-    return {name: jackknife(found) for name, found in values.items()}
-
-
-def _evidence(problem: LeastSquares, hypotheses: Sequence[Hypothesis], best: Hypothesis,
-              explained: float | None, inflated: float) -> Evidence:
-    """Return the fits with what each leaves; only that of the best has converged."""
-    top = verdict.best(hypotheses, problem.settings)
-    raw = problem.residuals({})
-    return Evidence(hypotheses, [
-        lack_of_fit(problem, raw, best if h is top else h, explained if h.named else None)
-        for h in hypotheses], inflated)

@@ -197,14 +197,15 @@ def values_with_intervals(hypothesis: Hypothesis,
 
 
 def doubts(hypothesis: Hypothesis, deviating: Mapping[str, float], gained: float,
-           settings: IntervalSettings, beyond: float) -> dict[str, float]:
+           settings: IntervalSettings, beyond: float,
+           own_gains: Mapping[str, float] = MappingProxyType({})) -> dict[str, float]:
     """
     Return the probability that effects are within their tolerances after all, by effect.
 
     An effect is in doubt if it exceeds its tolerance by few of its own deviations. The strongest
     one is not in doubt where the effects gain much. A weaker one has to exceed its tolerance by
-    more, because it may only mend the form of the strongest. A course over time is judged as a
-    whole, elsewhere.
+    more, or to gain more, because it may only mend the form of the strongest. A course over time
+    is judged as a whole, elsewhere.
 
     Parameters
     ----------
@@ -216,6 +217,8 @@ def doubts(hypothesis: Hypothesis, deviating: Mapping[str, float], gained: float
         thresholds
     beyond
         excess of the strongest effect, in deviations, at which its doubt is a half
+    own_gains
+        what an effect gains beside the others [half chi-square], over the inflation, where known
 
     """
     point = hypothesis.state.point()
@@ -225,12 +228,13 @@ def doubts(hypothesis: Hypothesis, deviating: Mapping[str, float], gained: float
               if effect in hypothesis.beyond_tolerance and not form.is_course}
     strongest = max(excess.values(), default=0.0)
 
-    def certainty(value: float) -> float:
+    def certainty(effect: str, value: float) -> float:
         if value < strongest:
-            return value / max(beyond, settings.sure_of_partner)
+            return max(value / max(beyond, settings.sure_of_partner),
+                       own_gains.get(effect, 0.0) / settings.partner_sure_by_gain)
         return max(value / beyond, gained / settings.sure_by_gain)
 
-    return {effect: 1.0 / (1.0 + certainty(value) ** settings.sure_slope)
+    return {effect: 1.0 / (1.0 + certainty(effect, value) ** settings.sure_slope)
             for effect, value in excess.items()}
 
 

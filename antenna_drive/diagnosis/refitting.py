@@ -30,10 +30,10 @@ import numpy as np
 
 @dataclass(frozen=True)
 class SharedJacobian:
-    """Derivatives by the nuisances, and by the parameters of courses by their form's name."""
+    """Derivatives by the nuisances, and by the parameters of each course."""
 
     nuisances: Jacobian
-    courses: Mapping[str, Jacobian]
+    courses: Mapping[Form, Jacobian]
 
 
 def shared_jacobian(problem: LeastSquares, state: FitState,
@@ -46,19 +46,19 @@ def shared_jacobian(problem: LeastSquares, state: FitState,
     courses = {form for h in hypotheses for form in h.forms if form.is_course}
     return SharedJacobian(
         problem.jacobian(point, problem.machine.nuisances, residual, False, steps),
-        {form.name: problem.jacobian(point, form.parameters, residual, False, steps)
+        {form: problem.jacobian(point, form.parameters, residual, False, steps)
          for form in courses})
 
 
 def refitted(problem: LeastSquares, shared: SharedJacobian, iterations: int,
              hypothesis: Hypothesis) -> Hypothesis:
     """Fit a hypothesis to another problem, with shared derivatives."""
-    courses = [form for form in hypothesis.forms if form.name in shared.courses]
+    courses = [form for form in hypothesis.forms if form in shared.courses]
     point, nuisances = taken_over(problem.machine, hypothesis.state.point(), hypothesis.forms,
                                   problem.machine.nuisances)
     state = problem.start_from(
         (*nuisances, *(p for form in courses for p in form.parameters)),
-        np.column_stack([shared.nuisances, *(shared.courses[f.name] for f in courses)]),
+        np.column_stack([shared.nuisances, *(shared.courses[form] for form in courses)]),
         [p for form in hypothesis.forms if form not in courses for p in form.parameters],
         point)
     return replace(hypothesis, state=problem.fit(state, iterations))

@@ -37,6 +37,7 @@ TRIAL_11 = 'trial 11'
 TRIALS_9_TO_11 = 'trials 9 to 11'
 TRIAL_12 = 'trial 12'
 TRIALS_9_TO_12 = 'trials 9 to 12'
+TRIALS_12_AND_13 = 'trials 12 and 13'
 WILD = 'wild practice cases'
 
 
@@ -276,6 +277,9 @@ class IntervalSettings:
         TRIALS_9_TO_12)
     sure_by_gain: float = _setting(
         400.0, 'half chi-square', 'gain from which the strongest effect is named anyway', TRIAL_12)
+    partner_sure_by_gain: float = _setting(
+        2000.0, 'half chi-square', 'the same for a weaker effect, of its gain beside the rest',
+        TRIALS_12_AND_13)
     sure_slope: float = _setting(
         3.0, '1', 'how sharply the doubt of an effect falls at these limits', TRIALS_9_TO_12)
 

@@ -252,9 +252,12 @@ def unknown_probability(lack: LackOfFit, settings: VerdictSettings) -> float:
         return slope * math.log(max(value / tipping, 1e-3))
 
     # an effect of another form than the true one leaves little; no effect has no such excuse
-    left = logit(lack.left, settings.left, settings.left_slope) if lack.named else 0.0
-    slow = _logistic(logit(lack.slow_excess, settings.slow, settings.slow_slope) + left)
-    regular = _logistic(logit(lack.regular, settings.regular, settings.regular_slope) + left)
+    left = logit(lack.left, settings.left, settings.left_slope)
+    slow = _logistic(logit(lack.slow_excess, settings.slow, settings.slow_slope)
+                     + (left if lack.named else 0.0))
+    # however regular: the little that such a form leaves repeats itself with the motion
+    regular = (_logistic(logit(lack.regular, settings.regular, settings.regular_slope))
+               * (_logistic(left) if lack.named else 1.0))
     # a sensor may be noisier than its sheet says; but noise does not shrink with an effect
     fast = (_logistic(logit(lack.fast, settings.fast, settings.fast_slope))
             * _logistic(logit(lack.fast_left, settings.fast_left, settings.fast_left_slope)))

@@ -114,6 +114,57 @@ def test_an_effect_that_the_catalogue_lacks_is_unknown() -> None:
     assert 'heater.step' in body.effects, 'the machine itself stays as it is'
 
 
+class Weather(Form):
+    """A course over time that is so free that it may be no weather, and here it is none."""
+
+    def implausibility(self, point: Point) -> float:
+        """Return how little it looks like weather."""
+        return 3.0
+
+
+class BodyInWeather(Body):
+    """A body to which weather may do what the heater does, and a little more."""
+
+    def __init__(self, truth: Mapping[str, float]) -> None:
+        super().__init__(truth)
+        weather = Weather('', tuple(
+            Parameter(f'air.weather.{name}', 'K', -1.0, 1.0, 1e-3)
+            for name in ('step', 'wave')), is_course=True)
+        self.effects = {**self.effects, 'air.weather': Effect(
+            'air.weather', 'air', 'a cause', 'a look', (weather,))}
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return what both thermometers say."""
+        return weathered(super().predict(point, experiment), point)
+
+
+def weathered(plain: FloatArray, point: Point) -> FloatArray:
+    weather = (point.get('air.weather.step', 0.0) * (TIME >= 4.0)
+               + point.get('air.weather.wave', 0.0) * np.sin(2.0 * TIME))
+    return plain + weather[:, np.newaxis]
+
+
+def of_weather(step: float, wave: float) -> BodyInWeather:
+    """Return a body that was recorded in such a course."""
+    body, point = BodyInWeather({}), {'air.weather.step': step, 'air.weather.wave': wave}
+    for experiment in body.experiments:
+        experiment.measured[:] = weathered(experiment.measured, point)
+    return body
+
+
+def test_what_explains_the_gap_without_an_implausible_course_is_named() -> None:
+    result = diagnose(of_weather(-0.3, 0.008)).result
+    assert result['which'][0]['effects'] == ['heater.step']
+    assert result['which'][0]['probability'] > 0.9
+    assert 'air.weather fits as no real one would' in result['notes'][-1]
+
+
+def test_an_implausible_course_that_nothing_else_explains_is_unknown() -> None:
+    result = diagnose(of_weather(-0.3, 0.2)).result
+    assert result['verdict'] == 'unknown_effect'
+    assert result['which'][1]['effects'] == ['air.weather']
+
+
 def noisier(body: Body, level: float, corner_hz: float, seed: int = 9) -> Body:
     """Return a body whose thermometers have slow noise beside their own."""
     random = np.random.default_rng(seed)

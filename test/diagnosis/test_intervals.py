@@ -186,6 +186,21 @@ def test_the_strongest_effect_of_those_that_gain_much_is_named_however_wide_its_
     assert both['part_0.effect'] < 0.2 and both['part_1.effect'] > 0.5
 
 
+def test_a_weaker_effect_that_gains_very_much_beside_the_strongest_is_named() -> None:
+    fit, deviating = with_sizes(2.0, 0.2)
+
+    def doubt(own: float) -> float:
+        return doubts(fit, deviating, 0.0, SETTINGS, SETTINGS.sure,
+                      {'part_1.effect': own})['part_1.effect']
+
+    limit = SETTINGS.partner_sure_by_gain
+    assert doubt(0.0) > 0.9
+    assert doubt(limit) == pytest.approx(0.5)
+    assert doubt(10.0 * limit) < 0.01
+    # what would do for the strongest is not enough
+    assert doubt(SETTINGS.sure_by_gain) > 0.9
+
+
 def test_a_weaker_effect_must_exceed_its_tolerance_by_more() -> None:
     between = 0.1 * (1.0 + 0.5 * (SETTINGS.sure + SETTINGS.sure_of_partner))
     fit, deviating = with_sizes(2.0, between)

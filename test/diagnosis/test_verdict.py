@@ -90,6 +90,12 @@ def test_noise_is_not_unknown_and_hum_is() -> None:
         0.0, 0.0, fast=16.0, fast_left=0.02)) < SETTINGS.least_unknown + 0.05
 
 
+def test_a_regular_residual_counts_beside_a_named_effect_by_the_share_that_it_is() -> None:
+    assert unknown(LackOfFit(0.0, 0.0, regular=0.9, named=False)) > 0.7
+    assert unknown(LackOfFit(0.0, 0.3, regular=0.9)) > 0.6
+    assert unknown(LackOfFit(0.0, 0.01, regular=0.9)) < 0.2
+
+
 def test_one_sample_beside_its_edge_is_no_noise() -> None:
     """A single sample that is off by any amount makes a signal neither loud nor slow."""
     z: FloatArray = np.random.default_rng(0).normal(size=2000)

@@ -1,0 +1,163 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""From the machine's fits to what is decided about them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from statistics import fmean
+from typing import Any
+
+from antenna_drive.diagnosis import verdict
+from antenna_drive.diagnosis.elimination import (
+    backward_elimination, forward_selection, settled_rivals,
+)
+from antenna_drive.diagnosis.evidence import Evidence
+from antenna_drive.diagnosis.full_fits import FullFits
+from antenna_drive.diagnosis.held_out import held_out, refuted, shows_no_gap
+from antenna_drive.diagnosis.hypothesis import Hypothesis
+from antenna_drive.diagnosis.intervals import deviations, doubts, inflation, jackknife
+from antenna_drive.diagnosis.interventions import simplified
+from antenna_drive.diagnosis.lack_of_fit import lack_of_fit
+from antenna_drive.diagnosis.least_squares import LeastSquares
+from antenna_drive.diagnosis.machine import Machine
+from antenna_drive.diagnosis.search import Search
+from antenna_drive.diagnosis.settings import Settings
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """
+    What the fits to a machine's experiments say.
+
+    Attributes
+    ----------
+    problem : the whole experiments, with the noise of the motion that was found
+    none, best : the hypotheses without and with the likeliest effects
+    reach : how far the gap shrinks, see `held_out`
+    deviating : returns the standard deviations of the values of a hypothesis' effects
+    evidence : every fit, with what each leaves
+    decision : what follows from it
+    notes : for people
+
+    """
+
+    problem: LeastSquares
+    none: Hypothesis
+    best: Hypothesis
+    reach: dict[str, Any]
+    deviating: Callable[[Hypothesis], dict[str, float]]
+    evidence: Evidence
+    decision: verdict.Decision
+    notes: tuple[str, ...]
+
+    @property
+    def implausible_courses(self) -> tuple[str, ...]:
+        """
+        Return the effects of the best hypothesis whose course over time looks like no real one.
+
+        A course has so many numbers that it imitates what moves the same part.
+        """
+        if self.decision.lack.implausibility <= 1.0:
+            return ()
+        return tuple(effect for effect, form in zip(
+            self.best.effects, self.best.forms, strict=True) if form.is_course)
+
+
+def concluded(machine: Machine, progress: Callable[[float, str], None], threads: int,
+              settings: Settings) -> Conclusion:
+    """
+    Fit, select, withhold and decide.
+
+    Parameters
+    ----------
+    machine, progress, threads, settings
+        see `diagnosis.diagnose`
+
+    """
+    whole = LeastSquares(machine, settings=settings)
+
+    def told(share: float, doing: str) -> None:
+        progress(0.9 * share, doing)
+
+    fits = FullFits(whole, told, threads)
+    found = fits.compared(*Search(whole, told, threads).run())
+    hypotheses, best = backward_elimination(fits, found, settings)
+    hypotheses, best = settled_rivals(fits, hypotheses, best, settings)
+    hypotheses, best = forward_selection(fits, hypotheses, best, settings)
+    # the noise is that of the motion that was found
+    problem = fits.problem
+    hypotheses, best = simplified(problem, hypotheses, best)
+    none, best = hypotheses[0], best.with_jacobian(problem)
+    progress(0.9, 'withheld data')
+    reach = held_out(problem, none, best, threads)
+    notes = []
+    if refuted(reach):
+        notes.append(f'{" + ".join(best.effects)} fits best and closes nothing of the gap of '
+                     'withheld data: no effect is named')
+        hypotheses, best = [none], none.with_jacobian(problem)
+        reach = held_out(problem, none, best, threads)
+    inflated = dict(zip((p.name for p in best.state.parameters),
+                        inflation(problem, best.state).tolist(), strict=True))
+    usual = fmean([inflated[p.name] for p, _ in best.values] or [1.0])
+    between_tests = _between_tests(reach)
+    beyond = (settings.interval.sure_of_all if shows_no_gap(reach, settings)
+              else settings.interval.sure)
+
+    def deviating(hypothesis: Hypothesis) -> dict[str, float]:
+        return deviations(
+            hypothesis, lambda name: inflated.get(name, usual), settings.interval,
+            between_tests if hypothesis.effects == best.effects else {})
+
+    def judged(hypothesis: Hypothesis) -> Hypothesis:
+        own = _own_gains(hypothesis, hypotheses)
+        return replace(hypothesis, doubts=doubts(
+            hypothesis, deviating(hypothesis), (none.cost - hypothesis.cost) / usual,
+            settings.interval, beyond, {effect: gain / usual for effect, gain in own.items()}))
+
+    hypotheses, best = [judged(h) for h in hypotheses], judged(best)
+    if best.unsure:
+        notes.append(f'{" + ".join(sorted(best.unsure))}: not surely beyond the tolerance, and '
+                     'therefore not named')
+    evidence = _evidence(
+        problem, hypotheses, best, reach['explained_fraction']['ci95'][1], usual)
+    return Conclusion(problem, none, best, reach, deviating, evidence,
+                      evidence.decide(settings), tuple(notes))
+
+
+def _between_tests(reach: Mapping[str, Any]) -> dict[str, float]:
+    """Return how much the effects' numbers depend on the tests, by name."""
+    values: dict[str, list[float]] = {}
+    for fold in reach['folds']:
+        for name, value in fold['values'].items():
+            values.setdefault(name, []).append(value)
+    return {name: jackknife(found) for name, found in values.items()}
+
+
+def _own_gains(hypothesis: Hypothesis, hypotheses: Sequence[Hypothesis]) -> dict[str, float]:
+    """Return what each effect gains over the fit without it, where there is one."""
+    cost = {frozenset(h.effects): h.cost for h in hypotheses}
+    rests = {effect: frozenset(hypothesis.effects) - {effect} for effect in hypothesis.effects}
+    return {effect: cost[rest] - hypothesis.cost for effect, rest in rests.items() if rest in cost}
+
+
+def _evidence(problem: LeastSquares, hypotheses: Sequence[Hypothesis], best: Hypothesis,
+              explained: float | None, inflated: float) -> Evidence:
+    """Return the fits with what each leaves; only that of the best has converged."""
+    top = verdict.best(hypotheses, problem.settings)
+    raw = problem.residuals({})
+    return Evidence(hypotheses, [
+        lack_of_fit(problem, raw, best if h is top else h, explained if h.named else None)
+        for h in hypotheses], inflated)
