@@ -63,23 +63,14 @@ class Conclusion:
     decision: verdict.Decision
     notes: tuple[str, ...]
 
-    @property
-    def implausible_courses(self) -> tuple[str, ...]:
-        """
-        Return the effects of the best hypothesis whose course over time looks like no real one.
-
-        A course has so many numbers that it imitates what moves the same part.
-        """
-        if self.decision.lack.implausibility <= 1.0:
-            return ()
-        return tuple(effect for effect, form in zip(
-            self.best.effects, self.best.forms, strict=True) if form.is_course)
-
 
 def concluded(machine: Machine, progress: Callable[[float, str], None], threads: int,
               settings: Settings) -> Conclusion:
     """
     Fit, select, withhold and decide.
+
+    A course over time has so many numbers that it imitates what moves the same part. Where it
+    looks like no real one, everything is done without it first.
 
     Parameters
     ----------
@@ -96,6 +87,13 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
     found = fits.compared(*Search(whole, told, threads).run())
     hypotheses, best = backward_elimination(fits, found, settings)
     hypotheses, best = settled_rivals(fits, hypotheses, best, settings)
+    if courses := _implausible_courses(best):
+        progress(0.9, 'again without ' + ' and '.join(courses))
+        plain = concluded(machine.without(courses), lambda share, doing: None, threads, settings)
+        if plain.decision.word != 'unknown_effect':
+            return replace(plain, notes=(
+                *plain.notes, f'{" + ".join(courses)} fits as no real one would, and what is '
+                'named explains the gap without it'))
     hypotheses, best = forward_selection(fits, hypotheses, best, settings)
     # the noise is that of the motion that was found
     problem = fits.problem
@@ -135,6 +133,13 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
         problem, hypotheses, best, reach['explained_fraction']['ci95'][1], usual)
     return Conclusion(problem, none, best, reach, deviating, evidence,
                       evidence.decide(settings), tuple(notes))
+
+
+def _implausible_courses(best: Hypothesis) -> tuple[str, ...]:
+    """Return the effects whose course over time looks like no real one."""
+    point = best.state.point()
+    return tuple(effect for effect, form in zip(best.effects, best.forms, strict=True)
+                 if form.is_course and form.implausibility(point) > 1.0)
 
 
 def _between_tests(reach: Mapping[str, Any]) -> dict[str, float]:

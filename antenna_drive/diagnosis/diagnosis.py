@@ -20,7 +20,7 @@ It works on any `Machine`; the antenna's is in `machines.antenna`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 import time
 from typing import Any
 
@@ -180,13 +180,6 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
               limits: Mapping[str, float]) -> Diagnosis:
     began = time.monotonic()
     found = concluded(machine, progress, threads, settings)
-    if courses := found.implausible_courses:
-        progress(0.9, 'again without ' + ' and '.join(courses))
-        plain = concluded(machine.without(courses), lambda share, doing: None, threads, settings)
-        if plain.decision.word != 'unknown_effect':
-            found = replace(plain, notes=(
-                *plain.notes, f'{" + ".join(courses)} fits as no real one would, and what is '
-                'named explains the gap without it'))
     problem, none, best, decision = found.problem, found.none, found.best, found.decision
     places: Sequence[unknown_input.Place] = ()
     located: Sequence[localisation.Located] = ()
