@@ -92,8 +92,8 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
         plain = concluded(machine.without(courses), lambda share, doing: None, threads, settings)
         if plain.decision.word != 'unknown_effect':
             return replace(plain, notes=(
-                *plain.notes, f'{" + ".join(courses)} fits as no real one would, and what is '
-                'named explains the gap without it'))
+                *plain.notes, f'{" + ".join(courses)} fits best, as no real one would: the '
+                'verdict is without it'))
     hypotheses, best = forward_selection(fits, hypotheses, best, settings)
     # the noise is that of the motion that was found
     problem = fits.problem

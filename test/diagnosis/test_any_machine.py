@@ -156,7 +156,7 @@ def test_what_explains_the_gap_without_an_implausible_course_is_named() -> None:
     result = diagnose(of_weather(-0.3, 0.008)).result
     assert result['which'][0]['effects'] == ['heater.step']
     assert result['which'][0]['probability'] > 0.9
-    assert 'air.weather fits as no real one would' in result['notes'][-1]
+    assert 'air.weather fits best, as no real one would' in result['notes'][-1]
 
 
 def test_an_implausible_course_that_nothing_else_explains_is_unknown() -> None:
