@@ -53,8 +53,8 @@ def run(args: argparse.Namespace) -> int:
     from antenna_drive.emulator.units import overridden
     from antenna_drive.parameters import load
     from antenna_drive.recording.atomic import refuse_existing
-    from antenna_drive.recording.csv_format import write_csv
     from antenna_drive.recording.bag_writer import write_bag
+    from antenna_drive.recording.csv_format import write_csv
     from antenna_drive.recording.runs import from_run
 
     check_options(args, duration=Entry('s', 1e-5, 1e9), every=Entry('', 1, whole=True))

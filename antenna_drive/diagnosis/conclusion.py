@@ -88,12 +88,13 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
     hypotheses, best = backward_elimination(fits, found, settings)
     hypotheses, best = settled_rivals(fits, hypotheses, best, settings)
     if courses := _implausible_courses(best):
-        progress(0.9, 'again without ' + ' and '.join(courses))
-        plain = concluded(machine.without(courses), lambda share, doing: None, threads, settings)
+        names = ' + '.join(courses)
+        plain = concluded(machine.without(courses), lambda share, doing: progress(
+            0.9, f'without {names}: {doing}'), threads, settings)
         if plain.decision.word != 'unknown_effect':
             return replace(plain, notes=(
-                *plain.notes, f'{" + ".join(courses)} fits best, as no real one would: the '
-                'verdict is without it'))
+                *plain.notes,
+                f'{names} fits best, as no real one would: the verdict is without it'))
     hypotheses, best = forward_selection(fits, hypotheses, best, settings)
     # the noise is that of the motion that was found
     problem = fits.problem
@@ -119,11 +120,12 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
             hypothesis, lambda name: inflated.get(name, usual), settings.interval,
             between_tests if hypothesis.effects == best.effects else {})
 
+    costs = _least_costs(hypotheses)
+
     def judged(hypothesis: Hypothesis) -> Hypothesis:
-        own = _own_gains(hypothesis, hypotheses)
         return replace(hypothesis, doubts=doubts(
             hypothesis, deviating(hypothesis), (none.cost - hypothesis.cost) / usual,
-            settings.interval, beyond, {effect: gain / usual for effect, gain in own.items()}))
+            settings.interval, beyond, _own_gains(hypothesis, costs, usual)))
 
     hypotheses, best = [judged(h) for h in hypotheses], judged(best)
     if best.unsure:
@@ -151,11 +153,18 @@ def _between_tests(reach: Mapping[str, Any]) -> dict[str, float]:
     return {name: jackknife(found) for name, found in values.items()}
 
 
-def _own_gains(hypothesis: Hypothesis, hypotheses: Sequence[Hypothesis]) -> dict[str, float]:
-    """Return what each effect gains over the fit without it, where there is one."""
-    cost = {frozenset(h.effects): h.cost for h in hypotheses}
+def _least_costs(hypotheses: Sequence[Hypothesis]) -> dict[frozenset[str], float]:
+    """Return the least cost of a fit with each set of effects."""
+    return {frozenset(h.effects): h.cost
+            for h in sorted(hypotheses, key=lambda h: h.cost, reverse=True)}
+
+
+def _own_gains(hypothesis: Hypothesis, costs: Mapping[frozenset[str], float],
+               inflated: float) -> dict[str, float]:
+    """Return what each effect gains over the best fit without it, where there is one."""
     rests = {effect: frozenset(hypothesis.effects) - {effect} for effect in hypothesis.effects}
-    return {effect: cost[rest] - hypothesis.cost for effect, rest in rests.items() if rest in cost}
+    return {effect: (costs[rest] - hypothesis.cost) / inflated
+            for effect, rest in rests.items() if rest in costs}
 
 
 def _evidence(problem: LeastSquares, hypotheses: Sequence[Hypothesis], best: Hypothesis,

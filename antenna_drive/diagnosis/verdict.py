@@ -255,7 +255,7 @@ def unknown_probability(lack: LackOfFit, settings: VerdictSettings) -> float:
     left = logit(lack.left, settings.left, settings.left_slope)
     slow = _logistic(logit(lack.slow_excess, settings.slow, settings.slow_slope)
                      + (left if lack.named else 0.0))
-    # however regular: the little that such a form leaves repeats itself with the motion
+    # what such a form leaves repeats itself with the motion, and counts by its share only
     regular = (_logistic(logit(lack.regular, settings.regular, settings.regular_slope))
                * (_logistic(left) if lack.named else 1.0))
     # a sensor may be noisier than its sheet says; but noise does not shrink with an effect

@@ -23,7 +23,9 @@ before the recorder has the last.
 out    folder to write, not there yet; recording_DATE_TIME if not given. A drive that begins a
        new run gets a new folder, my_run_run_2 and so on.
 sheet  a test sheet, which goes into the bag.
-sync   after how many seconds the disk is made to hold what was written; if not given, at the end.
+sync   after how many seconds the disk is made to hold what was written; if not given, at the end
+       of each storage file.
+split  after how many seconds the next storage file begins; 600 if not given, 0 for one file.
 
 Ctrl-C completes the bag. A recorder that is killed loses the last half second at most; where the
 power fails, what was written since the last sync may be lost.

@@ -90,7 +90,7 @@ class _RecorderNode:
         out = str(node.declare_parameter('out', default).value)
         sheet = str(node.declare_parameter('sheet', '').value or '')
         sync_s = _seconds(node, 'sync', 0.0, 'after how long the disk is made to hold what was '
-                          'written, 0: at the end')
+                          'written, 0: at the end of each storage file')
         split_s = _seconds(node, 'split', SPLIT_S, 'after how long the next storage file begins, '
                            '0: never')
         self._recorder = RunRecorder(

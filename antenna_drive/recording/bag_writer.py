@@ -139,6 +139,7 @@ class BagWriter:
         self._split_s = split_s
         self._files: list[_StorageFile] = []
         self._stem = stem or self.path.name
+        self._writer: Writer | None = None
         attachments = {
             CONFIGURATION: _as_json(configuration or {}), NOTES: _as_json(notes or {}),
             FILE_NAME: dump_sheet(sheet or TestSheet())}
@@ -155,7 +156,7 @@ class BagWriter:
             if sync_s is not None:
                 self._sync()
 
-    def _opened(self) -> tuple[io.FileIO, Writer | None]:
+    def _opened(self) -> tuple[io.FileIO, Writer]:
         """Return the next storage file and what writes it."""
         name = f'{self._stem}_{len(self._files)}.mcap'
         # not buffered: after a full disk nothing may be written that was held back; the writer
@@ -291,12 +292,16 @@ class BagWriter:
         """
         with self._guarded() as writer:
             writer.flush()
-        self.written_ns = max(file.last_ns for file in self._files)
+        self.written_ns = self._last_ns
         self._flushed_ns = max(self.written_ns, 0)
         self._flushed_at = self._clock()
         if self._sync_s is not None and self._flushed_at - self._synced_at >= self._sync_s:
             with self._guarded():
                 self._sync()
+
+    @property
+    def _last_ns(self) -> int:
+        return max(file.last_ns for file in self._files)
 
     @property
     def _full(self) -> bool:
@@ -318,7 +323,7 @@ class BagWriter:
     def _complete(self, writer: Writer) -> None:
         writer.finish()
         writer.flush()
-        self.written_ns = max(file.last_ns for file in self._files)
+        self.written_ns = self._last_ns
         self._sync()
 
     def _sync(self) -> None:
@@ -348,7 +353,7 @@ class BagWriter:
     def _metadata(self) -> str:
         whole = _StorageFile(
             '', 0.0, [sum(own) for own in zip(*(f.counts for f in self._files), strict=True)],
-            min(f.first_ns for f in self._files), max(f.last_ns for f in self._files))
+            min(f.first_ns for f in self._files), self._last_ns)
         topics = [
             {'topic_metadata': {
                 'name': f'/{name}', 'type': MESSAGE_TYPE, 'serialization_format': 'cdr',
