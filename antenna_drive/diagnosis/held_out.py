@@ -64,6 +64,8 @@ class _Fold:
     reasons : why the others cannot be judged, by id
     names, values : numbers of the judged effects
     drawn : `after` with draws of these numbers, shape (draws, n, c); None if none can be judged
+    local_minimum : whether the fit to the training data stopped where other values of all
+        parameters fit the same data better
 
     """
 
@@ -78,6 +80,7 @@ class _Fold:
     names: tuple[str, ...] = ()
     values: FloatArray = field(default_factory=lambda: np.zeros(0))
     drawn: FloatArray | None = None
+    local_minimum: bool = False
 
 
 def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads: int = 1,
@@ -124,7 +127,8 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads:
         'held_out': _HALVES if single else what,
         'folds': [{'withheld': fold.name, 'judged': list(fold.judged),
                    'values': dict(zip(fold.names, fold.values.tolist(), strict=True)),
-                   'cannot_be_judged': dict(fold.reasons)} for fold in folds],
+                   'cannot_be_judged': dict(fold.reasons),
+                   'local_minimum': fold.local_minimum} for fold in folds],
         'training_began_at': [
             {'effect': effect, 'form': form.name, 'values': form.start}
             for effect, form in zip(best.effects, best.forms, strict=True)
@@ -234,6 +238,16 @@ class _Judge:
             part.parameters(self._nuisances), unaided.jacobian, own, point)
         return trained(part, state.parameters, point, [state.jacobian], self._settings)
 
+    def _in_local_minimum(self, problem: LeastSquares, part: Part, found: FitState) -> bool:
+        """
+        Return whether the fit to all tests suits the training data better than their own fit.
+
+        Nothing is taken from it: the effect is judged as the training data have it.
+        """
+        everywhere = problem.start(found.parameters, self._best.state.point(),
+                                   self._with.for_part(part, found.parameters))
+        return everywhere.cost < found.cost - self._settings.penalty.parameter
+
     def _undetermined(self, problem: LeastSquares, unaided: FitState, found: FitState,
                       ) -> tuple[dict[str, str], FloatArray]:
         """Return the reasons why effects cannot be judged, by id, and the fit's covariance."""
@@ -283,7 +297,8 @@ class _Judge:
         training, unaided, found = self._trained(part)
         reasons, posterior = self._undetermined(training, unaided, found)
         reasons = {**reasons, **self._unseen_labels(testing, part)}
-        fold = replace(fold, reasons=reasons)
+        fold = replace(fold, reasons=reasons,
+                       local_minimum=self._in_local_minimum(training, part, found))
         judged = self._judged(reasons)
         if not judged:
             return fold
@@ -326,7 +341,8 @@ class _Judge:
         if not self._best.effects:
             return fold
         reasons, posterior = self._undetermined(problem, unaided, found)
-        fold = replace(fold, reasons=reasons)
+        fold = replace(fold, reasons=reasons,
+                       local_minimum=self._in_local_minimum(problem, part, found))
         judged = self._judged(reasons)
         if not judged:
             return fold

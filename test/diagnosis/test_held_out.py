@@ -172,6 +172,28 @@ def test_a_limit_that_a_test_hardly_reaches_is_not_judged_there() -> None:
     assert found['explained_fraction']['value'] == pytest.approx(1.0, abs=1e-3)
 
 
+class Valleys(Ramp):
+    """A ramp whose slope grows to either side, and that says which side by a ripple."""
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return the ramp with its ripple."""
+        size = point.get(SIZE.name, 0.0)
+        return np.asarray((size + 0.5) ** 2 * self._shown[experiment]
+                          + 0.2 * size * np.sin(3.0 * TIME) + point.get('zero', 0.0))[:, None]
+
+
+@pytest.mark.parametrize('truth', [-2.0, 1.0])
+def test_a_training_that_stops_in_a_local_minimum_is_told(truth: float) -> None:
+    """A slope of 2.25 has a size of 1 or -2; from 0, the fit goes down to 1."""
+    machine = Valleys([0.0, 0.0, 0.0])
+    random = np.random.default_rng(4)
+    folds = judged(machine.with_experiments([replace(e, measured=machine.predict(
+        {SIZE.name: truth}, k) + 0.1 * random.normal(size=(TIME.size, 1)))
+        for k, e in enumerate(machine.experiments)]), truth)['folds']
+    assert [fold['values'][SIZE.name] for fold in folds] == pytest.approx([1.0] * 3, abs=0.1)
+    assert [fold['local_minimum'] for fold in folds] == [truth < 0.0] * 3
+
+
 def test_numbers_of_one_test_alone_are_not_judged() -> None:
     own = [replace(SIZE, experiment=0)]
     fraction = judged(Ramp([0.5, 0.5]), parameters=own)['explained_fraction']
