@@ -145,13 +145,9 @@ def _implausible_courses(best: Hypothesis) -> tuple[str, ...]:
 
 
 def _between_tests(reach: Mapping[str, Any]) -> dict[str, float]:
-    """
-    Return how much the effects' numbers depend on the tests, by name.
-
-    A training fit in a local minimum tells nothing of the tests.
-    """
+    """Return how much the effects' numbers depend on the tests, by name."""
     values: dict[str, list[float]] = {}
-    for fold in (fold for fold in reach['folds'] if not fold['local_minimum']):
+    for fold in reach['folds']:
         for name, value in fold['values'].items():
             values.setdefault(name, []).append(value)
     return {name: jackknife(found) for name, found in values.items()}

@@ -64,8 +64,6 @@ class _Fold:
     reasons : why the others cannot be judged, by id
     names, values : numbers of the judged effects
     drawn : `after` with draws of these numbers, shape (draws, n, c); None if none can be judged
-    local_minimum : whether the fit to the training data stopped where other values of all
-        parameters fit the same data better
 
     """
 
@@ -80,7 +78,6 @@ class _Fold:
     names: tuple[str, ...] = ()
     values: FloatArray = field(default_factory=lambda: np.zeros(0))
     drawn: FloatArray | None = None
-    local_minimum: bool = False
 
 
 def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads: int = 1,
@@ -127,8 +124,7 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads:
         'held_out': _HALVES if single else what,
         'folds': [{'withheld': fold.name, 'judged': list(fold.judged),
                    'values': dict(zip(fold.names, fold.values.tolist(), strict=True)),
-                   'cannot_be_judged': dict(fold.reasons),
-                   'local_minimum': fold.local_minimum} for fold in folds],
+                   'cannot_be_judged': dict(fold.reasons)} for fold in folds],
         'training_began_at': [
             {'effect': effect, 'form': form.name, 'values': form.start}
             for effect, form in zip(best.effects, best.forms, strict=True)
@@ -242,24 +238,27 @@ class _Judge:
         """
         Return whether the fit to all tests suits the training data better than their own fit.
 
-        Nothing is taken from it: the effect is judged as the training data have it.
+        That is all it is used for: an effect is judged with the values of the training data.
         """
         everywhere = problem.start(found.parameters, self._best.state.point(),
                                    self._with.for_part(part, found.parameters))
         return everywhere.cost < found.cost - self._settings.penalty.parameter
 
-    def _undetermined(self, problem: LeastSquares, unaided: FitState, found: FitState,
-                      ) -> tuple[dict[str, str], FloatArray]:
+    def _undetermined(self, problem: LeastSquares, part: Part, unaided: FitState,
+                      found: FitState) -> tuple[dict[str, str], FloatArray]:
         """Return the reasons why effects cannot be judged, by id, and the fit's covariance."""
         own = [v for p, v in zip(found.parameters, inflation(problem, found), strict=True)
                if p.name in self._effects]
         posterior = covariance(found, fmean(own or [1.0]), self._settings.interval)
         price = self._settings.penalty.parameter
         gain = unaided.cost - found.cost
+        stuck = self._in_local_minimum(problem, part, found)
         reasons = {}
         for effect, form in zip(self._best.effects, self._best.forms, strict=True):
             if form.is_course or any(p.experiment is not None for p in form.parameters):
                 reasons[effect] = 'its numbers belong to one test alone'
+            elif stuck:
+                reasons[effect] = 'the fit to the training data stopped in a local minimum'
             elif gain < price:
                 reasons[effect] = (f'the training data gain {max(gain, 0.0):.1f} by the effects, '
                                    f'less than the price of a parameter, {price:g}')
@@ -295,10 +294,9 @@ class _Judge:
             return fold
         part = Part(machine, [i for i, group in enumerate(groups) if group != groups[k]])
         training, unaided, found = self._trained(part)
-        reasons, posterior = self._undetermined(training, unaided, found)
+        reasons, posterior = self._undetermined(training, part, unaided, found)
         reasons = {**reasons, **self._unseen_labels(testing, part)}
-        fold = replace(fold, reasons=reasons,
-                       local_minimum=self._in_local_minimum(training, part, found))
+        fold = replace(fold, reasons=reasons)
         judged = self._judged(reasons)
         if not judged:
             return fold
@@ -340,9 +338,8 @@ class _Judge:
                           _shaped(own, own.residuals(unaided.point())))
         if not self._best.effects:
             return fold
-        reasons, posterior = self._undetermined(problem, unaided, found)
-        fold = replace(fold, reasons=reasons,
-                       local_minimum=self._in_local_minimum(problem, part, found))
+        reasons, posterior = self._undetermined(problem, part, unaided, found)
+        fold = replace(fold, reasons=reasons)
         judged = self._judged(reasons)
         if not judged:
             return fold
