@@ -236,9 +236,9 @@ class _Judge:
 
     def _in_local_minimum(self, problem: LeastSquares, part: Part, found: FitState) -> bool:
         """
-        Return whether the fit to all tests suits the training data better than their own fit.
+        Return whether the fit to all tests suits a part of them better than the part's own fit.
 
-        That is all it is used for: an effect is judged with the values of the training data.
+        An effect is judged with the values of its training data all the same.
         """
         everywhere = problem.start(found.parameters, self._best.state.point(),
                                    self._with.for_part(part, found.parameters))
@@ -302,15 +302,18 @@ class _Judge:
             return fold
         held = {**dict.fromkeys(self._effects, 0.0), **self._start,
                 **{p.name: found.value(p.name) for p in judged}}
-        # the nuisances begin where training has left them, too
+        # the nuisances begin where training has left them
         own = {p.name for p in testing.parameters(self._nuisances) if p.experiment is not None}
         begin = {name: value for name, value in found.point().items() if name not in own}
         state = self._fitted(testing, self._nuisances, held, {**begin, **held}, self._with)
-        if problem.leaves_much(state):
-            # or where the fit without effects has left them
-            again = self._fitted(testing, self._nuisances, held, {**bare.point(), **held},
-                                 self._with)
-            state = min(state, again, key=lambda fit: fit.cost)
+        # or where the fit without effects has left them, or that of all tests with the effects
+        others = [bare.point()] if problem.leaves_much(state) else []
+        if self._in_local_minimum(LeastSquares(testing.holding(held), settings=self._settings),
+                                  testing, state):
+            others.append(self._best.state.point())
+        state = min([state, *(
+            self._fitted(testing, self._nuisances, held, {**other, **held}, self._with)
+            for other in others)], key=lambda fit: fit.cost)
         point = {**held, **state.point()}
         fold = replace(fold, reasons={**reasons, **self._unseen(problem, point, state.residual,
                                                                 reasons)})

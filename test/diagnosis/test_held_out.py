@@ -203,6 +203,40 @@ def test_what_a_training_in_a_local_minimum_taught_is_not_judged(truth: float) -
     assert not refuted(found)
 
 
+class Burst(Ramp):
+    """A ramp whose zero moves ten readings of the last test far away, most of all near -0.85."""
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return the ramp with its burst."""
+        zero = point.get('zero', 0.0)
+        burst = 100.0 * (experiment == 2) * ((TIME > 9.0) & (TIME < 9.1))
+        moved = 0.5 * zero + 1.45 * np.exp(-((zero + 0.85) / 0.1) ** 2)
+        return np.asarray(
+            point.get(SIZE.name, 0.0) * self._shown[experiment] + moved * burst)[:, None]
+
+
+def test_the_offsets_of_a_withheld_test_leave_a_local_minimum() -> None:
+    """
+    A zero of -0.9 makes the burst. From 0, a fit goes to the upper bound, which is too near.
+
+    Only training without the last test has no burst to be led astray by. A robust level of what
+    is left hardly sees the ten readings.
+    """
+    machine = Burst([0.0, 0.0, 0.0])
+    zero = Parameter('zero', '1', -1.0, 0.5, 1e-3, 0.5)
+    truth = {SIZE.name: 0.5, 'zero': -0.9}
+    random = np.random.default_rng(4)
+    problem = LeastSquares(machine.with_experiments([replace(e, measured=machine.predict(
+        truth, k) + 0.1 * random.normal(size=(TIME.size, 1)))
+        for k, e in enumerate(machine.experiments)]))
+    found = held_out(
+        problem, Hypothesis((), (), problem.fit(problem.start([zero], {}), 20)),
+        Hypothesis((EFFECT.id,), EFFECT.forms, problem.start([zero, SIZE], truth)))
+    assert [fold['judged'] for fold in found['folds']] == [[], [], ['spring.rate']]
+    assert found['after'] == pytest.approx(1.0, abs=0.03)
+    assert found['explained_fraction']['value'] == pytest.approx(1.0, abs=1e-3)
+
+
 def test_numbers_of_one_test_alone_are_not_judged() -> None:
     own = [replace(SIZE, experiment=0)]
     fraction = judged(Ramp([0.5, 0.5]), parameters=own)['explained_fraction']
