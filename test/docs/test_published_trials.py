@@ -31,6 +31,13 @@ COLUMNS = {
     'overconfident_outside': 'named above 0.9 instead of unknown', 'ece': 'calibration error',
     'size_coverage': 'intervals that hold the size', 'size_error_median': 'median error of a size',
     'closed_held_back_median': 'closed on a fourth recording, median'}
+# beginnings of the rows of the table of tame trials
+ROWS = {
+    'top1': 'true effect first', 'top3': 'true effect in the first three',
+    'within_set': 'true effect in what', 'pairs_both': 'both of a pair',
+    'no_gap_on_none': '`no_gap`', 'auroc_unknown': 'AUROC', 'overconfident_outside': 'a catalogue',
+    'ece': 'expected', 'explained_fraction_median': 'median explained',
+    'seconds_median': 'median time'}
 TITLE = '| trial | one effect, named first |'
 
 
@@ -54,3 +61,16 @@ def test_figures_of_a_wild_trial_are_those_of_its_cases(page: str, file: str, na
             stated = re.match(r'[\d.]+', row[titles.index(title)])
             assert stated is not None
             assert float(stated.group()) == pytest.approx(figures[key], abs=0.005001), title
+
+
+@pytest.mark.parametrize('key', ROWS)
+def test_figures_of_a_tame_trial_are_those_of_its_cases(key: str) -> None:
+    figures = score(read_scored(DOCS / 'trials' / 'tame_5.jsonl'))
+    text = (DOCS / 'trials' / 'README.md').read_text(encoding='utf-8')
+    table = text[text.index('| figure (95 % interval) |'):].split('\n\n')[0].splitlines()
+    titles, _, *rows = [[cell.strip() for cell in line.strip('|').split('|')] for line in table]
+    [row] = [row for row in rows if row[0].startswith(ROWS[key])]
+    stated = re.match(r'[\d.]+', row[titles.index('5')])
+    assert stated is not None
+    assert float(stated.group()) == pytest.approx(
+        figures[key], abs=0.5001 if key == 'seconds_median' else 0.005001)
