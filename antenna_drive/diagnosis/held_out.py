@@ -234,25 +234,24 @@ class _Judge:
             part.parameters(self._nuisances), unaided.jacobian, own, point)
         return trained(part, state.parameters, point, [state.jacobian], self._settings)
 
-    def _in_local_minimum(self, problem: LeastSquares, part: Part, found: FitState) -> bool:
+    def _in_local_minimum(self, problem: LeastSquares, found: FitState) -> bool:
         """
-        Return whether the fit to all tests suits a part of them better than the part's own fit.
+        Return whether the values of the fit to all tests fit some tests better than `found` does.
 
-        An effect is judged with the values of its training data all the same.
+        Those values have seen what is withheld. A training fit takes nothing from them.
         """
-        everywhere = problem.start(found.parameters, self._best.state.point(),
-                                   self._with.for_part(part, found.parameters))
-        return everywhere.cost < found.cost - self._settings.penalty.parameter
+        of_all = problem.start(found.parameters, self._best.state.point(), found.base_jacobian)
+        return of_all.cost < found.cost - self._settings.penalty.parameter
 
-    def _undetermined(self, problem: LeastSquares, part: Part, unaided: FitState,
-                      found: FitState) -> tuple[dict[str, str], FloatArray]:
+    def _undetermined(self, problem: LeastSquares, unaided: FitState, found: FitState,
+                      ) -> tuple[dict[str, str], FloatArray]:
         """Return the reasons why effects cannot be judged, by id, and the fit's covariance."""
         own = [v for p, v in zip(found.parameters, inflation(problem, found), strict=True)
                if p.name in self._effects]
         posterior = covariance(found, fmean(own or [1.0]), self._settings.interval)
         price = self._settings.penalty.parameter
         gain = unaided.cost - found.cost
-        stuck = self._in_local_minimum(problem, part, found)
+        stuck = self._in_local_minimum(problem, found)
         reasons = {}
         for effect, form in zip(self._best.effects, self._best.forms, strict=True):
             if form.is_course or any(p.experiment is not None for p in form.parameters):
@@ -294,7 +293,7 @@ class _Judge:
             return fold
         part = Part(machine, [i for i, group in enumerate(groups) if group != groups[k]])
         training, unaided, found = self._trained(part)
-        reasons, posterior = self._undetermined(training, part, unaided, found)
+        reasons, posterior = self._undetermined(training, unaided, found)
         reasons = {**reasons, **self._unseen_labels(testing, part)}
         fold = replace(fold, reasons=reasons)
         judged = self._judged(reasons)
@@ -306,10 +305,10 @@ class _Judge:
         own = {p.name for p in testing.parameters(self._nuisances) if p.experiment is not None}
         begin = {name: value for name, value in found.point().items() if name not in own}
         state = self._fitted(testing, self._nuisances, held, {**begin, **held}, self._with)
-        # or where the fit without effects has left them, or that of all tests with the effects
+        # they begin again where the fit without effects has left them, or the fit to all tests
         others = [bare.point()] if problem.leaves_much(state) else []
-        if self._in_local_minimum(LeastSquares(testing.holding(held), settings=self._settings),
-                                  testing, state):
+        if self._in_local_minimum(
+                LeastSquares(testing.holding(held), settings=self._settings), state):
             others.append(self._best.state.point())
         state = min([state, *(
             self._fitted(testing, self._nuisances, held, {**other, **held}, self._with)
@@ -341,7 +340,7 @@ class _Judge:
                           _shaped(own, own.residuals(unaided.point())))
         if not self._best.effects:
             return fold
-        reasons, posterior = self._undetermined(problem, part, unaided, found)
+        reasons, posterior = self._undetermined(problem, unaided, found)
         fold = replace(fold, reasons=reasons)
         judged = self._judged(reasons)
         if not judged:

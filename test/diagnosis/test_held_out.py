@@ -72,6 +72,14 @@ def judged(machine: Machine, found: float | None = None,
     return held_out(problem, none, Hypothesis((effect.id,), effect.forms, state))
 
 
+def recorded(machine: Machine, truth: Point) -> Machine:
+    """Return a machine whose tests were recorded with these values, and with noise of 0.1."""
+    random = np.random.default_rng(4)
+    return machine.with_experiments([replace(e, measured=machine.predict(
+        truth, k) + 0.1 * random.normal(size=(TIME.size, 1)))
+        for k, e in enumerate(machine.experiments)])
+
+
 def test_an_effect_that_is_the_same_in_every_test_explains_all() -> None:
     found = judged(Ramp([0.5, 0.5, 0.5]))
     fraction = found['explained_fraction']
@@ -160,11 +168,7 @@ class Limited(Ramp):
 def test_a_limit_that_a_test_hardly_reaches_is_not_judged_there() -> None:
     """It ends 0.007 beyond the limit of 6; the derivative of its last samples is as of any."""
     machine = Limited([1.0, 1.0, 1.0], shows=(1.0, 1.0, 0.3005))
-    random = np.random.default_rng(4)
-    limited = machine.with_experiments([replace(e, measured=machine.predict(
-        {SIZE.name: -0.5}, k) + 0.1 * random.normal(size=(TIME.size, 1)))
-        for k, e in enumerate(machine.experiments)])
-    found = judged(limited)
+    found = judged(recorded(machine, {SIZE.name: -0.5}))
     assert [fold['judged'] for fold in found['folds']] == [
         ['spring.rate'], ['spring.rate'], []]
     assert found['folds'][2]['cannot_be_judged'] == {
@@ -189,11 +193,7 @@ def test_what_a_training_in_a_local_minimum_taught_is_not_judged(truth: float) -
 
     Only a training with the first test is led to -2 by its ripple.
     """
-    machine = Valleys([0.0, 0.0, 0.0])
-    random = np.random.default_rng(4)
-    found = judged(machine.with_experiments([replace(e, measured=machine.predict(
-        {SIZE.name: truth}, k) + 0.1 * random.normal(size=(TIME.size, 1)))
-        for k, e in enumerate(machine.experiments)]), truth)
+    found = judged(recorded(Valleys([0.0, 0.0, 0.0]), {SIZE.name: truth}), truth)
     stuck = {'spring.rate': 'the fit to the training data stopped in a local minimum'}
     assert [fold['cannot_be_judged'] for fold in found['folds']] == [
         stuck if truth < 0.0 else {}, {}, {}]
@@ -222,13 +222,9 @@ def test_the_offsets_of_a_withheld_test_leave_a_local_minimum() -> None:
     Only training without the last test has no burst to be led astray by. A robust level of what
     is left hardly sees the ten readings.
     """
-    machine = Burst([0.0, 0.0, 0.0])
     zero = Parameter('zero', '1', -1.0, 0.5, 1e-3, 0.5)
     truth = {SIZE.name: 0.5, 'zero': -0.9}
-    random = np.random.default_rng(4)
-    problem = LeastSquares(machine.with_experiments([replace(e, measured=machine.predict(
-        truth, k) + 0.1 * random.normal(size=(TIME.size, 1)))
-        for k, e in enumerate(machine.experiments)]))
+    problem = LeastSquares(recorded(Burst([0.0, 0.0, 0.0]), truth))
     found = held_out(
         problem, Hypothesis((), (), problem.fit(problem.start([zero], {}), 20)),
         Hypothesis((EFFECT.id,), EFFECT.forms, problem.start([zero, SIZE], truth)))
