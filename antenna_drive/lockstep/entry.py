@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+import faulthandler
 import os
 import signal
 import sys
@@ -41,6 +42,8 @@ if TYPE_CHECKING:
 
 # A node's parameter: a test sheet that its unit plays.
 SHEET = 'sheet'
+# A node that has been asked to end has ended after this [s], whatever holds it.
+_END_S = 3.0
 # Makes the unit of a node: its name, the wiring, configuration files, what else was given by name.
 MakeUnit = Callable[[str, 'Wiring', Sequence[str], Mapping[str, Any]], 'Unit']
 
@@ -192,6 +195,9 @@ class _Ending:
         if self._stop is None:
             # An exception could come up inside a library's callback and be swallowed there.
             os._exit(OK)
+        # A unit whose step does not return, or a middleware that hangs, would hold the process.
+        # The exit code is 1 then, and the log says where each thread was.
+        faulthandler.dump_traceback_later(_END_S, exit=True)
         self._stop()
 
     def by(self, stop: Callable[[], None]) -> None:

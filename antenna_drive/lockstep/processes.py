@@ -32,7 +32,7 @@ from antenna_drive.lockstep.entry import choose_transport
 from antenna_drive.lockstep.placement import hasten, machine_is_idle
 from antenna_drive.programs import PARENT
 
-# Nodes end within two seconds of a signal; after this something is wrong with them.
+# Nodes end within three seconds of a signal, whatever holds them.
 END_PATIENCE_S = 5.0
 
 Parameter = float | int | bool | str | Sequence[float] | Sequence[str]

@@ -147,7 +147,7 @@ def test_changes_refusals_and_foreign_frames_in_one_run(exchange: str) -> None:
     assert_same_bits(samples, want)
     assert not np.array_equal(want, in_process(
         steps, 2e-3, given={'test_signal.rate.waveform': 'external'})), 'the changes must count'
-    assert codes == dict.fromkeys(UNITS, 0)
+    assert codes == dict.fromkeys(UNITS, 0), logs
     assert not any('Traceback' in log for log in logs.values()), logs
 
 

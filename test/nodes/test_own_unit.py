@@ -68,6 +68,38 @@ def test_own_torque_share_joins_the_other_four(monkeypatch: pytest.MonkeyPatch) 
     assert codes == dict.fromkeys(UNITS, 0)
 
 
+STUCK = """
+import threading
+from antenna_drive.lockstep.entry import run_unit
+from own_torque_share.constant_bias import ConstantBias
+
+
+class Stuck(ConstantBias):
+    def step(self, k, inputs):
+        if k == 100:
+            threading.Event().wait()
+        return super().step(k, inputs)
+
+
+run_unit(Stuck())
+"""
+
+
+@pytest.mark.usefixtures('fresh_domain')
+def test_own_unit_that_does_not_return_is_ended_and_says_where_it_was() -> None:
+    path = os.pathsep.join([str(EXAMPLES / 'own_torque_share'), *sys.path])
+    with Recorder('watcher') as recorder, Watch() as watch, DriveProcesses(
+            {'test_signal': {'run.observers': ['watcher']}},
+            commands={'torque_share': (sys.executable, '-c', STUCK)},
+            environment={'PYTHONPATH': path}) as processes:
+        watch.until(lambda: recorder.steps >= 100, 'step 100')
+        watch.until(lambda: 'torque_share' in watch.value('motor_1', 'waiting for'), 'a wait')
+        codes = processes.stop()
+        log = processes.log('torque_share')
+    assert codes == {**dict.fromkeys(UNITS, 0), 'torque_share': 1}
+    assert 'in step' in log and '"<string>", line 10' in log
+
+
 @pytest.mark.usefixtures('fresh_domain')
 def test_own_position_loop_is_a_sixth_unit(monkeypatch: pytest.MonkeyPatch) -> None:
     package = str(EXAMPLES / 'own_position_loop')

@@ -156,9 +156,10 @@ async def _see_and_set(url: str, watch: Watch) -> None:
         {'id': number, 'channelId': channels[topic]['id']}
         for number, topic in enumerate(['/plant', '/torque_share'])])
     data = client.data
-    bias = await client.until(lambda: len(data.get(0, [])) > 100 and data.get(1))
+    # a drive that has just begun is at rest
+    bias = await client.until(lambda: len({message['encoder'] for _, message in data.get(
+        0, [])}) > 50 and data.get(1))
     times = [time_ns for time_ns, _ in data[0]]
-    assert len({message['encoder'] for _, message in data[0]}) > 50, 'it moves'
     assert all(time_ns % 10_000_000 == 9_000_000 for time_ns in times), 'steps 9, 19, 29 ...'
     assert times == sorted({*times})
     # a parameter that is set is in force, in the node and in what the signal does
@@ -219,7 +220,11 @@ def test_joints_are_the_readings_of_the_same_time(live: LiveCommand, watch: Watc
     try:
         # a drive that has just begun is at rest, and on a busy machine that may last
         watch.until(lambda: len(axis) > 100 and len(last) == 7 and moves(), 'joints that move')
-        assert watch.call('test_signal/pause').success
+        paused = watch.call('test_signal/pause')
+        assert paused.success
+        # The other nodes may be a step ahead of the clock. Readings are those of every tenth step.
+        if '9 of run' in paused.message:
+            assert watch.call('test_signal/step').success
         (ratio,) = watch.get('plant', 'gear_ratio')
 
         def same() -> bool:
@@ -234,7 +239,10 @@ def test_joints_are_the_readings_of_the_same_time(live: LiveCommand, watch: Watc
         assert (list(axis[-1].name), list(motors[-1].name)) == (['elevation'], ['m1', 'm2'])
         assert moves()
         stamps = [state.header.stamp.sec * 10**9 + state.header.stamp.nanosec for state in axis]
-        assert stamps == sorted({*stamps})
+        # what the drive remembers of an earlier run comes first
+        began = max((n for n, (one, next_one) in enumerate(zip(stamps, stamps[1:]), 1)
+                     if next_one < one), default=0)
+        assert stamps[began:] == sorted({*stamps[began:]})
         assert all(stamp % 10_000_000 == 0 for stamp in stamps), 'every tenth step'
         assert watch.call('test_signal/resume').success
         node.send_signal(signal.SIGINT)
