@@ -12,15 +12,18 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Does the trials of a campaign one after the other, each in a process of its own.
+Does the trials of a campaign, each in a process of its own.
 
+They are done one after the other, but for those that may run beside one another.
 Each outcome is a line of OUT/outcomes.jsonl. A campaign that is started again with the same OUT
 leaves out the trials that are there already.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import groupby
 import json
 import os
 from pathlib import Path
@@ -28,12 +31,13 @@ import signal
 import subprocess
 import sys
 import tempfile
+from threading import Lock
 import time
 from typing import Any
 
 from antenna_drive.campaign import leftovers
 from antenna_drive.campaign.domains import DomainClaim
-from antenna_drive.campaign.trials import Outcome, Trial
+from antenna_drive.campaign.trials import Outcome, SIDE_BY_SIDE, Trial
 from antenna_drive.errors import UserError
 
 OUTCOMES, SETTINGS = 'outcomes.jsonl', 'campaign.json'
@@ -63,6 +67,7 @@ class Campaign:
         self.folder = folder
         self.settings = settings
         self.outcomes: dict[str, dict[str, Any]] = {}
+        self._writing = Lock()
         path = folder / SETTINGS
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -84,12 +89,43 @@ class Campaign:
             except (ValueError, KeyError, TypeError):
                 continue  # cut short when the campaign was interrupted: the trial is done again
 
-    def do(self, trials: Sequence[Trial], told: Callable[[Trial, dict[str, Any]], None]) -> None:
-        """Do the trials that are not done, and tell of each."""
-        for trial in trials:
-            if trial.label in self.outcomes:
-                continue
-            entry = self.one(trial)
+    def do(self, trials: Sequence[Trial], told: Callable[[Trial, dict[str, Any]], None],
+           jobs: int = 1) -> None:
+        """
+        Do the trials that are not done, and tell of each.
+
+        Parameters
+        ----------
+        trials
+            in the order in which they are done
+        told
+            called after each with its outcome, from one thread at a time
+        jobs
+            how many of those of a part in SIDE_BY_SIDE are done at once
+
+        """
+        ahead = [trial for trial in trials if trial.label not in self.outcomes]
+        for together, group in groupby(ahead, lambda trial: trial.part in SIDE_BY_SIDE):
+            if together and jobs > 1:
+                self._side_by_side(group, told, jobs)
+            else:
+                for trial in group:
+                    self._keep(trial, self.one(trial), told)
+
+    def _side_by_side(self, trials: Iterable[Trial],
+                      told: Callable[[Trial, dict[str, Any]], None], jobs: int) -> None:
+        with ThreadPoolExecutor(jobs) as pool:
+            try:
+                for _ in pool.map(lambda trial: self._keep(trial, self.one(trial), told), trials):
+                    pass
+            except BaseException:
+                # those that have begun come to their end and are kept
+                pool.shutdown(cancel_futures=True)
+                raise
+
+    def _keep(self, trial: Trial, entry: dict[str, Any],
+              told: Callable[[Trial, dict[str, Any]], None]) -> None:
+        with self._writing:
             self.outcomes[trial.label] = entry
             with (self.folder / OUTCOMES).open('a', encoding='utf-8') as log:
                 # a line of its own, whatever an interruption has left

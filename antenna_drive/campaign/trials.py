@@ -37,6 +37,8 @@ PARTS = {
     'isolation': 'look at the drive from another network; ROS 2 security',
     'soak': 'run at real time for long: memory, file handles, lost and late steps',
 }
+# Parts whose trials may run beside one another, as nothing in them depends on how fast it goes.
+SIDE_BY_SIDE = frozenset({'mutations'})
 SHORT, MEDIUM, FULL = 'short', 'medium', 'full'
 DOSES = (SHORT, MEDIUM, FULL)
 

@@ -33,6 +33,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 from pathlib import Path
 import sys
 from typing import Any
@@ -60,6 +61,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='duration of the run at real time [s]; that of the dose if not given')
     parser.add_argument('--seed', type=int, default=1, metavar='N',
                         help='what everything is drawn from (default: %(default)s)')
+    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
+                        help='how many trials of damaged files run at once; all others have the '
+                        'machine to themselves (default: %(default)s here)')
     parser.add_argument('--repeat', metavar='TRIAL',
                         help='do one trial again, print its outcome and keep nothing')
     add_json_option(parser)
@@ -67,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do what is not done yet, and write the result."""
-    check_options(args, soak=Entry('s', 10.0, 1e6))
+    check_options(args, soak=Entry('s', 10.0, 1e6), jobs=Entry('1', 1, 1024, whole=True))
     dose = SHORT if args.short else args.dose
     trials = list(plan(dose, args.soak))
     campaign = Campaign(args.out, {'dose': dose, 'seed': args.seed, 'soak_s': args.soak})
@@ -87,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
               flush=True)
 
     try:
-        campaign.do(chosen, told)
+        campaign.do(chosen, told, args.jobs)
     finally:
         result = summary(chosen, campaign.outcomes, campaign.settings, str(args.out))
         with replaced(args.out / 'campaign.html') as stream:

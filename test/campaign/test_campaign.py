@@ -85,6 +85,20 @@ def test_a_campaign_that_is_started_again_leaves_out_what_is_done(tmp_path: Path
     assert done == ['mutations-change_0']
 
 
+def test_damaged_files_side_by_side_end_as_they_do_alone(tmp_path: Path) -> None:
+    trials = [Trial('mutations', f'{reader}_0', {'files': 100}, 120.0)
+              for reader in ('change', 'frame')]
+    outcomes = {}
+    for jobs in (1, 2):
+        campaign = Campaign(tmp_path / str(jobs), SETTINGS)
+        done: list[str] = []
+        campaign.do(trials, lambda trial, entry: done.append(trial.label), jobs)
+        outcomes[jobs] = Campaign(tmp_path / str(jobs), SETTINGS).outcomes
+        assert sorted(done) == sorted(outcomes[jobs]) == sorted(trial.label for trial in trials)
+    for label, alone in outcomes[1].items():
+        assert outcomes[2][label]['counts'] == alone['counts']
+
+
 def test_a_folder_of_another_campaign_is_refused_in_a_line(tmp_path: Path) -> None:
     Campaign(tmp_path, SETTINGS)
     with pytest.raises(UserError, match='holds a campaign with'):
