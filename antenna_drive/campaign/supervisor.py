@@ -21,8 +21,7 @@ leaves out the trials that are there already.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
 from itertools import groupby
 import json
 import os
@@ -31,7 +30,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-from threading import Lock
 import time
 from typing import Any
 
@@ -39,6 +37,7 @@ from antenna_drive.campaign import leftovers
 from antenna_drive.campaign.domains import DomainClaim
 from antenna_drive.campaign.trials import Outcome, SIDE_BY_SIDE, Trial
 from antenna_drive.errors import UserError
+from antenna_drive.workers import workers
 
 OUTCOMES, SETTINGS = 'outcomes.jsonl', 'campaign.json'
 # How long what a trial has started may take to end with it [s].
@@ -67,7 +66,6 @@ class Campaign:
         self.folder = folder
         self.settings = settings
         self.outcomes: dict[str, dict[str, Any]] = {}
-        self._writing = Lock()
         path = folder / SETTINGS
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -99,38 +97,29 @@ class Campaign:
         trials
             in the order in which they are done
         told
-            called after each with its outcome, from one thread at a time
+            called after each with its outcome
         jobs
             how many of those of a part in SIDE_BY_SIDE are done at once
 
         """
         ahead = [trial for trial in trials if trial.label not in self.outcomes]
         for together, group in groupby(ahead, lambda trial: trial.part in SIDE_BY_SIDE):
-            if together and jobs > 1:
-                self._side_by_side(group, told, jobs)
+            if together:
+                part = list(group)
+                with workers(jobs, threads=True) as pool:
+                    for number, outcome in pool.each(self.one, ((trial,) for trial in part)):
+                        self._keep(part[number], outcome(), told)
             else:
                 for trial in group:
                     self._keep(trial, self.one(trial), told)
 
-    def _side_by_side(self, trials: Iterable[Trial],
-                      told: Callable[[Trial, dict[str, Any]], None], jobs: int) -> None:
-        with ThreadPoolExecutor(jobs) as pool:
-            try:
-                for _ in pool.map(lambda trial: self._keep(trial, self.one(trial), told), trials):
-                    pass
-            except BaseException:
-                # those that have begun come to their end and are kept
-                pool.shutdown(cancel_futures=True)
-                raise
-
     def _keep(self, trial: Trial, entry: dict[str, Any],
               told: Callable[[Trial, dict[str, Any]], None]) -> None:
-        with self._writing:
-            self.outcomes[trial.label] = entry
-            with (self.folder / OUTCOMES).open('a', encoding='utf-8') as log:
-                # a line of its own, whatever an interruption has left
-                log.write(('\n' if log.tell() else '') + json.dumps(entry))
-            told(trial, entry)
+        self.outcomes[trial.label] = entry
+        with (self.folder / OUTCOMES).open('a', encoding='utf-8') as log:
+            # a line of its own, whatever an interruption has left
+            log.write(('\n' if log.tell() else '') + json.dumps(entry))
+        told(trial, entry)
 
     def one(self, trial: Trial) -> dict[str, Any]:
         """Do one trial; return its outcome with its id, seed, options, load and duration."""
