@@ -116,6 +116,8 @@ def test_an_effect_that_begins_to_act_beyond_its_first_step_is_remarked() -> Non
     ({'effects': [effect('a.b', start=size(0.0, 1.0))]}, 'start: the name is there twice'),
     ({'effects': [effect('a.b', one=size(0.0, 1.0)), effect('a.b', two=size(0.0, 1.0))]},
      'effect a.b: the name is there twice'),
+    ({'effects': [effect('a.b', drift=size(0.0, 1.0), simpler='a.b')]},
+     'effect a.b: simpler: a.b: no such other effect'),
     ({'per_test': {'start': free(1.0, 0.0)}}, 'the smaller first'),
     ({'push': {'wind': push('swing', 'wind', 'N', 0.0)}}, 'with a size above 0'),
 ])

@@ -42,7 +42,7 @@ effects:
   shaft.twist:
     cause: it twists
     numbers: {twist: {size: [0.0, 1.0], adds_to_inverse: stiffness}}
-  shaft.grows: {numbers: {grows: {size: [-1.0, 1.0], scales: stiffness}}}
+  shaft.grows: {simpler: shaft.twist, numbers: {grows: {size: [-1.0, 1.0], scales: stiffness}}}
   bus.delay: {numbers: {delay: {size: [0.0, 1.0], unit: s, step: 0.01, delays: force}}}
 push:
   load: {label: a push, unit: N, size: 2.0}
@@ -102,6 +102,7 @@ def test_numbers_effects_and_readings_are_those_of_a_declaration(
     assert model.per_test['offset'].is_known
     assert [item.name for item in model.effects] == ['shaft.twist', 'shaft.grows', 'bus.delay']
     assert model.effects[0].cause == 'it twists'
+    assert [item.simpler for item in model.effects] == ['', 'shaft.twist', '']
     assert model.readings['first'].unit == 'rad'
     assert model.push['load'].size == 2.0
     assert (model.settles_s, model.blocks, model.parallel) == (0.1, ('bus', 'shaft'), True)

@@ -278,6 +278,7 @@ class OwnEffect:
     look : what it looks like in the readings, one sentence
     forms : alternatives; the best one counts
     ripple : set in the place of forms for a wave by an angle
+    simpler : name of the effect that it becomes at an end of its range; empty if there is none
 
     """
 
@@ -286,6 +287,7 @@ class OwnEffect:
     look: str
     forms: tuple[OwnForm, ...] = ()
     ripple: Ripple | None = None
+    simpler: str = ''
 
     @property
     def component(self) -> str:
@@ -298,7 +300,7 @@ def form(name: str, **numbers: Number) -> OwnForm:
     return OwnForm(name, numbers)
 
 
-def effect(name: str, *forms: OwnForm, cause: str = '', look: str = '',
+def effect(name: str, *forms: OwnForm, cause: str = '', look: str = '', simpler: str = '',
            **numbers: Number) -> OwnEffect:
     """
     Return an effect that the model may lack.
@@ -313,6 +315,9 @@ def effect(name: str, *forms: OwnForm, cause: str = '', look: str = '',
         its physical cause, one sentence
     look
         what it looks like in the readings, one sentence
+    simpler
+        name of the effect that it becomes at an end of its range, as a Stribeck friction
+        becomes a Coulomb friction; it is tried in its place
     numbers
         of its only form: `size` or `shape` by name
 
@@ -325,7 +330,7 @@ def effect(name: str, *forms: OwnForm, cause: str = '', look: str = '',
         raise ModelError(f'effect {name}: give its numbers, such as half_gap=size(0, 1e-3, '
                          "'rad'), or several form()s")
     return OwnEffect(name, cause or name.partition('.')[2].replace('_', ' '), look,
-                     forms or (OwnForm('', numbers),))
+                     forms or (OwnForm('', numbers),), simpler=simpler)
 
 
 def ripple(name: str, stem: str, amplitude: Number, angle: str | Angle,
@@ -470,6 +475,11 @@ def _check(model: Model) -> None:
     for name in names:
         if names.count(name) > 1:
             raise ModelError(f'effect {name}: the name is there twice')
+    for item in model.effects:
+        others = [name for name in names if name != item.name]
+        if item.simpler and item.simpler not in others:
+            raise ModelError(f'effect {item.name}: simpler: {item.simpler}: no such other effect'
+                             f'{nearest(item.simpler, others)}')
     for name, draw in model.tests.items():
         if not callable(draw):
             raise ModelError(f'tests: {name}: give a function f(duration_s, random) -> Log')

@@ -308,7 +308,8 @@ def _effect(item: OwnEffect) -> Effect:
         forms = [Form(form.name, tuple(_parameter(f'{item.name}.{name}', number)
                                        for name, number in form.numbers.items()))
                  for form in item.forms]
-    return Effect(item.name, item.component, item.cause, item.look, tuple(forms))
+    return Effect(item.name, item.component, item.cause, item.look, tuple(forms),
+                  simpler=(item.simpler,) if item.simpler else ())
 
 
 def _parameter(name: str, item: Number) -> Parameter:

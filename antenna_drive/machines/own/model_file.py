@@ -45,6 +45,7 @@ _TOP = (*_PROGRAMS, 'step_s', 'inputs', 'starts', 'constants', 'base', 'per_test
 _ACTS = ('sets', 'scales', 'adds', 'adds_to_inverse', 'delays')
 _KINDS = ('known', 'share', 'by', 'free', 'size', 'shape')
 _OF_NUMBER = ('value', 'start', 'unit', 'step', 'tolerance')
+_OF_EFFECT = ('cause', 'look', 'simpler', 'numbers')
 _NUMBER = Entry('')
 _POSITIVE = Entry('', low=1e-12)
 _PAIR = Entry('', lengths=(2, 2))
@@ -135,8 +136,7 @@ def _model(path: Path, top: Mapping[str, Any]) -> Model:
         base=dict(_numbers('base', top, defaults)),
         per_test=dict(_numbers('per_test', top, defaults)),
         readings={name: _reading(key, body) for name, (key, body) in readings.items()},
-        effects=[_effect(name, body) for name, body in _bodies(
-            'effects', top, ('cause', 'look', 'numbers'))],
+        effects=[_effect(name, body) for name, body in _bodies('effects', top, _OF_EFFECT)],
         push={name: _push(key, name, body) for name, (key, body) in pushes.items()},
         settles_s=_optional('settles_s', top), judged_hz=_optional('judged_hz', top),
         blocks=_list('blocks', top), advice=_list('advice', top), parallel=simulator.parallel)
@@ -229,7 +229,7 @@ def _number_bodies(top: Mapping[str, Any]) -> Iterator[tuple[str, str, Mapping[s
     for where in ('base', 'per_test'):
         for name, body in _bodies(where, top, allowed):
             yield f'{where}.{name}', name, body
-    for title, item in _bodies('effects', top, ('cause', 'look', 'numbers')):
+    for title, item in _bodies('effects', top, _OF_EFFECT):
         for name, body in _bodies('numbers', item, allowed, f'effects.{title}.'):
             yield f'effects.{title}.numbers.{name}', name, body
 
@@ -314,7 +314,8 @@ def _effect(name: str, body: Mapping[str, Any]) -> OwnEffect:
             numbers[one] = shape(low, high, _number(f'{where}.start', item.get('start')), unit,
                                  step=step)
     return effect(name, cause=_text(f'{key}.cause', body.get('cause', '')),
-                  look=_text(f'{key}.look', body.get('look', '')), **numbers)
+                  look=_text(f'{key}.look', body.get('look', '')),
+                  simpler=_text(f'{key}.simpler', body.get('simpler', '')), **numbers)
 
 
 def _kind(key: str, body: Mapping[str, Any], allowed: Collection[str]) -> str:
