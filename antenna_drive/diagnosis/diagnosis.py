@@ -102,14 +102,20 @@ class Diagnosis:
 
 def _closed(result: Mapping[str, Any]) -> list[str]:
     """Return how much of the gap is closed, and by what."""
-    fraction, named = result['how_far']['explained_fraction'], result['statements']['named']
-    if not named['best_of_catalogue']:
-        return []
-    names = ' and '.join(named['best_of_catalogue'])
-    if fraction['value'] is None:
-        return [f'how much of the gap {names} explains cannot be judged on withheld data: '
-                f'{fraction["reason"]}'] if fraction.get('reason') else []
-    return [f'{names} explains {share_text(fraction)}, judged on {result["how_far"]["held_out"]}']
+    far, named = result['how_far'], result['statements']['named']['best_of_catalogue']
+    judged = [effect for effect in named if effect in far['judged']]
+    fraction = far['explained_fraction']
+    if named and fraction['value'] is None:
+        return [_cannot_be_judged(' and '.join(named), fraction['reason'])] if fraction.get(
+            'reason') else []
+    lines = [f'{" and ".join(judged)} {"explain" if judged[1:] else "explains"} '
+             f'{share_text(fraction)}, judged on {far["held_out"]}'] if judged else []
+    return lines + [_cannot_be_judged(effect, far['cannot_be_judged'][effect])
+                    for effect in named if effect not in far['judged']]
+
+
+def _cannot_be_judged(effects: str, reason: str) -> str:
+    return f'how much of the gap {effects} explains cannot be judged on withheld data: {reason}'
 
 
 def _why_small(item: Mapping[str, Any]) -> str:

@@ -121,6 +121,7 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads:
             'value': fraction, 'ci95': interval, 'bounds': list(BOUNDS),
             'reason': reason, 'interval': _INTERVAL},
         'per_signal': _per_signal(problem, counted, known or not best.effects),
+        **_judged(best.effects, counted),
         'held_out': _HALVES if single else what,
         'folds': [{'withheld': fold.name, 'judged': list(fold.judged),
                    'values': dict(zip(fold.names, fold.values.tolist(), strict=True)),
@@ -147,6 +148,14 @@ def refuted(reach: Mapping[str, Any]) -> bool:
     closed = reach['explained_fraction']['value']
     return closed is not None and closed <= 0.0 and not any(
         fold['judged'] and fold['cannot_be_judged'] for fold in reach['folds'])
+
+
+def _judged(effects: Sequence[str], folds: Sequence[_Fold]) -> dict[str, Any]:
+    """Return the effects that were judged in some test, and why each other was in none."""
+    reasons = {effect: fold.reasons[effect] for fold in folds for effect in fold.reasons}
+    judged = [effect for effect in effects if any(effect in fold.judged for fold in folds)]
+    return {'judged': judged, 'cannot_be_judged': {
+        effect: reasons[effect] for effect in effects if effect not in judged}}
 
 
 def _reason(folds: Sequence[_Fold]) -> str:

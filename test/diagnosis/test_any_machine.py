@@ -250,6 +250,25 @@ def test_an_effect_that_widens_the_gap_explains_nothing_of_it() -> None:
     assert share_text({'value': 0.9, 'ci95': [-0.2, 0.99]}) == '90 % of the gap (0 to 99 %)'
 
 
+@pytest.mark.parametrize('judged, said', [
+    (['a', 'b'], ['a and b explain 90 % of the gap (80 to 99 %), judged on the rest']),
+    (['a'], ['a explains 90 % of the gap (80 to 99 %), judged on the rest',
+             'how much of the gap b explains cannot be judged on withheld data: why b']),
+    ([], ['how much of the gap a and b explains cannot be judged on withheld data: why']),
+])
+def test_the_text_says_of_which_effects_a_share_is(judged: list[str], said: list[str]) -> None:
+    diagnosis = diagnose(Body({'heater.step.size': -0.3}))
+    named = {**diagnosis.result['statements']['named'], 'best_of_catalogue': ['a', 'b']}
+    fraction = ({'value': 0.9, 'ci95': [0.8, 0.99]} if judged else
+                {'value': None, 'reason': 'why'})
+    text = replace(diagnosis, result={
+        **diagnosis.result, 'statements': {'named': named}, 'how_far': {
+            'explained_fraction': fraction, 'held_out': 'the rest', 'judged': judged,
+            'cannot_be_judged': {name: f'why {name}' for name in 'ab' if name not in judged},
+        }}).summary()
+    assert [line.strip() for line in text.splitlines() if 'of the gap' in line] == said
+
+
 def test_what_closes_nothing_of_withheld_data_is_not_named() -> None:
     """A step of another sign in each test fits both together, and predicts neither."""
     body, other = Body({'heater.step.size': 0.5}), Body({'heater.step.size': -0.25})

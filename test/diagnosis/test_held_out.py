@@ -98,6 +98,20 @@ def test_an_effect_that_turns_its_sign_explains_less_than_nothing_elsewhere() ->
     assert fraction['value'] == -1.0 and fraction['ci95'][1] < 0.0
 
 
+def test_a_share_names_the_effects_that_it_is_of() -> None:
+    """What belongs to one test is never judged, and has no part in what the other explains."""
+    machine = Ramp([0.5, 0.5, 0.5])
+    own = Form('', (Parameter('clamp.play.size', '1', -1.0, 1.0, 1e-3, experiment=0),))
+    problem = LeastSquares(machine)
+    none = Hypothesis((), (), problem.fit(problem.start([ZERO], {}), 20))
+    both = problem.fit(problem.start([ZERO, SIZE, *own.parameters], {}), 20)
+    found = held_out(problem, none, Hypothesis(
+        ('clamp.play', EFFECT.id), (own, *EFFECT.forms), both))
+    assert found['judged'] == [EFFECT.id]
+    assert found['cannot_be_judged'] == {'clamp.play': 'its numbers belong to one test alone'}
+    assert found['explained_fraction']['value'] == pytest.approx(1.0, abs=1e-3)
+
+
 def test_only_what_could_be_judged_in_full_is_refuted() -> None:
     turned = judged(Ramp([0.5, -0.5]))
     assert refuted(turned)

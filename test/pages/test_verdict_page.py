@@ -56,6 +56,7 @@ FULL: dict[str, Any] = {
                 'dial': {'unit': 'V', 'too_few_to_judge': 12}},
     'how_far': {'before': 9.0, 'after': 1.25, 'held_out': HOSTILE,
                 'explained_fraction': {'value': 0.9, 'ci95': [0.8, 0.95]},
+                'judged': ['motors.friction'], 'cannot_be_judged': {HOSTILE: HOSTILE},
                 'per_signal': {HOSTILE: {
                     'before': 9.0, 'after': 1.25, 'unit': HOSTILE, 'before_in_unit': 0.0432,
                     'after_in_unit': None}}},
@@ -118,7 +119,9 @@ def test_everything_is_said_and_nothing_is_taken_for_html(browser: Page, tmp_pat
     text = show(browser, tmp_path, FULL, advice=(
         (('friction',), 'Turn it by hand.'), (('ripple',), 'Hold one rate.'), ((), HOSTILE)))
     for words in ('Partly explained', '75.0 % motors.friction', f'torque = 0.25 {HOSTILE}',
-                  'The effects explain 90 % of the gap (80 to 95 %).', f'dial.gain + {HOSTILE}',
+                  'motors.friction explains 90 % of the gap (80 to 95 %). '
+                  f'How much {HOSTILE} explains cannot be judged: {HOSTILE}.',
+                  f'dial.gain + {HOSTILE}',
                   'cannot tell apart: motors.friction, dial.gain', 'reversal 40 %',
                   f'{HOSTILE} dial 30 %', f'{HOSTILE} depends on rate (20 % of its residual)',
                   'Turn it by hand.', '3 s of computing', 'a bent needle',
