@@ -22,7 +22,7 @@ from antenna_drive.physics.compiling import inner, shared
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ['dead_zone', 'held', 'lagged', 'lagged_mean', 'limited', 'rate_limited',
+__all__ = ['dead_zone', 'delayed', 'held', 'lagged', 'lagged_mean', 'limited', 'rate_limited',
            'soft_limited']
 
 
@@ -94,6 +94,27 @@ def lagged_mean(value: float, source: float, time_constant: float,
     fall = math.exp(-step / time_constant)
     return (source + (value - source) * time_constant / step * (1.0 - fall),
             source + (value - source) * fall)
+
+
+@inner
+def delayed(past: NDArray[np.float64], k: int, ticks: float) -> float:
+    """
+    Return what a signal was some ticks ago, on the straight line between two of its samples.
+
+    It has a derivative by the delay, which `held` has not.
+
+    Parameters
+    ----------
+    past
+        the signal at each tick so far, shape (n,), any unit
+    k
+        index of the present tick
+    ticks
+        delay, 0 or more; before the first sample the first value holds
+
+    """
+    whole, share = int(ticks), ticks % 1.0
+    return (1.0 - share) * past[max(k - whole, 0)] + share * past[max(k - whole - 1, 0)]
 
 
 @shared

@@ -166,6 +166,20 @@ def test_a_delayed_command_is_the_command_of_an_earlier_moment() -> None:
 
 
 @compiled
+def all_delayed(past: FloatArray, ticks: float, out: FloatArray) -> None:
+    for k in range(past.size):
+        out[k] = shaping.delayed(past, k, ticks)
+
+
+@pytest.mark.parametrize('ticks', [0.0, 0.25, 1.0, 3.6])
+def test_a_ramp_that_is_delayed_is_the_ramp_of_that_moment(ticks: float) -> None:
+    """To any share of a tick; before its begin it stands still."""
+    tick, out = np.arange(40.0), np.empty(40)
+    all_delayed(3.0 + 2.0 * tick, ticks, out)
+    assert out == pytest.approx(3.0 + 2.0 * np.maximum(tick - ticks, 0.0), abs=1e-12)
+
+
+@compiled
 def read(angle: float) -> tuple[float, float, float, float]:
     return (sensor.encoder(angle, 2.0, 0.01, -0.02), sensor.counts(angle, 4096.0),
             sensor.digitised(angle, 0.1), sensor.tachometer(3.0, angle, 0.02, 0.1, 4.0, 0.0, 0.05))

@@ -19,7 +19,7 @@ from antenna_drive.machines.own import (
     effect, form, free, machine as own_machine, Numbers, OneTest, push, reading, ripple,
     shape, size, within, without_gaps,
 )
-from antenna_drive.parts import compiled, coupling, friction, harmonics, inner, loop, shaping, wave
+from antenna_drive.parts import compiled, coupling, friction, harmonics, loop, shaping, wave
 from antenna_drive.parts.friction import Friction
 from antenna_drive.parts.loop import Cascade
 import numpy as np
@@ -32,13 +32,6 @@ Wave = tuple[float, tuple[float, float, float, float]]
 TICK = 1e-3     # of the controller [s]
 PARTS = 2       # steps of the integration in a tick
 GEAR = 30.0
-
-
-@inner
-def late(past: Array, k: int, ticks: float) -> float:
-    """Return what was asked for some ticks ago."""
-    whole, share = int(ticks), ticks % 1.0
-    return (1.0 - share) * past[max(k - whole, 0)] + share * past[max(k - whole - 1, 0)]
 
 
 @compiled
@@ -64,7 +57,7 @@ def run(reference: Array, ticks: int, push: Array, cascade: Cascade, rubbing: Fr
         rate = (read - before) / TICK if k > 0 else 0.0
         before = read
         past[k], integral = loop.cascade(cascade, asked, 0.0, read, rate, integral, TICK)
-        demand = late(past, k, delay / TICK)
+        demand = shaping.delayed(past, k, delay / TICK)
         h = TICK / PARTS
         for _ in range(PARTS):
             current, flowing = shaping.lagged_mean(flowing, demand, lag, h)
