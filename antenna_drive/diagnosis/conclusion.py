@@ -120,14 +120,13 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
             hypothesis, lambda name: inflated.get(name, usual), settings.interval,
             between_tests if hypothesis.effects == best.effects else {})
 
-    costs = _least_costs(hypotheses)
-
-    def judged(hypothesis: Hypothesis) -> Hypothesis:
+    def judged(hypothesis: Hypothesis, fitted: Sequence[Hypothesis]) -> Hypothesis:
         return replace(hypothesis, doubts=doubts(
             hypothesis, deviating(hypothesis), (none.cost - hypothesis.cost) / usual,
-            settings.interval, beyond, _own_gains(hypothesis, costs, usual)))
+            settings.interval, beyond, _own_gains(hypothesis, _least_costs(fitted), usual)))
 
-    hypotheses, best = [judged(h) for h in hypotheses], judged(best)
+    hypotheses = _with_rests(fits, hypotheses, judged(best, hypotheses))
+    hypotheses, best = [judged(h, hypotheses) for h in hypotheses], judged(best, hypotheses)
     if best.unsure:
         notes.append(f'{" + ".join(sorted(best.unsure))}: not surely beyond the tolerance, and '
                      'therefore not named')
@@ -151,6 +150,19 @@ def _between_tests(reach: Mapping[str, Any]) -> dict[str, float]:
         for name, value in fold['values'].items():
             values.setdefault(name, []).append(value)
     return {name: jackknife(found) for name, found in values.items()}
+
+
+def _with_rests(fits: FullFits, hypotheses: Sequence[Hypothesis],
+                best: Hypothesis) -> list[Hypothesis]:
+    """
+    Return hypotheses, and those that show what each unsure effect of the best gains.
+
+    The search gives up what is far behind the best, and so the best without what gains most.
+    """
+    known = {frozenset(h.effects) for h in hypotheses}
+    return [*hypotheses, *(fits.without(best, effect) for effect in best.effects
+                           if effect in best.unsure
+                           and frozenset(best.effects) - {effect} not in known)]
 
 
 def _least_costs(hypotheses: Sequence[Hypothesis]) -> dict[frozenset[str], float]:

@@ -104,6 +104,35 @@ def test_three_effects_at_once_are_all_named() -> None:
         'thermometer.gain', 'heater.step', 'air.draught'}
 
 
+class Scale(Machine):
+    """A scale on a slope that drifts, and a load nearly like the drift, and a wave."""
+
+    def __init__(self, truth: Mapping[str, float]) -> None:
+        random = np.random.default_rng(6)
+        super().__init__([Experiment(
+            f'day {k}', TIME, ('weight',), ('N',),
+            self.predict(truth, k) + NOISE * random.normal(size=(TIME.size, 1)),
+            np.full((TIME.size, 1), NOISE)) for k in range(2)],
+            [Parameter('drift', 'N/s', -10.0, 10.0, 1e-3, 5.0)],
+            [effect('load.creep', 'N/s', -10.0, 10.0), effect('floor.wave', 'N', -1.0, 1.0)])
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return the weight."""
+        creep = point.get('load.creep.size', 0.0)
+        return np.asarray((point.get('drift', 0.0) + creep) * TIME
+                          + 0.25 * creep * np.sin(5.0 * TIME + experiment)
+                          + point.get('floor.wave.size', 0.0) * np.sin(9.0 * TIME))[:, None]
+
+
+def test_an_effect_that_gains_very_much_is_named_though_its_interval_is_wide() -> None:
+    """A tenth by which derivatives may be wrong leaves open what drifts; its waves do not."""
+    result = diagnose(Scale({'load.creep.size': 1.0, 'floor.wave.size': 0.05})).result
+    top = result['which'][0]
+    low, high = top['parameters']['load.creep.size']['ci95']
+    assert low < 0.0 < 1.0 < high
+    assert set(top['effects']) == {'load.creep', 'floor.wave'}
+
+
 def test_an_effect_that_the_catalogue_lacks_is_unknown() -> None:
     body = Body({'heater.step.size': -0.3})
     whole, withheld = (diagnose(machine).result for machine in (

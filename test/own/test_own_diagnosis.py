@@ -20,7 +20,8 @@ from typing import Any
 from antenna_drive.diagnosis.page import contents
 from antenna_drive.errors import UserError
 from antenna_drive.machines.own import (
-    diagnose_logs, OwnMachine, ripple, size, summary_of, unseen,
+    diagnose_logs, effect, free, Log, machine, OwnMachine, reading, ripple, size, summary_of,
+    unseen,
 )
 from antenna_drive.pages import render
 import numpy as np
@@ -46,6 +47,29 @@ def test_the_missing_effect_is_named_with_its_size() -> None:
     drift = first['parameters']['sensor.drift.drift']
     assert drift['value'] == pytest.approx(0.01, rel=0.05) and drift['unit'] == 'rad/s'
     assert found.result['numbers']['drift']['value'] == drift['value']
+
+
+def test_a_smooth_simulation_has_the_intervals_of_least_squares() -> None:
+    """Derivatives right to a tenth could not tell this creep from the drift that is tolerated."""
+    def straight(n: Any, test: Any) -> dict[str, Any]:
+        creep = test.time + 0.5 * np.sin(5.0 * test.time)
+        return {'weight': n.drift * test.time + n.creep * creep}
+
+    noise, random = 0.02, np.random.default_rng(8)
+    wave = TIME + 0.5 * np.sin(5.0 * TIME)
+    found = diagnose_logs(machine(
+        straight, base={'drift': free(-5.0, 5.0, 'N/s')},
+        readings={'weight': reading('N', noise=noise)},
+        effects=[effect('load.creep', creep=size(-5.0, 5.0, 'N/s'))],
+        push={}, settles_s=0.1), [
+            Log(f'day {k}', TIME, {'weight': 0.3 * wave + noise * random.normal(size=TIME.size)})
+            for k in range(4)])
+    [creep] = found.result['which'][0]['parameters'].values()
+    columns = np.tile(np.column_stack([TIME, wave]), (4, 1)) / noise
+    deviation = np.sqrt(np.linalg.inv(columns.T @ columns)[1, 1])
+    low, high = creep['ci95']
+    assert low < 0.3 < high
+    assert 0.95 < (high - low) / (2.0 * 1.96 * deviation) < 2.0
 
 
 def test_the_order_of_a_ripple_is_found() -> None:

@@ -20,19 +20,18 @@ from dataclasses import dataclass
 import math
 import time
 
-from antenna_drive.diagnosis import check_machine, FloatArray, idle_effects, Parameter, Point
+from antenna_drive.diagnosis import check_machine, FloatArray, idle_effects, Parameter
 from antenna_drive.errors import UserError
 from antenna_drive.machines.own.declaration import Model
 from antenna_drive.machines.own.log import Log, OneTest
 from antenna_drive.machines.own.machine import OwnMachine
 from antenna_drive.machines.own.named_numbers import Numbers
+from antenna_drive.machines.own.response import NO_RESPONSE, Response, tests_of, where_it_acts
 import numpy as np
 
 # Two difference quotients with a step and twice the step differ by less than this where the
 # simulation is smooth.
 _ROUGH = 0.5
-# A response below this is none, in standard deviations of the noise.
-_NO_RESPONSE = 1e-6
 _LEAST_SAMPLES = 50
 # Simulations of a usual diagnosis, by which its duration is told.
 _RUNS = 6000
@@ -119,7 +118,7 @@ def _idle_pushes(machine: OwnMachine) -> Iterator[str]:
         pushed = machine.simulate_disturbed({}, place, np.ones_like)
         change = max(_rms(one - other, e.noise) for one, other, e in zip(
             pushed, neutral, machine.experiments, strict=True))
-        if change < _NO_RESPONSE:
+        if change < NO_RESPONSE:
             name = machine.push_at(place.name)
             yield f"push {name}: changes no reading; add test.push['{name}'] where it enters"
 
@@ -127,8 +126,8 @@ def _idle_pushes(machine: OwnMachine) -> Iterator[str]:
 def _rough(machine: OwnMachine) -> Iterator[str]:
     """Yield numbers by which the readings have no derivative, or that change nothing."""
     for parameter in machine.nuisances:
-        responses = [_Response.at(machine, parameter, k, {})
-                     for k in _tests_of(machine, parameter)]
+        responses = [Response.at(machine, parameter, k, {})
+                     for k in tests_of(machine, parameter)]
         if not any(item.acts for item in responses):
             yield f'{parameter.name}: changes no reading in these tests; make it known()'
         yield from _told(parameter, responses)
@@ -139,63 +138,23 @@ def _rough_effects(machine: OwnMachine) -> Iterator[str]:
     for effect in machine.effects.values():
         form = effect.forms[0]
         for parameter in form.sizes:
-            if not any(_Response.at(machine, parameter, k, form.start).acts
-                       for k in _tests_of(machine, parameter)):
+            if not any(Response.at(machine, parameter, k, form.start).acts
+                       for k in tests_of(machine, parameter)):
                 yield (f'{parameter.name}: a step of {parameter.step:g} {parameter.unit} from 0 '
                        'changes no reading, and a search begins there; let it act from 0 on, or '
                        'give a larger step=')
-            # where the effect is there: at its edge many a law has a corner
-            here = {**form.start, parameter.name: 0.25 * max(
-                parameter.low, parameter.high, key=abs)}
-            yield from _told(parameter, [_Response.at(machine, parameter, k, here)
-                                         for k in _tests_of(machine, parameter)])
+            here = where_it_acts(form, parameter)
+            yield from _told(parameter, [Response.at(machine, parameter, k, here)
+                                         for k in tests_of(machine, parameter)])
 
 
-def _told(parameter: Parameter, responses: Sequence[_Response]) -> Iterator[str]:
+def _told(parameter: Parameter, responses: Sequence[Response]) -> Iterator[str]:
     worst = max((item.roughness for item in responses), default=0.0)
     if worst > _ROUGH:
         yield (f'{parameter.name}: the derivative of the readings by it is noise: it changes by '
                f'{100.0 * min(worst, 9.99):.0f} % where the step of {parameter.step:g} '
                f'{parameter.unit} is doubled; leave digits out of the simulation, let it switch '
                'between samples, or give a larger step=')
-
-
-def _tests_of(machine: OwnMachine, parameter: Parameter) -> Sequence[int]:
-    return [k for k in range(len(machine.logs)) if parameter.experiment in (None, k)]
-
-
-@dataclass(frozen=True)
-class _Response:
-    """
-    How readings answer to a step of a number, in standard deviations.
-
-    Attributes
-    ----------
-    acts : False if nothing changes
-    roughness : how much the difference quotient changes when its step is doubled, as a share
-
-    """
-
-    acts: bool
-    roughness: float
-
-    @classmethod
-    def at(cls, machine: OwnMachine, parameter: Parameter, experiment: int,
-           point: Point) -> _Response:
-        """Return the response of one test at a point."""
-        here = point.get(parameter.name, 0.0)
-        signed = parameter.step if here + 2.0 * parameter.step <= parameter.high else (
-            -parameter.step)
-        noise = machine.experiments[experiment].noise
-        before = machine.predict(point, experiment)
-        one, two = ((machine.predict({**point, parameter.name: here + count * signed}, experiment)
-                     - before) / noise for count in (1.0, 2.0))
-        there = np.isfinite(one) & np.isfinite(two)
-        if not there.any() or float(np.abs(one[there]).max()) < _NO_RESPONSE:
-            return cls(False, 0.0)
-        size = 0.5 * math.sqrt(float(np.mean(two[there] ** 2)))
-        off = math.sqrt(float(np.mean((one[there] - 0.5 * two[there]) ** 2)))
-        return cls(True, off / size)
 
 
 def _rms(change: FloatArray, noise: FloatArray) -> float:

@@ -25,6 +25,7 @@ Examples
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from antenna_drive.diagnosis import (
@@ -36,10 +37,13 @@ from antenna_drive.machines.own.declaration import Model
 from antenna_drive.machines.own.log import Log
 from antenna_drive.machines.own.machine import OwnMachine
 from antenna_drive.machines.own.pushes import pushes
+from antenna_drive.machines.own.response import derivative_error
 from antenna_drive.parameters.schema import nearest
 
 # Pushes that the summary lists.
 _LISTED = 6
+# However smooth a simulation is, a fit is linear about its end only so far.
+_LEAST_ERROR = 0.01
 
 
 def diagnose_logs(model: Model, logs: Sequence[Log],
@@ -86,10 +90,18 @@ def diagnose_logs(model: Model, logs: Sequence[Log],
         if name not in model.readings:
             raise UserError(f'{name}: no such reading{nearest(name, model.readings)}; there are '
                             f'{", ".join(model.readings)}')
-    found = diagnose(machine.without(without), progress, threads, settings, limits)
+    found = diagnose(machine.without(without), progress, threads,
+                     _for_derivatives_of(machine, settings), limits)
     found.result['numbers'] = numbers_as_fitted(found.machine, found.best.state.point())
     found.result['pushes'] = pushes_found(found, settings)
     return found
+
+
+def _for_derivatives_of(machine: OwnMachine, settings: Settings) -> Settings:
+    """Return thresholds with the error that this simulation's derivatives have."""
+    usual = settings.interval.derivative_error
+    error = min(max(derivative_error(machine), _LEAST_ERROR), usual)
+    return replace(settings, interval=replace(settings.interval, derivative_error=error))
 
 
 def numbers_as_fitted(machine: Machine, point: Point) -> dict[str, Any]:
