@@ -26,7 +26,7 @@ from antenna_drive.machines.own.declaration import Model
 from antenna_drive.machines.own.log import Log, OneTest
 from antenna_drive.machines.own.machine import OwnMachine
 from antenna_drive.machines.own.named_numbers import Numbers
-from antenna_drive.machines.own.response import NO_RESPONSE, Response, tests_of, where_it_acts
+from antenna_drive.machines.own.response import NO_RESPONSE, StepResponse, tests_of, where_it_acts
 import numpy as np
 
 # Two difference quotients with a step and twice the step differ by less than this where the
@@ -126,7 +126,7 @@ def _idle_pushes(machine: OwnMachine) -> Iterator[str]:
 def _rough(machine: OwnMachine) -> Iterator[str]:
     """Yield numbers by which the readings have no derivative, or that change nothing."""
     for parameter in machine.nuisances:
-        responses = [Response.at(machine, parameter, k, {})
+        responses = [StepResponse.at(machine, parameter, k, {})
                      for k in tests_of(machine, parameter)]
         if not any(item.acts for item in responses):
             yield f'{parameter.name}: changes no reading in these tests; make it known()'
@@ -138,17 +138,17 @@ def _rough_effects(machine: OwnMachine) -> Iterator[str]:
     for effect in machine.effects.values():
         form = effect.forms[0]
         for parameter in form.sizes:
-            if not any(Response.at(machine, parameter, k, form.start).acts
+            if not any(StepResponse.at(machine, parameter, k, form.start).acts
                        for k in tests_of(machine, parameter)):
                 yield (f'{parameter.name}: a step of {parameter.step:g} {parameter.unit} from 0 '
                        'changes no reading, and a search begins there; let it act from 0 on, or '
                        'give a larger step=')
             here = where_it_acts(form, parameter)
-            yield from _told(parameter, [Response.at(machine, parameter, k, here)
+            yield from _told(parameter, [StepResponse.at(machine, parameter, k, here)
                                          for k in tests_of(machine, parameter)])
 
 
-def _told(parameter: Parameter, responses: Sequence[Response]) -> Iterator[str]:
+def _told(parameter: Parameter, responses: Sequence[StepResponse]) -> Iterator[str]:
     worst = max((item.roughness for item in responses), default=0.0)
     if worst > _ROUGH:
         yield (f'{parameter.name}: the derivative of the readings by it is noise: it changes by '

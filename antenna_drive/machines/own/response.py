@@ -28,7 +28,7 @@ NO_RESPONSE = 1e-6
 
 
 @dataclass(frozen=True)
-class Response:
+class StepResponse:
     """
     How readings answer to a step of a number, in standard deviations.
 
@@ -44,7 +44,7 @@ class Response:
 
     @classmethod
     def at(cls, machine: OwnMachine, parameter: Parameter, experiment: int,
-           point: Point) -> Response:
+           point: Point) -> StepResponse:
         """Return the response of one test at a point."""
         here = point.get(parameter.name, 0.0)
         signed = parameter.step if here + 2.0 * parameter.step <= parameter.high else (
@@ -82,6 +82,6 @@ def derivative_error(machine: OwnMachine) -> float:
     places += [(parameter, where_it_acts(form, parameter))
                for effect in machine.effects.values() for form in effect.forms
                for parameter in form.sizes]
-    return max((Response.at(machine, parameter, k, point).roughness
+    return max((StepResponse.at(machine, parameter, k, point).roughness
                 for parameter, point in places for k in tests_of(machine, parameter)),
                default=0.0)
