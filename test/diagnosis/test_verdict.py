@@ -88,6 +88,9 @@ def test_noise_is_not_unknown_and_hum_is() -> None:
     # a wave that was fifty times as loud without the effect is explained, except its finer form
     assert unknown(LackOfFit(
         0.0, 0.0, fast=16.0, fast_left=0.02)) < SETTINGS.least_unknown + 0.05
+    # without an effect, nothing explains that it has become less loud
+    assert unknown(LackOfFit(0.0, 0.0, fast=16.0, fast_left=0.02, named=False)) == pytest.approx(
+        SETTINGS.most_unknown, abs=0.05)
 
 
 def test_a_regular_residual_counts_beside_a_named_effect_by_the_share_that_it_is() -> None:
