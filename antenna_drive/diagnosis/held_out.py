@@ -14,28 +14,20 @@
 """
 How far the gap shrinks once an effect is added, judged on data whose effect is withheld.
 
-The effect's numbers come from the other tests alone: their fit begins at the model as configured.
-The offsets within the tolerance are no part of the effect. They are fitted to the withheld test,
-with the effect and without.
+Each test is withheld in turn, see `judge`. What the tests say together is here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
-import math
-from statistics import fmean
 from typing import Any
 
 from antenna_drive.diagnosis.hypothesis import Hypothesis
-from antenna_drive.diagnosis.intervals import covariance, inflation
-from antenna_drive.diagnosis.least_squares import (
-    FitState, LeastSquares, prior_precision, settled, weighted_product, with_initial_conditions,
-)
-from antenna_drive.diagnosis.machine import FloatArray, Form, Machine, Parameter
+from antenna_drive.diagnosis.judge import Judge, Withheld
+from antenna_drive.diagnosis.least_squares import LeastSquares
+from antenna_drive.diagnosis.machine import FloatArray
 from antenna_drive.diagnosis.settings import Settings
-from antenna_drive.diagnosis.training import begun, Part, Slopes, trained
 import numpy as np
 
 _TURNS = ('each recording in turn, with the effect as the others have it; offsets within the '
@@ -45,39 +37,6 @@ _HALVES = 'the second half of the recording, predicted from the first'
 _INTERVAL = ("a bootstrap over blocks of time, each with a draw of the effect's numbers from "
              'their Gaussian posterior in the training data')
 BOUNDS = (-1.0, 1.0)
-
-
-@dataclass(frozen=True)
-class _Fold:
-    """
-    A test that was withheld.
-
-    Attributes
-    ----------
-    name : of the test
-    time : shape (n,) [s]
-    gap_before : measured minus predicted without the effects, in the readings' own units, shape
-        (n, c); NaN where nothing is judged
-    before : the same in standard deviations of the noise, whitened
-    gap_after, after : with those effects that can be judged; None if none can
-    judged : ids of these
-    reasons : why the others cannot be judged, by id
-    names, values : numbers of the judged effects
-    drawn : `after` with draws of these numbers, shape (draws, n, c); None if none can be judged
-
-    """
-
-    name: str
-    time: FloatArray
-    gap_before: FloatArray
-    before: FloatArray
-    gap_after: FloatArray | None = None
-    after: FloatArray | None = None
-    judged: tuple[str, ...] = ()
-    reasons: Mapping[str, str] = field(default_factory=dict)
-    names: tuple[str, ...] = ()
-    values: FloatArray = field(default_factory=lambda: np.zeros(0))
-    drawn: FloatArray | None = None
 
 
 def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads: int = 1,
@@ -100,7 +59,7 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads:
 
     """
     single = len(problem.experiments) == 1
-    judge = _Judge(problem, none, best, groups or [e.name for e in problem.experiments])
+    judge = Judge(problem, none, best, groups or [e.name for e in problem.experiments])
     with ThreadPoolExecutor(threads) as pool:
         folds = list(pool.map(judge.second_half if single else judge.withheld,
                               range(len(problem.experiments))))
@@ -150,7 +109,7 @@ def refuted(reach: Mapping[str, Any]) -> bool:
         fold['judged'] and fold['cannot_be_judged'] for fold in reach['folds'])
 
 
-def _judged(effects: Sequence[str], folds: Sequence[_Fold]) -> dict[str, Any]:
+def _judged(effects: Sequence[str], folds: Sequence[Withheld]) -> dict[str, Any]:
     """Return the effects that were judged in some test, and why each other was in none."""
     reasons = {effect: fold.reasons[effect] for fold in folds for effect in fold.reasons}
     judged = [effect for effect in effects if any(effect in fold.judged for fold in folds)]
@@ -158,7 +117,7 @@ def _judged(effects: Sequence[str], folds: Sequence[_Fold]) -> dict[str, Any]:
         effect: reasons[effect] for effect in effects if effect not in judged}}
 
 
-def _reason(folds: Sequence[_Fold]) -> str:
+def _reason(folds: Sequence[Withheld]) -> str:
     """Return why nothing could be judged."""
     reasons = dict.fromkeys(f'{effect}: {reason}' for fold in folds
                             for effect, reason in fold.reasons.items())
@@ -169,7 +128,7 @@ def _rms(residuals: Iterable[FloatArray]) -> float:
     return float(np.sqrt(np.nanmean(np.concatenate([np.ravel(z) for z in residuals]) ** 2)))
 
 
-def _per_signal(problem: LeastSquares, folds: Sequence[_Fold], known: bool) -> dict[str, Any]:
+def _per_signal(problem: LeastSquares, folds: Sequence[Withheld], known: bool) -> dict[str, Any]:
     """Return the rms of each signal, in standard deviations and in its own unit."""
     found = {}
     first = problem.experiments[0]
@@ -185,276 +144,6 @@ def _per_signal(problem: LeastSquares, folds: Sequence[_Fold], known: bool) -> d
     return found
 
 
-class _Judge:
-    """Judges a hypothesis on each test in turn."""
-
-    def __init__(self, problem: LeastSquares, none: Hypothesis, best: Hypothesis,
-                 groups: Sequence[str]) -> None:
-        """Take the derivatives at the model as configured and at both optima."""
-        self._problem = problem
-        self._groups = groups
-        self._settings: Settings = problem.settings
-        none, best = (h.with_jacobian(problem) for h in (none, best))
-        self._none, self._best = none, best
-        self._without, self._with = (Slopes.of(problem, h.state) for h in (none, best))
-        self._start: dict[str, float] = {}
-        for form in best.forms:
-            self._start.update(form.start)
-        self._effects = {p.name for form in best.forms for p in form.parameters}
-        self._nuisances = [p for p in best.state.parameters if p.name not in self._effects]
-        if best.effects or len(problem.experiments) == 1:
-            at = with_initial_conditions(problem, self._start)
-            self._neutral = Slopes.of(problem, problem.start(best.state.parameters, at))
-
-    # -- training ------------------------------------------------------------------------------
-
-    def _trained(self, part: Part) -> tuple[LeastSquares, FitState, FitState]:
-        """Return a part's problem, and its fits without and with the effects."""
-        problem = LeastSquares(part, settings=self._settings)
-        own = part.parameters(self._best.state.parameters)
-        start = begun(part, self._best.forms, self._start, self._settings)
-        found = trained(part, own, start, [
-            slopes.for_part(part, own) for slopes in (self._neutral, self._with)], self._settings)
-        if not self._best.effects:
-            return problem, found, found
-        # The fit without effects begins where the one with them ended. It is run to its end only
-        # where that could matter.
-        bare = part.parameters(self._none.state.parameters)
-        unaided = problem.fit(
-            problem.start(bare, found.point(), self._without.for_part(part, bare)),
-            self._settings.held_out.iterations)
-        search = self._settings.search
-        if (unaided.cost < (1.0 + search.doubtful) * found.cost
-                or problem.leaves_much(found)):
-            options = self._settings.held_out
-            unaided = settled(problem, unaided, search, options.passes, options.iterations)
-            found = min(found, self._added(problem, part, unaided), key=lambda s: s.cost)
-        return problem, unaided, found
-
-    def _added(self, problem: LeastSquares, part: Part, unaided: FitState) -> FitState:
-        """
-        Fit the effects on top of a fit without them.
-
-        A fit of everything at once may bend the nuisances to what a ripple does, and stop there.
-        """
-        own = part.parameters([p for p in self._best.state.parameters if p.name in self._effects])
-        point = {**unaided.point(), **self._start}
-        state = problem.start_from(
-            part.parameters(self._nuisances), unaided.jacobian, own, point)
-        return trained(part, state.parameters, point, [state.jacobian], self._settings)
-
-    def _in_local_minimum(self, problem: LeastSquares, found: FitState) -> bool:
-        """
-        Return whether the values of the fit to all tests fit some tests better than `found` does.
-
-        Those values have seen what is withheld. A training fit takes nothing from them.
-        """
-        of_all = problem.start(found.parameters, self._best.state.point(), found.base_jacobian)
-        return of_all.cost < found.cost - self._settings.penalty.parameter
-
-    def _undetermined(self, problem: LeastSquares, unaided: FitState, found: FitState,
-                      ) -> tuple[dict[str, str], FloatArray]:
-        """Return the reasons why effects cannot be judged, by id, and the fit's covariance."""
-        own = [v for p, v in zip(found.parameters, inflation(problem, found), strict=True)
-               if p.name in self._effects]
-        posterior = covariance(found, fmean(own or [1.0]), self._settings.interval)
-        price = self._settings.penalty.parameter
-        gain = unaided.cost - found.cost
-        stuck = self._in_local_minimum(problem, found)
-        reasons = {}
-        for effect, form in zip(self._best.effects, self._best.forms, strict=True):
-            if form.is_course or any(p.experiment is not None for p in form.parameters):
-                reasons[effect] = 'its numbers belong to one test alone'
-            elif stuck:
-                reasons[effect] = 'the fit to the training data stopped in a local minimum'
-            elif gain < price:
-                reasons[effect] = (f'the training data gain {max(gain, 0.0):.1f} by the effects, '
-                                   f'less than the price of a parameter, {price:g}')
-            else:
-                ratio = _deviations(form, found, posterior)
-                if ratio < 1.0:
-                    reasons[effect] = ('the training data do not determine it: its value is '
-                                       f'{ratio:.1f} standard deviations')
-        return reasons, posterior
-
-    def _unseen_labels(self, testing: Part, training: Part) -> dict[str, str]:
-        """Return the reasons why effects cannot be judged whose label training does not have."""
-        [test] = testing.experiments
-        reasons = {}
-        for effect, form in zip(self._best.effects, self._best.forms, strict=True):
-            for key, value in {p.label for p in form.parameters if p.label}:
-                if test.labels.get(key, '') == value and not any(
-                        e.labels.get(key, '') == value for e in training.experiments):
-                    reasons[effect] = f'no other test has the label {key}: {value}'
-        return reasons
-
-    # -- judging -------------------------------------------------------------------------------
-
-    def withheld(self, k: int) -> _Fold:
-        """Judge on test k what the other tests have taught."""
-        machine, groups = self._problem.machine, self._groups
-        testing = Part(machine, [k])
-        bare = self._fitted(testing, self._none.state.parameters, {}, self._none.state.point(),
-                            self._without)
-        problem = LeastSquares(testing, settings=self._settings)
-        fold = self._fold(k, _gap(testing, bare.point()), problem.residuals_of(bare, 0))
-        if not self._best.effects:
-            return fold
-        part = Part(machine, [i for i, group in enumerate(groups) if group != groups[k]])
-        training, unaided, found = self._trained(part)
-        reasons, posterior = self._undetermined(training, unaided, found)
-        reasons = {**reasons, **self._unseen_labels(testing, part)}
-        fold = replace(fold, reasons=reasons)
-        judged = self._judged(reasons)
-        if not judged:
-            return fold
-        held = {**dict.fromkeys(self._effects, 0.0), **self._start,
-                **{p.name: found.value(p.name) for p in judged}}
-        # the nuisances begin where training has left them
-        own = {p.name for p in testing.parameters(self._nuisances) if p.experiment is not None}
-        begin = {name: value for name, value in found.point().items() if name not in own}
-        state = self._fitted(testing, self._nuisances, held, {**begin, **held}, self._with)
-        # they begin again where the fit without effects has left them, or the fit to all tests
-        others = [bare.point()] if problem.leaves_much(state) else []
-        if self._in_local_minimum(
-                LeastSquares(testing.holding(held), settings=self._settings), state):
-            others.append(self._best.state.point())
-        state = min([state, *(
-            self._fitted(testing, self._nuisances, held, {**other, **held}, self._with)
-            for other in others)], key=lambda fit: fit.cost)
-        point = {**held, **state.point()}
-        fold = replace(fold, reasons={**reasons, **self._unseen(problem, point, state.residual,
-                                                                reasons)})
-        known = np.linalg.pinv(state.hessian + np.diag(prior_precision(state.parameters)))
-
-        def followed(drawn: FloatArray) -> FloatArray:
-            # what a draw leaves once the offsets have followed it
-            changes = (drawn - state.residual).T.astype(np.float32)
-            steps = known @ weighted_product(state.jacobian, state.weight, changes)
-            return drawn - (state.jacobian @ steps.astype(np.float32)).T
-
-        return self._completed(fold, problem, point, state.residual, found, posterior, followed)
-
-    def second_half(self, k: int) -> _Fold:
-        """Judge on the second half of a test what the first half has taught."""
-        machine, whole = self._problem.machine, self._problem.experiments[k]
-        middle = 0.5 * (whole.time[0] + whole.time[-1])  # a window may begin later than its run
-        first = (whole.time < middle)[:, np.newaxis]
-        part, testing = (
-            Part(machine, [k], [replace(whole, measured=np.where(used, whole.measured, np.nan))])
-            for used in (first, ~first))
-        problem, unaided, found = self._trained(part)
-        own = LeastSquares(testing, settings=self._settings)
-        fold = self._fold(k, _gap(testing, unaided.point()),
-                          _shaped(own, own.residuals(unaided.point())))
-        if not self._best.effects:
-            return fold
-        reasons, posterior = self._undetermined(problem, unaided, found)
-        fold = replace(fold, reasons=reasons)
-        judged = self._judged(reasons)
-        if not judged:
-            return fold
-        left_out = {p.name for effect, form in zip(self._best.effects, self._best.forms,
-                                                   strict=True)
-                    if effect in reasons for p in form.sizes}
-        point = {**found.point(), **dict.fromkeys(left_out, 0.0)}
-        residual = own.residuals(point)
-        fold = replace(fold, reasons={**reasons, **self._unseen(own, point, residual, reasons)})
-        return self._completed(fold, own, point, residual, found, posterior)
-
-    def _unseen(self, problem: LeastSquares, point: dict[str, float], residual: FloatArray,
-                reasons: Mapping[str, str]) -> dict[str, str]:
-        """
-        Return the reasons why effects cannot be judged that a withheld test does not show.
-
-        A limit that a test does not reach changes nothing there, whatever its derivative says.
-        `residual` is that at the point.
-        """
-        unseen = {}
-        for effect, form in zip(self._best.effects, self._best.forms, strict=True):
-            if effect not in reasons:
-                without = problem.residuals({**point, **{p.name: 0.0 for p in form.sizes}})
-                if 0.5 * float(np.sum(np.square(residual - without))) < (
-                        self._settings.penalty.parameter):
-                    unseen[effect] = 'the withheld data do not show it'
-        return unseen
-
-    def _judged(self, reasons: Mapping[str, str]) -> list[Parameter]:
-        """Return the numbers of the effects that can be judged."""
-        return [p for effect, form in zip(self._best.effects, self._best.forms, strict=True)
-                if effect not in reasons for p in form.parameters]
-
-    def _fold(self, k: int, gap: FloatArray, before: FloatArray) -> _Fold:
-        experiment = self._problem.experiments[k]
-        return _Fold(experiment.name, experiment.time, gap, before)
-
-    def _completed(self, fold: _Fold, problem: LeastSquares, point: Mapping[str, float],
-                   residual: FloatArray, found: FitState, posterior: FloatArray,
-                   followed: Callable[[FloatArray], FloatArray] = lambda drawn: drawn) -> _Fold:
-        """
-        Return a fold with what is left, and with draws of the numbers that can be judged.
-
-        Parameters
-        ----------
-        fold
-            with the reasons why the others cannot
-        problem, point, residual
-            the withheld test, where it is judged, and the residual there, shape (n c,)
-        found, posterior
-            the fit to the training data, and the covariance of its numbers
-        followed
-            of residuals with draws, shape (draws, n c), those that are left once the nuisances
-            have followed
-
-        """
-        judged = self._judged(fold.reasons)
-        if not judged:
-            return fold
-        names = [p.name for p in found.parameters]
-        places = [names.index(p.name) for p in judged]
-        # rounding may leave the least variance just below zero
-        draws = np.random.default_rng(0).multivariate_normal(
-            found.x[places], posterior[np.ix_(places, places)], self._settings.held_out.draws,
-            method='eigh', check_valid='ignore')
-        drawn = followed(problem.residuals_at([
-            {**point, **{p.name: min(max(value, p.low), p.high)
-                         for p, value in zip(judged, draw, strict=True)}}
-            for draw in draws.tolist()]))
-        return replace(
-            fold, judged=tuple(e for e in self._best.effects if e not in fold.reasons),
-            gap_after=_gap(problem.machine, point),
-            after=_shaped(problem, residual),
-            names=tuple(p.name for p in judged), values=found.x[places],
-            drawn=np.array([_shaped(problem, z) for z in drawn]))
-
-    def _fitted(self, testing: Part, nuisances: Sequence[Parameter], held: Mapping[str, float],
-                begin: Mapping[str, float], slopes: Slopes) -> FitState:
-        """Fit the nuisances to a withheld test, with some values held."""
-        own = testing.parameters(nuisances)
-        return trained(testing.holding(held), own, begin, [slopes.for_part(testing, own)],
-                       self._settings)
-
-
-def _gap(machine: Machine, point: Mapping[str, float]) -> FloatArray:
-    """Return measured minus predicted of a single test, shape (n, c)."""
-    return machine.experiments[0].measured - machine.predict(point, 0)
-
-
-def _shaped(problem: LeastSquares, residual: FloatArray) -> FloatArray:
-    """Return the residuals of a single test, NaN where nothing is judged, shape (n, c)."""
-    shape = problem.experiments[0].measured.shape
-    return np.where(problem.valid, residual, np.nan).reshape(shape)
-
-
-def _deviations(form: Form, found: FitState, posterior: FloatArray) -> float:
-    """Return how far the sizes of an effect are from zero, in standard deviations."""
-    names = [p.name for p in found.parameters]
-    places = [names.index(p.name) for p in form.sizes]
-    sizes = found.x[places]
-    square = float(sizes @ np.linalg.pinv(posterior[np.ix_(places, places)]) @ sizes)
-    return math.sqrt(max(square, 0.0) / len(places))
-
-
 # -- the interval --------------------------------------------------------------------------------
 
 def block_sums(time_s: FloatArray, before: FloatArray, after: FloatArray,
@@ -467,7 +156,7 @@ def block_sums(time_s: FloatArray, before: FloatArray, after: FloatArray,
                        np.isfinite(before).sum(axis=1))])
 
 
-def _bootstrapped(folds: Sequence[_Fold],
+def _bootstrapped(folds: Sequence[Withheld],
                   problem: LeastSquares) -> tuple[float, list[float | None]]:
     """Return the explained fraction with its 95 percent interval, see `_INTERVAL`."""
     settings, block_s = problem.settings.held_out, problem.machine.time_scales.block_s
@@ -489,7 +178,7 @@ def _bootstrapped(folds: Sequence[_Fold],
             [float(np.quantile(fractions, 0.025)), float(np.quantile(fractions, 0.975))])
 
 
-def _after(fold: _Fold) -> FloatArray:
+def _after(fold: Withheld) -> FloatArray:
     """Return what is left, which is everything if nothing can be judged."""
     return fold.before if fold.after is None else fold.after
 

@@ -38,6 +38,7 @@ TRIALS_9_TO_11 = 'trials 9 to 11'
 TRIAL_12 = 'trial 12'
 TRIALS_9_TO_12 = 'trials 9 to 12'
 TRIALS_12_AND_13 = 'trials 12 and 13'
+TRIAL_15 = 'trial 15'
 WILD = 'wild practice cases'
 
 
@@ -308,6 +309,9 @@ class HeldOutSettings:
         'Jacobians')
     passes: int = _setting(
         1, '1', 'greatest number of fresh Jacobians of a fit to the training data')
+    further_passes: int = _setting(
+        4, '1', 'the same where the values of the fit to all tests fit the training data better',
+        TRIAL_15)
     no_gap: float = _setting(
         1e-3, '1', 'gap, as a share of the energy before, below which nothing is to be explained')
     no_harm: float = _setting(

@@ -217,6 +217,41 @@ def test_what_a_training_in_a_local_minimum_taught_is_not_judged(truth: float) -
     assert not refuted(found)
 
 
+class Placed(Ramp):
+    """A slow ramp whose zero may be either of two places, until its size tells which."""
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return the ramp, with a wave that grows with the size and turns with the zero."""
+        size, zero = point.get(SIZE.name, 0.0), point.get('zero', 0.0)
+        return np.asarray(size * self._shown[experiment] + zero ** 2 - 0.25
+                          + 0.1 * size * zero * np.sin(3.0 * TIME))[:, None]
+
+    def initial_conditions(self, experiment: int) -> Sequence[Sequence[Point]]:
+        """Return both places."""
+        return [[{'zero': 0.5}, {'zero': -0.5}]]
+
+
+@pytest.mark.parametrize('passes', [0, 4])
+def test_initial_conditions_are_chosen_again_where_a_training_has_stopped_short(
+        passes: int) -> None:
+    """
+    At no size both places are alike, and the first is taken. The truth is the second.
+
+    All sizes that are tried out before a fit are far too great.
+    """
+    truth = {SIZE.name: 1.0, 'zero': -0.5}
+    size = replace(SIZE, low=-1e4, high=1e4)
+    problem = LeastSquares(recorded(Placed([0.0] * 3, shows=[0.008] * 3), truth),
+                           settings=DEFAULT.changed('held_out.further_passes', passes))
+    found = held_out(
+        problem, Hypothesis((), (), problem.fit(problem.start([ZERO], {}), 20)),
+        Hypothesis((EFFECT.id,), (Form('', (size,)),), problem.start([ZERO, size], truth)))
+    assert [fold['judged'] for fold in found['folds']] == [
+        ['spring.rate'] if passes else []] * 3
+    if passes:
+        assert found['explained_fraction']['value'] == pytest.approx(1.0, abs=0.02)
+
+
 class Burst(Ramp):
     """A ramp whose zero moves ten readings of the last test far away, most of all near -0.85."""
 
