@@ -120,9 +120,10 @@ class Judge:
 
     def _finished(self, problem: LeastSquares, found: FitState) -> FitState:
         """
-        Go on with a fit that has stopped short, with fresh derivatives.
+        Go on with a training fit while it is in a local minimum and gains.
 
-        Initial conditions that were chosen before the fit may not be the best after it.
+        It gets fresh derivatives. Initial conditions that were chosen before the fit may not be
+        the best after it, and are chosen again.
         """
         options = self._settings.held_out
         for _ in range(options.further_passes):

@@ -258,8 +258,8 @@ def unknown_probability(lack: LackOfFit, settings: VerdictSettings) -> float:
     # what such a form leaves repeats itself with the motion, and counts by its share only
     regular = (_logistic(logit(lack.regular, settings.regular, settings.regular_slope))
                * (_logistic(left) if lack.named else 1.0))
-    # a sensor may be noisier than its sheet says; but noise does not shrink with an effect. What
-    # shrinks without any is a zero or a delay that was fitted, and excuses nothing.
+    # a sensor may be noisier than its sheet says; but noise does not shrink with an effect.
+    # Without an effect it is a fitted zero or delay that makes a residual less loud.
     fast = (_logistic(logit(lack.fast, settings.fast, settings.fast_slope))
             * (_logistic(logit(lack.fast_left, settings.fast_left, settings.fast_left_slope))
                if lack.named else 1.0))
