@@ -122,10 +122,9 @@ setup(
             'flake8-builtins',
             'flake8-comprehensions',
             'flake8-deprecated',
-            'flake8-docstrings',
+            'flake8-docstrings',  # which is pydocstyle, as in ament_pep257
             'flake8-import-order',
             'flake8-quotes',
-            'pydocstyle >= 6.1',
             'vermin',  # tells what the oldest Python lacks
         ],
         # what the emulator is measured against, and dask as a cluster; PathSim and Drake change

@@ -130,7 +130,7 @@ async def _join(url: str) -> None:
     piece = await client.until(lambda: client.pieces[-1] if client.pieces else None)
     assert struct.unpack_from('<4I5d', piece)[2] == len(hello['signals'])
     assert (await client.ask('run', service='pause'))['ok']
-    await client.until(lambda: client.notices['state']['state'] == 'paused')
+    await client.until(lambda: client.notices.get('state', {}).get('state') == 'paused')
     told = await client.ask('experiment', name='T1')
     assert not told['ok'] and 'start the drive with config old_circuit' in told['reason']
     assert (await client.ask('run', service='resume'))['ok']
