@@ -250,7 +250,7 @@ class ByLabel(Machine):
         result, held = dict(point), set[str]()
         for k in range(len(self.experiments)):
             found, names = self.inner.take_over(self.in_test(point, k), bases)
-            result.update({name: found[name] for name in names})
+            result.update({name: value for name, value in found.items() if name in result})
             held |= names
             for p in (p for form in forms for p in form.parameters):
                 base, label = self._parts(p.name)

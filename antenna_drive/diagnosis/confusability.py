@@ -14,26 +14,34 @@
 """
 Which effects a set of tests can and cannot tell apart, before the tests are made.
 
-The derivative by each effect is projected onto what the nuisances cannot imitate. What remains,
-in standard deviations of the sensors, says how small an effect shows. The angle between what
-remains of two effects says whether one passes for the other.
+An effect shows if it does more than its price even where the nuisances imitate as much of it as
+their tolerances allow. All derivatives are taken at one point, and what may be their error shows
+nothing. The angle between what the nuisances cannot imitate of two effects says whether one passes
+for the other.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+import math
 from typing import Any
 
+from antenna_drive.diagnosis.box_qp import box_constrained_step
 from antenna_drive.diagnosis.cholesky import factored, ROUNDING, solved
-from antenna_drive.diagnosis.least_squares import FitState, LeastSquares, proper_precision
-from antenna_drive.diagnosis.machine import FloatArray, Machine
+from antenna_drive.diagnosis.least_squares import (
+    FitState, LeastSquares, prior_precision, proper_precision,
+)
+from antenna_drive.diagnosis.machine import FloatArray, Machine, Parameter
 from antenna_drive.diagnosis.noise import with_model_error
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
 import numpy as np
+from scipy.optimize import brentq
 
-# share of a single-precision column's power that may be rounding
-_POWER_ROUNDING = 1e-6
+# a size is told to this share of itself
+_SHARE = 0.01
+# nothing that is left, for its logarithm [half chi-square]
+_LEAST_LEFT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -44,8 +52,8 @@ class Confusability:
     Attributes
     ----------
     effects : ids, m of them
-    detectable : least size that shows, in the unit of the effect's first parameter; infinite if
-        none does; shape (m,)
+    detectable : least size that shows in any case, in the unit of the effect's first parameter;
+        infinite if none within its bounds does; shape (m,)
     units : of that size
     alike : share of the squared remainder of one effect that another can imitate, shape (m, m)
     limit : share from which two effects count as alike
@@ -125,20 +133,18 @@ def visibility(problem: LeastSquares, state: FitState,
     factor = factored(known / np.outer(scale, scale), ROUNDING)
     ids, units, sizes, remainders = [], [], [], []
     price = settings.penalty.effect + settings.penalty.parameter
+    imitation = _Imitation(state, settings.interval.derivative_error)
     for i, effect in enumerate(machine.effects.values()):
         progress(i / len(machine.effects))
         form = machine.typical_form(effect)
         first = form.parameters[0]
         column = problem.jacobian({**state.point(), **form.start}, [first], state.residual,
                                   central=False)[:, 0]
-        cross = jacobian.T @ column
+        cross = (jacobian.T @ column).astype(float)
         imitated = solved(factor, cross / scale) / scale
-        power = float(column @ column - cross @ imitated)
         ids.append(effect.id)
         units.append(first.unit)
-        # an effect is named if it gains more than its price, and is larger than its tolerance
-        sizes.append(max(np.sqrt(2.0 * price / power), first.tolerance)
-                     if power > _POWER_ROUNDING * float(column @ column) else np.inf)
+        sizes.append(imitation.least_visible(first, float(column @ column), cross, price))
         remainders.append(column - jacobian @ imitated)
     matrix = np.array(remainders)
     gram = matrix @ matrix.T
@@ -146,6 +152,63 @@ def visibility(problem: LeastSquares, state: FitState,
     alike = (gram / np.outer(size, size)) ** 2
     return Confusability(tuple(ids), np.array(sizes), tuple(units), np.asarray(alike),
                          settings.confusability.alike)
+
+
+class _Imitation:
+    """What nuisances within their bounds leave of an effect, by derivatives at one point."""
+
+    def __init__(self, state: FitState, derivative_error: float) -> None:
+        self._error = derivative_error
+        self._hessian = state.hessian + np.diag(prior_precision(state.parameters))
+        self._low = np.array([p.low for p in state.parameters]) - state.x
+        self._high = np.array([p.high for p in state.parameters]) - state.x
+
+    def left(self, size: float, power: float, cross: FloatArray) -> float:
+        """
+        Return what is surely left of an effect, in halves of a chi-square.
+
+        Parameters
+        ----------
+        size
+            of the effect
+        power, cross
+            products of its column with itself and with those of the nuisances, shape (m,)
+
+        """
+        gradient = -size * cross
+        step = box_constrained_step(self._hessian, gradient, self._low, self._high)
+        whole = 0.5 * size ** 2 * power
+        imitated = float(gradient @ step - 0.5 * step @ self._hessian @ step)
+        return whole * (1.0 - self._error ** 2) - imitated
+
+    def least_visible(self, number: Parameter, power: float, cross: FloatArray,
+                      price: float) -> float:
+        """
+        Return the size from which an effect is named, whichever sign it has.
+
+        It is then larger than its tolerance, and more than its price is left of it.
+        """
+        # where nothing imitates it; a little less, so that rounding does not make it visible
+        least = (1.0 - _SHARE) * math.sqrt(2.0 * price / power) if power > 0.0 else math.inf
+        least = max(least, number.tolerance)
+
+        def of_sign(sign: float, bound: float) -> float:
+            def surplus(log_size: float) -> float:
+                left = self.left(sign * math.exp(log_size), power, cross)
+                return math.log(max(left, _LEAST_LEFT) / price)
+
+            if bound <= least:
+                return math.inf
+            low, high = math.log(least), math.log(bound)
+            if surplus(low) >= 0.0:
+                return least
+            if surplus(high) < 0.0:
+                return math.inf
+            # what is left over the square of the size grows with it, so there is one such size
+            return math.exp(brentq(surplus, low, high, xtol=_SHARE))
+
+        return max(of_sign(sign, bound)
+                   for sign, bound in ((-1.0, -number.low), (1.0, number.high)) if bound > 0.0)
 
 
 def could_hide(problem: LeastSquares, state: FitState) -> list[dict[str, Any]]:

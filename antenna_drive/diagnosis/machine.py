@@ -500,7 +500,8 @@ class Machine(ABC):
         Return a point at which effects alone stand for their numbers.
 
         A nuisance may stand for the very number that an effect changes. Both together are not
-        determined, so the nuisance is held at zero, and the effect takes over its value.
+        determined, so the nuisance is held at zero, and the effect takes over its value. Of
+        several nuisances it takes over what they have in common.
 
         Parameters
         ----------

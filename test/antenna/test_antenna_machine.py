@@ -93,18 +93,21 @@ def test_a_source_of_bias_that_is_off_gives_as_much_more() -> None:
 
 
 def test_an_effect_takes_over_the_tolerance_of_its_own_number(model: AntennaMachine) -> None:
-    """The readings stay; of an effect in both motors neither tolerance is its number."""
+    """The readings stay, and so do the differences between motors."""
     for effect, path in (('axis.coulomb_friction', 'plant.axis.coulomb_torque'),
                          ('torque_share.filter_1_gain', 'torque_share.filter_1.gain'),
                          ('motors.amplifier_gain', '')):
         form = model.effects[effect].forms[0]
         size = form.sizes[0].name
         point = {**dict.fromkeys((p.name for p in model.nuisances), 0.0), **form.start, size: 0.1}
-        if path:
-            point[f'offset:{path}'] = 0.015
+        for name, value in ({f'offset:{path}': 0.015} if path else {
+                'offset:motor_1.amplifier.rate_gain': 0.02,
+                'offset:motor_2.amplifier.rate_gain': 0.01}).items():
+            point[name] = value
         taken, held = model.take_over(point, [form])
         assert held == ({f'offset:{path}'} if path else set())
         assert all(taken[name] == 0.0 for name in held)
+        assert taken[size] == pytest.approx(1.1 * 1.015 - 1.0)
         before, after = (model.simulate([at])[0] for at in (point, taken))
         for experiment, a, b in zip(model.experiments, before, after, strict=True):
             assert a is not None and b is not None

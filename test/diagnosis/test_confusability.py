@@ -24,7 +24,9 @@ import pytest
 
 TIME: FloatArray = np.linspace(-1.0, 1.0, 400)
 STRONG = 1e6
+PRICE = DEFAULT.penalty.effect + DEFAULT.penalty.parameter
 CURVE = Parameter('body.curve.size', '1', -10.0, 10.0, 1e-3)
+SHIFT = Parameter('body.shift.size', 'm', -100.0, 100.0, 1e-3)
 
 
 class Line(Machine):
@@ -52,5 +54,37 @@ def test_the_least_size_is_that_of_the_part_that_nuisances_cannot_imitate() -> N
     lines = np.stack([np.ones(TIME.size), TIME], axis=1)
     square = TIME ** 2
     rest = square - lines @ np.linalg.lstsq(lines, square, rcond=None)[0]
-    price = DEFAULT.penalty.effect + DEFAULT.penalty.parameter
-    assert found.detectable == pytest.approx([np.sqrt(2.0 * price / (rest @ rest))], rel=0.01)
+    sure = rest @ rest - DEFAULT.interval.derivative_error ** 2 * (square @ square)
+    assert found.detectable == pytest.approx([np.sqrt(2.0 * PRICE / sure)], rel=0.01)
+
+
+class Shifted(Machine):
+    """A machine whose reading is off by a zero within bounds, or by an effect that looks alike."""
+
+    def __init__(self, bound: float) -> None:
+        super().__init__([Experiment(
+            'line', TIME, ('y',), ('m',), np.zeros((TIME.size, 1)), np.ones((TIME.size, 1)))],
+            [Parameter('zero', 'm', -bound, bound, 1e-3)],
+            [Effect('body.shift', 'body', '', '', (Form('', (SHIFT,)),))])
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return a constant."""
+        return np.full((TIME.size, 1), point.get('zero', 0.0) + point.get(SHIFT.name, 0.0))
+
+
+@pytest.mark.parametrize(('bound', 'at'), [(0.5, 0.0), (40.0, 0.0), (0.5, 0.3)])
+def test_nuisances_imitate_an_effect_as_far_as_their_bounds_allow(bound: float, at: float) -> None:
+    problem = LeastSquares(Shifted(bound))
+    found = visibility(problem, problem.start(problem.machine.nuisances, {'zero': at}))
+    # a shift away from the further bound has the most room; a tenth of it may be an error:
+    # (size - room)^2 - (size / 10)^2 = 2 price / count
+    room, sure = bound + at, 1.0 - DEFAULT.interval.derivative_error ** 2
+    rest = room ** 2 - 2.0 * PRICE / TIME.size
+    assert found.detectable == pytest.approx(
+        [(room + np.sqrt(room ** 2 - sure * rest)) / sure], rel=0.01)
+
+
+def test_an_effect_that_no_size_shows_could_always_hide() -> None:
+    problem = LeastSquares(Shifted(2.0 * SHIFT.high))
+    found = visibility(problem, problem.start(problem.machine.nuisances, {}))
+    assert found.detectable == [np.inf]

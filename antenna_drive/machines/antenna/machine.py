@@ -21,6 +21,7 @@ from concurrent.futures import ThreadPoolExecutor
 import copy
 from dataclasses import dataclass, replace
 import math
+from statistics import fmean
 from threading import Lock
 from typing import Any, TypeAlias
 
@@ -303,18 +304,27 @@ class AntennaMachine(Machine):
         return result
 
     def take_over(self, point: Point, forms: Sequence[Form]) -> tuple[dict[str, float], set[str]]:
-        """Return a point at which effects of one number alone stand for it."""
+        """
+        Return a point at which effects alone stand for their numbers.
+
+        An effect of several numbers, such as one in both motors, takes over what their tolerances
+        have in common. These stay free, because the numbers may differ from each other.
+        """
         result, held = dict(point), set()
         for item in (p for form in forms for p in form.sizes):
             assert isinstance(item, AntennaParameter)
-            modifier = item.modifier
-            tolerance = self._tolerance_of.get((''.join(modifier.fields[:1]), modifier.how))
-            if tolerance is None or tolerance.modifier.fields != modifier.fields:
+            how, fields = item.modifier.how, item.modifier.fields
+            same = [found for path in fields if (found := self._tolerance_of.get((path, how)))]
+            if not same or len(same) < len(fields):
                 continue
-            both = _together(result[item.name], result.get(tolerance.name, 0.0), modifier.how)
-            result[item.name] = min(max(both, item.low), item.high)
-            result[tolerance.name] = 0.0
-            held.add(tolerance.name)
+            common = fmean(result.get(tolerance.name, 0.0) for tolerance in same)
+            together = _together(result[item.name], common, how)
+            result[item.name] = min(max(together, item.low), item.high)
+            for tolerance in same:
+                rest = _apart(result.get(tolerance.name, 0.0), common, how)
+                result[tolerance.name] = min(max(rest, tolerance.low), tolerance.high)
+            if len(same) == 1:
+                held.add(same[0].name)
         return result, held
 
     # -- running -------------------------------------------------------------------------------
@@ -486,6 +496,11 @@ def _in_common(sheets: Iterable[TestSheet]) -> TestSheet:
 def _together(one: float, other: float, how: str) -> float:
     """Return two changes of one number as one."""
     return one + other if how == ADD else (1.0 + one) * (1.0 + other) - 1.0
+
+
+def _apart(both: float, other: float, how: str) -> float:
+    """Return the change of a number that makes both with another one."""
+    return both - other if how == ADD else (1.0 + both) / (1.0 + other) - 1.0
 
 
 def _tolerated(effect: Effect, tolerances: Sequence[AntennaParameter]) -> Effect:
