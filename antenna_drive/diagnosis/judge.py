@@ -116,7 +116,18 @@ class Judge:
             unaided = settled(problem, unaided, search, options.passes, options.iterations)
             found = self._finished(problem, min(
                 found, self._added(problem, part, unaided), key=lambda s: s.cost))
-        return problem, unaided, found
+        return problem, unaided, self._taken_over(problem, found)
+
+    def _taken_over(self, problem: LeastSquares, found: FitState) -> FitState:
+        """
+        Return a training fit whose effects alone stand for their numbers.
+
+        Only they are taken to the withheld test. What a tolerance has of them would be lost.
+        """
+        at, _ = self._problem.machine.take_over(found.point(), self._best.forms)
+        if at == found.point():
+            return found
+        return problem.start(found.parameters, at, found.jacobian)
 
     def _finished(self, problem: LeastSquares, found: FitState) -> FitState:
         """

@@ -98,6 +98,33 @@ def test_an_effect_that_turns_its_sign_explains_less_than_nothing_elsewhere() ->
     assert fraction['value'] == -1.0 and fraction['ci95'][1] < 0.0
 
 
+class Shared(Ramp):
+    """A ramp whose size is also the number of a tolerance, which the effect takes over."""
+
+    tolerance = Parameter('tolerance', '1', -0.1, 0.1, 1e-3)
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return the ramp."""
+        whole = point.get(SIZE.name, 0.0) + point.get('tolerance', 0.0)
+        return super().predict({**point, SIZE.name: whole}, experiment)
+
+    def take_over(self, point: Point, forms: Sequence[Form]) -> tuple[dict[str, float], set[str]]:
+        """Return a point at which the effect alone stands for the number."""
+        if SIZE.name not in point:
+            return dict(point), set()
+        return {**point, SIZE.name: point[SIZE.name] + point['tolerance'], 'tolerance': 0.0}, set()
+
+
+def test_what_a_tolerance_has_of_an_effect_in_training_is_the_effect() -> None:
+    problem = LeastSquares(Shared([0.37, 0.37, 0.37]))
+    free = [ZERO, Shared.tolerance]
+    none = Hypothesis((), (), problem.fit(problem.start(free, {}), 20))
+    best = problem.fit(problem.start([*free, SIZE], {}), 20)
+    found = held_out(problem, none, Hypothesis((EFFECT.id,), EFFECT.forms, best))
+    assert [fold['values'][SIZE.name] for fold in found['folds']] == pytest.approx(
+        [0.37] * 3, abs=1e-3)
+
+
 def test_a_share_names_the_effects_that_it_is_of() -> None:
     """What belongs to one test is never judged, and has no part in what the other explains."""
     machine = Ramp([0.5, 0.5, 0.5])
