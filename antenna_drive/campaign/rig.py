@@ -55,13 +55,26 @@ KEPT = 3000
 
 
 class InVainError(Exception):
-    """What had to come has not come."""
+    """
+    What had to come has not come.
+
+    Attributes
+    ----------
+    logs : the end of what each process of that drive wrote, by its name
+
+    """
+
+    def __init__(self, message: str, logs: Mapping[str, str]) -> None:
+        """Say what has not come."""
+        super().__init__(message)
+        self.logs = dict(logs)
 
 
 class Said(NamedTuple):
     """A report on /diagnostics: when it came [s], of whom, how bad, its text and values."""
 
     time_s: float
+    namespace: str
     node: str
     level: int
     message: str
@@ -85,7 +98,8 @@ class Diagnostics:
         now = time.monotonic()
         for status in message.status:
             self.count += 1
-            self.said.append(Said(now, status.name.rpartition('/')[2],
+            namespace, _, node = status.name.rpartition('/')
+            self.said.append(Said(now, namespace, node,
                                   int.from_bytes(status.level, 'little'), status.message,
                                   {item.key: item.value for item in status.values}))
 
@@ -209,6 +223,7 @@ class Rig:
 
         """
         self.outcome = outcome
+        self.namespace = namespace
         self.settings = dict(settings or {})
         self.said = Diagnostics() if said is None else said
         self._owns_said = said is None
@@ -258,7 +273,10 @@ class Rig:
         began = time.monotonic()
         while not true():
             if time.monotonic() - began > patience_s:
-                raise InVainError(f'in vain for {patience_s:g} s: {what}; {self.state()}')
+                raise InVainError(
+                    f'in vain for {patience_s:g} s: {what}; {self.state()}',
+                    {name: self.processes.log(name)[-1500:] for name in self.names
+                     if self._has_started(name)})
             time.sleep(0.01)
         return time.monotonic() - began
 
@@ -275,7 +293,8 @@ class Rig:
 
     def state(self) -> str:
         """Say in a line where the drive stands."""
-        last = {said.node: said.message for said in self.said.said.copy()}
+        last = {said.node: said.message for said in self.said.said.copy()
+                if said.namespace == self.namespace}
         ended = [f'{name} has ended with {code}' for name in self.names
                  if (code := self.processes.process(name).poll()) is not None]
         return '; '.join((f'watcher at step {self.watcher.step}, run {len(self.watcher.runs)}',
@@ -350,8 +369,7 @@ class Rig:
                  traceback: TracebackType | None) -> bool:
         """End every process; what has come in vain becomes a finding."""
         if isinstance(error, InVainError):
-            self.outcome.find(str(error), 'hangs', logs={
-                name: self.processes.log(name)[-1500:] for name in self.names})
+            self.outcome.find(str(error), 'hangs', logs=error.logs)
         started = [name for name in self.names if self._has_started(name)]
         self.names = tuple(started)
         self.stop()
