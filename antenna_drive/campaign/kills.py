@@ -168,21 +168,23 @@ class _Session:
                     due: bool) -> None:
         if not due:
             return
-        self._outcome.count('kills_to_name')
-        if victim not in UNITS:
-            # the drive may go on for 500 steps without an observer before it has to wait
-            time.sleep(0.1)
-            self._rig.until_still(patience_s)
-            at = max(at, self._rig.watcher.moved_s)
+
+        def stood_since() -> float:
+            """Return when the drive began to wait: it goes on for 500 steps without observers."""
+            return at if victim in UNITS else max(at, self._rig.watcher.moved_s)
 
         def named() -> float | None:
-            return next((said.time_s - at for said in self._rig.said.since(at)
+            return next((said.time_s for said in self._rig.said.since(at)
                          if said.node != victim and victim in said.values.get(
                              'waiting for', '').split(', ')), None)
 
         deadline = at + patience_s
-        while (took := named()) is None and time.monotonic() < deadline:
+        while (told := named()) is None and time.monotonic() < deadline:
             time.sleep(0.02)
+        took = None if told is None else max(0.0, told - stood_since())
+        if told is None and stood_since() > deadline - NAMED_WITHIN_S:
+            return  # it has not waited long enough
+        self._outcome.count('kills_to_name')
         if took is not None and took <= NAMED_WITHIN_S:
             self._outcome.count('kills_named_within_2s')
         else:

@@ -285,12 +285,6 @@ class Rig:
         self.until(lambda: self.watcher.step >= step and len(self.watcher.runs) >= (runs or 1),
                    f'step {step}')
 
-    def until_still(self, patience_s: float) -> None:
-        """Wait until the watcher has seen no step for 0.3 s, but not longer than patience."""
-        deadline = time.monotonic() + patience_s
-        while time.monotonic() < min(deadline, self.watcher.moved_s + 0.3):
-            time.sleep(0.02)
-
     def state(self) -> str:
         """Say in a line where the drive stands."""
         last = {said.node: said.message for said in self.said.said.copy()
