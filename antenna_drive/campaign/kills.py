@@ -21,8 +21,10 @@ run begins without a restart of the others, and its bits are those of one proces
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from pathlib import Path
 import random
+import re
 import signal
 import sys
 import tempfile
@@ -50,6 +52,8 @@ NAMED_WITHIN_S = 2.0
 NOTICED_S = NAMED_WITHIN_S + 0.5
 # How far behind the watcher a recorder may be that the drive waits for [steps].
 BEHIND = 500
+# Steps that a recorder may lack at the end of a run whose node was killed.
+LOST_WITH_NODE = 10
 # What a step takes from the watcher to the recorder and back, on a busy machine [s].
 DELAY_S = 0.2
 
@@ -71,11 +75,13 @@ def run(name: str, options: Mapping[str, Any], rng: random.Random) -> Outcome:
             conductor = (sys.executable, '-m', 'antenna_drive.nodes.command_player', str(field))
         with Rig(outcome, folder, recorder=True, observers=[OBSERVER], conductor=conductor,
                  exchange=exchange, settings=settings, pace=pace) as rig:
+            rig.nodes_are_killed = True
             session = _Session(rig, outcome, rng, folder, expected)
             rig.start()
             rig.until_step(300)
             for number in range(options['kills']):
                 session.strike(number, options['longest_stop_s'])
+            session.note_lost_steps()
         session.check_bags()
     return outcome
 
@@ -92,6 +98,13 @@ def _field(path: Path, rng: random.Random) -> Callable[[int], FloatArray]:
         held = values[:steps]
         return np.stack([held, np.zeros_like(held)], axis=2)
     return expected
+
+
+def _lost_steps(log: str) -> list[list[int]]:
+    """Return what each recorder in a log has said of steps lost so far, in order."""
+    # the first bag of a recorder has no number at its end
+    return [[int(total) for total in re.findall(r'(\d+) steps lost', said)]
+            for said in re.split(r'/start_\d+\n', log)]
 
 
 class _Session:
@@ -142,7 +155,7 @@ class _Session:
         else:
             if way == END:
                 code = process.wait(10.0)
-                if code != 0:
+                if not rig.ended_well(victim, code):
                     outcome.find(f'{victim} ended with {code} after SIGTERM', 'wrong_exits',
                                  log=rig.processes.log(victim)[-2000:], **detail)
             else:
@@ -195,6 +208,14 @@ class _Session:
         if took is not None:
             worst = self._outcome.figures.get('longest_to_name_s', 0.0)
             self._outcome.figures['longest_to_name_s'] = max(worst, round(took, 3))
+
+    def note_lost_steps(self) -> None:
+        """Count the steps that recorders lacked because a node took its last frames along."""
+        lost = [total - before for totals in _lost_steps(self._rig.processes.log(RECORDER))
+                for before, total in pairwise([0, *totals])]
+        self._outcome.count('steps_lost_with_nodes', sum(lost))
+        if max(lost, default=0) > LOST_WITH_NODE:
+            self._outcome.find(f'a recorder lacks {max(lost)} steps of a run', 'lost_steps')
 
     def _note_bag(self, least: int) -> None:
         """Note the bag that a killed recorder has left open, and how long it must be."""

@@ -25,6 +25,7 @@ import sys
 from typing import Any
 
 from antenna_drive.campaign import leftovers
+from antenna_drive.campaign.kills import _lost_steps
 from antenna_drive.campaign.mutations import _fault
 from antenna_drive.campaign.page import page
 from antenna_drive.campaign.readers import Reader
@@ -158,6 +159,16 @@ def test_the_slope_is_that_of_the_means_of_blocks() -> None:
     assert value == pytest.approx(means.slope)
     assert high - value == value - low == pytest.approx(2.101 * means.stderr)
     assert low < 7.0 < high
+
+
+def test_steps_lost_are_told_of_each_recorder_by_itself() -> None:
+    """A recorder says how many it has lost so far; one that is started again begins anew."""
+    begun = '[recorder]: run 7: recording from step {} on to /tmp/bags/start_{}{}\n'
+    lost = '[recorder]: {} steps lost: the recorder or the machine is too slow\n'
+    log = ''.join((begun.format(0, 1795641360, ''), begun.format(0, 1795641360, '_run_2'),
+                   lost.format(1), lost.format(3), begun.format(110, 1795641408, ''),
+                   begun.format(0, 1795641408, '_run_2'), lost.format(2)))
+    assert [totals for totals in _lost_steps(log) if totals] == [[1, 3], [2]]
 
 
 def test_no_garbage_is_a_frame_that_somebody_may_wait_for() -> None:
