@@ -13,6 +13,8 @@
 # limitations under the License.
 """Errors that the user can correct, each one line long."""
 
+_CUT = ' ... '
+
 
 class UserError(Exception):
     """
@@ -27,11 +29,11 @@ class UserError(Exception):
     LONGEST = 6000
 
     def __init__(self, message: str) -> None:
-        """Keep the message in one line of bounded length, whatever it may quote."""
-        line = ' '.join(message.split())
+        """Keep the message in one printable line of bounded length, whatever it may quote."""
+        line = ' '.join(''.join(c if c.isprintable() else ' ' for c in message).split())
         if len(line) > self.LONGEST:
-            half = self.LONGEST // 2
-            line = f'{line[:half]} ... {line[-half:]}'
+            half = (self.LONGEST - len(_CUT)) // 2
+            line = f'{line[:half]}{_CUT}{line[-half:]}'
         super().__init__(line)
 
 

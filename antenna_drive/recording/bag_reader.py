@@ -55,6 +55,7 @@ _MESSAGE = np.dtype([
 _MESSAGE_LENGTH = _MESSAGE.itemsize - 9
 _FEW = 1024  # messages that are looked at at first
 _FOOTER_TAIL = 12  # the summary's checksum and the magic
+LONGEST_NAME = 255  # characters of a file's name; no file system of today takes more
 
 
 class _DamageError(Exception):
@@ -382,14 +383,13 @@ def _files(path: Path) -> tuple[list[Path], dict[str, int] | None]:
     if compression not in ('', 'none', None):
         raise RecordingError(f'{path}: compressed by {one_line(repr(compression), 30)}, which is '
                              'not read here; MCAP compresses its own chunks')
-    files = []
     for name in names:
-        file = path / name
+        if len(name) > LONGEST_NAME:
+            raise RecordingError(f'{path / METADATA}: {one_line(name, 60)} is no name of a file')
         if not _lies_in(path, name):
             raise RecordingError(f'{path / METADATA}: the file {one_line(name, 60)} lies outside '
                                  'the bag')
-        files.append(file)
-    return files, counts
+    return [path / name for name in names], counts
 
 
 def _lies_in(folder: Path, name: str) -> bool:
@@ -424,7 +424,7 @@ def _recording(storage: _Storage) -> Recording:
         stamps = np.concatenate([np.empty(0, np.uint64), *(p['log_time'] for p in parts)])
         values = np.concatenate([np.empty(0), *(p['value'] for p in parts)])
         if len(stamps) and stamps.max() >= 2**63:
-            raise RecordingError(f'{name}: a time stamp is beyond 292 years')
+            raise RecordingError(f'{one_line(name)}: a time stamp is beyond 292 years')
         channels[name] = make_channel(name, storage.units[topic] or unit_of(name),
                                       stamps.astype(np.int64), values)
     known = {}

@@ -608,4 +608,4 @@ def make_channel(name: str, unit: str, time_ns: ArrayLike, values: ArrayLike) ->
     try:
         return Channel(unit, time_ns, values)  # type: ignore[arg-type]
     except (RecordingError, TypeError, ValueError) as error:
-        raise RecordingError(f'{name}: {error}') from None
+        raise RecordingError(f'{one_line(name)}: {error}') from None

@@ -26,6 +26,7 @@ from antenna_drive import __version__, cli
 from antenna_drive.errors import UserError
 from antenna_drive.parameters.schema import ParameterError
 from antenna_drive.programs import BAD_INPUT, NOT_INSTALLED
+from hypothesis import given, strategies as st
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -142,6 +143,14 @@ def test_user_errors_are_one_line(fake: FakeCommand, error: type[UserError],
     fake(f'from {error.__module__} import {error.__name__} as E; raise E("a.yaml:\\n  b: wrong")')
     assert cli.main(['fake']) == BAD_INPUT
     assert capsys.readouterr().err == 'antenna-drive fake: a.yaml: b: wrong\n'
+
+
+@given(st.text(), st.integers(0, 3 * UserError.LONGEST))
+def test_an_error_is_a_printable_line_of_bounded_length(quoted: str, times: int) -> None:
+    """What a file held may be quoted: a null byte, an escape sequence, a megabyte of brackets."""
+    message = str(UserError(f'a.yaml: {quoted}{"[" * times}; mend it'))
+    assert message.isprintable() and len(message) <= UserError.LONGEST
+    assert message.startswith('a.yaml: ') and message.endswith('; mend it')
 
 
 def test_missing_file(fake: FakeCommand, tmp_path: Path,
