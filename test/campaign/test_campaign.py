@@ -38,6 +38,7 @@ from antenna_drive.emulator.wiring import OUTPUTS
 from antenna_drive.errors import UserError
 from antenna_drive.lockstep.frame import FrameLayout, read_foreign
 from antenna_drive.lockstep.inbox import Inbox
+from antenna_drive.trial.verdict import VerdictError
 import numpy as np
 import pytest
 from scipy.stats import linregress
@@ -142,7 +143,7 @@ class _Raises:
 @pytest.mark.parametrize(('error', 'counted'), [
     (UserError('sheet.yaml: wrong'), None), (UserError('wrong'), 'bad_messages'),
     (UserError('sheet.yaml: ' + 'x' * 5000), 'bad_messages'), (KeyError('a'), 'tracebacks'),
-    (UserError('sheet.yaml: \0'), 'bad_messages'), (MemoryError(), 'gigabytes'),
+    (VerdictError('sheet.yaml: \0'), 'bad_messages'), (MemoryError(), 'gigabytes'),
     (RecursionError(), 'tracebacks')])
 def test_each_answer_of_a_reader_is_judged(error: BaseException, counted: str | None,
                                            tmp_path: Path) -> None:
