@@ -30,7 +30,7 @@ class UserError(Exception):
 
     def __init__(self, message: str) -> None:
         """Keep the message in one printable line of bounded length, whatever it may quote."""
-        line = ' '.join(''.join(c if c.isprintable() else ' ' for c in message).split())
+        line = _printable(message)
         if len(line) > self.LONGEST:
             half = (self.LONGEST - len(_CUT)) // 2
             line = f'{line[:half]}{_CUT}{line[-half:]}'
@@ -39,6 +39,10 @@ class UserError(Exception):
 
 def one_line(text: object, longest: int = 120) -> str:
     """Return a text that fits into an error of one line, whatever a file held."""
-    line = ''.join(c if c.isprintable() else ' ' for c in str(text)[:10 * longest])
-    line = ' '.join(line.split())
+    line = _printable(str(text)[:10 * longest])
     return line if len(line) <= longest else line[:longest - 3] + '...'
+
+
+def _printable(text: str) -> str:
+    """Return a text with single spaces in the place of whatever does not print."""
+    return ' '.join(''.join(c if c.isprintable() else ' ' for c in text).split())

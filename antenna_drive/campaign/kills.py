@@ -74,8 +74,7 @@ def run(name: str, options: Mapping[str, Any], rng: random.Random) -> Outcome:
             expected = _field(field, rng)
             conductor = (sys.executable, '-m', 'antenna_drive.nodes.command_player', str(field))
         with Rig(outcome, folder, recorder=True, observers=[OBSERVER], conductor=conductor,
-                 exchange=exchange, settings=settings, pace=pace) as rig:
-            rig.nodes_are_killed = True
+                 exchange=exchange, settings=settings, nodes_are_killed=True, pace=pace) as rig:
             session = _Session(rig, outcome, rng, folder, expected)
             rig.start()
             rig.until_step(300)

@@ -186,7 +186,8 @@ class Rig:
                  commands: Mapping[str, Sequence[str]] | None = None,
                  waited_for: Sequence[str] = (), settings: Mapping[str, Any] | None = None,
                  nap_s: float = 0.0, keep: int = KEPT,
-                 said: Diagnostics | None = None, **run: Any) -> None:
+                 said: Diagnostics | None = None, nodes_are_killed: bool = False,
+                 **run: Any) -> None:
         """
         Say what to start; `start` starts it.
 
@@ -218,6 +219,9 @@ class Rig:
             how long the watcher takes for each step [s], and how many it keeps of each run
         said
             hears /diagnostics; None for a listener of the rig's own
+        nodes_are_killed
+            True if the trial does that: a node may take its last frames along, and the recorder
+            then lacks steps
         run
             the parameters run.* of test_signal
 
@@ -245,8 +249,7 @@ class Rig:
             parameters, namespace=namespace, order=self.names, environment=environment,
             commands={**further, **({TEST_SIGNAL: conductor} if conductor else {})})
         self.codes: dict[str, int] = {}
-        # a node that is killed may take its last frames along: the recorder then lacks steps
-        self.nodes_are_killed = False
+        self._nodes_are_killed = nodes_are_killed
 
     def start(self, rng: random.Random | None = None, longest_wait_s: float = 0.0) -> None:
         """Start the processes, with a random wait after each [s]."""
@@ -338,7 +341,7 @@ class Rig:
 
     def ended_well(self, name: str, code: int) -> bool:
         """Return whether an exit code is right; a recorder that lost steps ends with 1."""
-        return code == 0 or (code == 1 and name == RECORDER and self.nodes_are_killed
+        return code == 0 or (code == 1 and name == RECORDER and self._nodes_are_killed
                              and 'steps lost' in self.processes.log(name))
 
     def stop(self, number: signal.Signals = signal.SIGTERM) -> None:

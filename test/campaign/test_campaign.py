@@ -143,8 +143,8 @@ class _Raises:
 @pytest.mark.parametrize(('error', 'counted'), [
     (UserError('sheet.yaml: wrong'), None), (UserError('wrong'), 'bad_messages'),
     (UserError('sheet.yaml: ' + 'x' * 5000), 'bad_messages'), (KeyError('a'), 'tracebacks'),
-    (VerdictError('sheet.yaml: \0'), 'bad_messages'), (MemoryError(), 'gigabytes'),
-    (RecursionError(), 'tracebacks')])
+    (VerdictError('sheet.yaml: \0'), 'bad_messages'), (UserError('sheet.yaml: \0'), None),
+    (MemoryError(), 'gigabytes'), (RecursionError(), 'tracebacks')])
 def test_each_answer_of_a_reader_is_judged(error: BaseException, counted: str | None,
                                            tmp_path: Path) -> None:
     fault = _fault(Reader('sheet.yaml', b'', _Raises(error)), tmp_path, Outcome())
