@@ -62,7 +62,8 @@ class Workers:
 
         Only two tasks for each worker are handed out at a time, and no result is kept here. The
         memory that is needed therefore does not grow with the number of tasks. Ctrl-C goes
-        through once every result that is there has been yielded.
+        through once every result that is there has been yielded. Of tasks that have ended
+        together those that failed come last: who stops at an error has kept the rest.
 
         Parameters
         ----------
@@ -86,7 +87,7 @@ class Workers:
                     running[self._submit(function, arguments)] = number
                 if not running:
                     return
-                for future in self._ended(running):
+                for future in sorted(self._ended(running), key=self._failed):
                     yield running.pop(future), partial(self._result, future)
         except KeyboardInterrupt:
             for future, number in running.items():
@@ -106,6 +107,9 @@ class Workers:
 
     def _ended(self, running: Iterable[Future[Result]]) -> Iterable[Future[Result]]:
         return wait(running, return_when=FIRST_COMPLETED).done
+
+    def _failed(self, future: Future[Result]) -> bool:
+        return future.cancelled() or future.exception() is not None
 
     def _result(self, future: Future[Result]) -> Result:
         try:

@@ -81,7 +81,8 @@ def test_a_trial_of_the_twin_goes_on_in_another_folder(
     monkeypatch.setattr(twin_trial, 'outcome', outcome)
     monkeypatch.setattr(twin_trial, 'workers',
                         lambda jobs, scheduler: workers(jobs, threads=True))
-    words = ['twin-trial', '--kind', 'healthy', '--cases', '4', '--seed', '8', '--quiet', '--out']
+    words = ['twin-trial', '--kind', 'healthy', '--cases', '4', '--seed', '8', '--jobs', '1',
+             '--quiet', '--out']
     assert main([*words, str(tmp_path / 'one')]) == 2
     (tmp_path / 'two').mkdir()
     (tmp_path / 'one' / FILE).rename(tmp_path / 'two' / FILE)

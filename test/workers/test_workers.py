@@ -15,9 +15,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
+from typing import Any
 
-from antenna_drive.workers import TaskLost, workers
+from antenna_drive.workers import TaskLost, Workers, workers
 import pytest
 import worker_tasks
 
@@ -55,6 +57,33 @@ def test_an_error_is_that_of_its_task_and_ends_no_other() -> None:
                 result()
             errors.append(number)
     assert sorted(errors) == list(range(5))
+
+
+class _AtOnce(Executor):
+    """Does each task as it is handed out."""
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any,
+               **named: Any) -> Future[Any]:
+        """Return a future that has ended."""
+        future: Future[Any] = Future()
+        try:
+            future.set_result(function(*arguments, **named))
+        except ValueError as error:
+            future.set_exception(error)
+        return future
+
+
+def test_of_tasks_that_end_together_those_that_failed_come_last() -> None:
+    """Who stops at the first error has every result that was there."""
+    def odd_ones_fail(k: int) -> int:
+        return worker_tasks.fail(k) if k % 2 else k
+
+    for _again in range(10):
+        found = []
+        with pytest.raises(ValueError, match='task'):
+            for _, result in Workers(_AtOnce(), 4).each(odd_ones_fail, ((k,) for k in range(8))):
+                found.append(result())
+        assert sorted(found) == [0, 2, 4, 6]
 
 
 def test_a_process_that_dies_is_told() -> None:
