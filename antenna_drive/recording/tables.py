@@ -35,6 +35,7 @@ import zlib
 from antenna_drive.errors import one_line
 from antenna_drive.limits import CSV_LINE, SAMPLES, SIGNALS
 from antenna_drive.recording.csv_format import open_text, read_text, rows
+from antenna_drive.recording.mat_format import read_mat
 from antenna_drive.recording.plain import from_json, PlainDataError
 from antenna_drive.recording.recording import RecordingError
 import numpy as np
@@ -45,8 +46,6 @@ _BLOCK = 4096   # rows that are turned into cells at a time
 # what the libraries raise where a file is damaged
 _DAMAGE = (ValueError, TypeError, BadZipFile, EOFError, zlib.error, ArithmeticError, LookupError,
            AttributeError, RuntimeError, SyntaxError, TokenError)
-_MAT_NUMBERS = frozenset({'double', 'single', 'logical', *(
-    f'{sign}int{bits}' for sign in ('', 'u') for bits in (8, 16, 32, 64))})
 
 
 @dataclass(frozen=True)
@@ -223,21 +222,7 @@ def _within(room: int) -> None:
 
 
 def _mat(path: Path) -> Table:
-    from scipy.io import loadmat, whosmat
-    from scipy.io.matlab import MatReadError
-    wanted, room = [], SAMPLES.value()
-    try:
-        for name, shape, kind in whosmat(path):
-            if kind in _MAT_NUMBERS:
-                wanted.append(name)
-                room -= int(np.prod(shape, dtype=object))
-        _within(room)
-        found = loadmat(path, variable_names=wanted) if wanted else {}
-    except MatReadError as error:
-        raise ValueError(str(error)) from None
-    except NotImplementedError:
-        raise RecordingError('a file of version 7.3; in MATLAB, save it with -v7') from None
-    return _arrays({name: np.asarray(found[name]) for name in wanted if name in found})
+    return _arrays(read_mat(path))
 
 
 # -- JSON ----------------------------------------------------------------------------------------
