@@ -191,7 +191,7 @@ def _clock_set(outcome: Outcome, options: Mapping[str, Any], rng: random.Random,
     clock.write_bytes(bytes(8))
     with Rig(outcome, folder / 'bags', recorder=True, observers=[OBSERVER], pace=1.0,
              environment={'LD_PRELOAD': str(library), 'CLOCK_OFFSET_FILE': str(clock)},
-             settings=random_settings(rng)) as rig:
+             settings=random_settings(rng), nodes_are_killed=True) as rig:
         rig.start()
         rig.until_step(500)
         for offset_s in (rng.choice([HOUR_S, -HOUR_S]), 0):
