@@ -50,6 +50,8 @@ DRIVES_PER_DOMAIN = 5
 CROWD_PACE = 0.03
 CHANGES_PER_MINUTE = 1000
 HOUR_S = 3600
+# Frames of garbage, 1000 a second.
+GARBAGE = 10_000
 # In a file system of its own, mounted in $0: the command that follows.
 MOUNTED = 'mount -t tmpfs -o size={size} none "$0" && mkdir "$0/bags" && {then} exec "$@"'
 
@@ -62,7 +64,8 @@ def run(name: str, options: Mapping[str, Any], rng: random.Random) -> Outcome:
         'removed_folder': _removed_folder, 'full_disk_for_commands': _full_disk_for_commands,
         'clock_set': _clock_set, 'suspended': _suspended, 'many_drives': _many_drives,
         'slow_observer': _slow_observer, 'many_changes': _many_changes,
-        'second_publishers': _second_publishers}
+        'second_publishers': _second_publishers,
+        'stopped_beside_garbage': _stopped_beside_garbage}
     with tempfile.TemporaryDirectory() as folder:
         conditions[name.rpartition('_')[0]](outcome, options, rng, Path(folder))
     return outcome
@@ -324,3 +327,26 @@ def _second_publishers(outcome: Outcome, options: Mapping[str, Any], rng: random
         rig.end('echo')
     for bag in sorted((folder / 'bags').iterdir()):
         check_bag(outcome, bag)
+
+
+def _stopped_beside_garbage(outcome: Outcome, options: Mapping[str, Any], rng: random.Random,
+                            folder: Path) -> None:
+    """Garbage may lead a drive astray that stands still; once it is over, the drive comes back."""
+    speaker = (sys.executable, '-m', 'antenna_drive.campaign.impostor', 'garbage',
+               str(rng.randrange(2**32)), str(GARBAGE))
+    with Rig(outcome, commands={'impostor': speaker}, observers=[OBSERVER], pace=0.0,
+             exchange=rng.choice(['python', 'auto']), settings=random_settings(rng),
+             keep=10**6) as rig:
+        rig.start()
+        impostor, victim = rig.processes.process('impostor'), rng.choice(UNITS)
+        rig.until(lambda: 'started' in rig.processes.log('impostor'), 'an impostor')
+        for number in (signal.SIGSTOP, signal.SIGCONT):
+            rig.processes.process(victim).send_signal(number)
+            if number == signal.SIGSTOP:
+                time.sleep(rng.uniform(1.0, 3.0))
+        rig.until(lambda: impostor.poll() is not None, 'the end of the garbage')
+        over = time.monotonic()
+        outcome.figures.update(victim=victim, runs=len(rig.watcher.runs), went_on_after_s=rig.until(
+            lambda: rig.watcher.moved_s > over and rig.watcher.step >= 300,
+            'the drive to go on after the garbage', 20.0))
+        rig.compare()

@@ -340,8 +340,8 @@ class Conductor(Member):
 
     It begins a run when it has heard from every other member, publishes step k + 1 only when
     it holds step k of every one, and begins afresh when one of them says hello and makes no more
-    steps: that is a node that was started again. So it does when one has left for another run,
-    which somebody invented. Observers are waited for too, at step 0 but not at every step: they
+    steps: that is a node that was started again. So it does when a member or an observer that it
+    waits for has left for another run, which somebody invented. Observers are waited for too, at step 0 but not at every step: they
     may read in bulk, as long as they stay within what the others remember.
     """
 
@@ -374,6 +374,8 @@ class Conductor(Member):
         # Our step when a member said hello, or last spoke of another run.
         self._hello_at: dict[str, int] = {}
         self._elsewhere_at: dict[str, int] = {}
+        # How far an observer was that then spoke of another run.
+        self._strayed_at: dict[str, float] = {}
 
     def receive(self, peer: str, frame: Frame) -> None:
         """Take in a frame or refuse it; note who is there."""
@@ -387,7 +389,10 @@ class Conductor(Member):
             # nobody but the conductor makes runs
             self.inbox.refuse(peer, Refusal.WRONG_RUN)
             self._hear(peer, frame)
-            self._elsewhere_at[peer] = self.step
+            if peer in self.used:
+                self._strayed_at[peer] = self.used[peer]
+            else:
+                self._elsewhere_at[peer] = self.step
         elif peer in self.used and frame[0] == self.run:
             self.used[peer] = max(self.used[peer], frame[1])
         else:
@@ -469,11 +474,15 @@ class Conductor(Member):
             if (self._left(self._hello_at, gone)
                     or stands_still and self._left(self._elsewhere_at, missing)):
                 self._begin_again = True
+        if stands_still and any(self._strayed_at.get(name) == self.used[name]
+                                for name in self._behind()):
+            self._begin_again = True
         if not self._begin_again or self.unheard():
             return None
         self._begin_again = False
         self._hello_at.clear()
         self._elsewhere_at.clear()
+        self._strayed_at.clear()
         self.ended = False
         self.used = dict.fromkeys(self.used, _NOT_BEGUN)
         run = max(float(int(now)), self.birth + 1.0, self.run + 1.0,

@@ -532,13 +532,25 @@ class DriveNode:
         self._tell_state(only_news=True)
         ready = self._link.wait(member.wanted(), timeout)
         for peer in ready:
-            frame = self._link.take(peer)
-            if frame is not None:
-                member.receive(peer, frame)
+            self._take_past_refused(peer)
         self._quiet = not ready
         now = time.monotonic()
         self._stands_still = self._report.stands_still(now)
         self._report.publish_if_due(now)
+
+    def _take_past_refused(self, peer: str) -> None:
+        """
+        Take frames of a peer up to the first that is not refused, or to the last.
+
+        One a turn would be too few: who speaks in a peer's name may send more than that, and for
+        as long as frames come the conductor begins no new run.
+        """
+        member = self._member
+        while (frame := self._link.take(peer)) is not None:
+            refused = member.inbox.refused.total()
+            member.receive(peer, frame)
+            if member.inbox.refused.total() == refused:
+                break
 
 
 def _as_float(value: Value) -> float:

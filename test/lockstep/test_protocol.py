@@ -690,3 +690,40 @@ def test_the_conductor_waits_for_an_observer_that_falls_behind() -> None:
     conductor.receive('recorder', (run, SLACK + 21.0, 1e-3))
     step_as_far_as_possible()
     assert conductor.ended
+
+
+def waiting_for_its_recorder() -> Conductor:
+    """Return a conductor that has made every step that its recorder, at step 5, lets it make."""
+    conductor = Conductor(Chaotic('test_signal'), 1.0, 1e-3, None, OUTPUTS, ('recorder',))
+    for name in (*UNITS[1:], 'recorder'):
+        conductor.receive(name, (0.0, 2.0, 0.0, *([] if name == 'recorder' else [0.0] * 4)))
+    assert conductor.new_run(10.0) is not None
+    conductor.receive('recorder', (conductor.run, 5.0, 1e-3))
+    for _ in range(SLACK + 10):
+        for name in UNITS[1:]:
+            if name in conductor.missing():
+                conductor.receive(name, (conductor.run, float(conductor.step), 1e-3, *[0.5] * 4))
+        conductor.go_on()
+    assert conductor.missing() == ('recorder',)
+    return conductor
+
+
+def test_an_observer_that_was_led_into_an_invented_run_is_fetched_back() -> None:
+    conductor = waiting_for_its_recorder()
+    run = conductor.run
+    conductor.receive('recorder', (run + 7.0, 0.0, 1e-3))
+    assert conductor.new_run(20.0) is None, 'the drive does not stand still yet'
+    assert conductor.new_run(20.0, stands_still=True) is not None
+    assert conductor.run > run + 7.0
+
+
+def test_an_observer_that_reads_on_has_not_left() -> None:
+    """The other run was somebody else's word in the observer's name."""
+    conductor = waiting_for_its_recorder()
+    conductor.receive('recorder', (conductor.run + 7.0, 0.0, 1e-3))
+    conductor.receive('recorder', (conductor.run, 6.0, 1e-3))
+    for name in UNITS[1:]:
+        conductor.receive(name, (conductor.run, float(conductor.step), 1e-3, *[0.5] * 4))
+    conductor.go_on()
+    assert conductor.missing()[-1:] == ('recorder',)
+    assert conductor.new_run(20.0, stands_still=True) is None
