@@ -346,7 +346,8 @@ def _stopped_beside_garbage(outcome: Outcome, options: Mapping[str, Any], rng: r
                 time.sleep(rng.uniform(1.0, 3.0))
         rig.until(lambda: impostor.poll() is not None, 'the end of the garbage')
         over = time.monotonic()
-        outcome.figures.update(victim=victim, runs=len(rig.watcher.runs), went_on_after_s=rig.until(
+        outcome.figures.update(victim=victim, runs=len(rig.watcher.runs))
+        outcome.figures['went_on_after_s'] = rig.until(
             lambda: rig.watcher.moved_s > over and rig.watcher.step >= 300,
-            'the drive to go on after the garbage', 20.0))
+            'the drive to go on after the garbage', 20.0)
         rig.compare()

@@ -340,9 +340,10 @@ class Conductor(Member):
 
     It begins a run when it has heard from every other member, publishes step k + 1 only when
     it holds step k of every one, and begins afresh when one of them says hello and makes no more
-    steps: that is a node that was started again. So it does when a member or an observer that it
-    waits for has left for another run, which somebody invented. Observers are waited for too, at step 0 but not at every step: they
-    may read in bulk, as long as they stay within what the others remember.
+    steps: that is a node that was started again. So it does when a member, or an observer that
+    it waits for, has left for another run, which somebody invented. Observers are waited for
+    too, at step 0 but not at every step: they may read in bulk, as long as they stay within what
+    the others remember.
     """
 
     def __init__(self, unit: Unit, birth: float, step_s: float, last_step: int | None = None,
