@@ -36,6 +36,7 @@ from antenna_drive.campaign.rig import (
 from antenna_drive.campaign.starts import check_bag
 from antenna_drive.campaign.trials import Outcome
 from antenna_drive.emulator.wiring import UNITS
+from antenna_drive.lockstep.member import DECEIVED_STANDSTILL_S
 from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.recording import RecordingError, RecordingWarning
 from rcl_interfaces.srv import SetParameters
@@ -51,7 +52,7 @@ CROWD_PACE = 0.03
 CHANGES_PER_MINUTE = 1000
 HOUR_S = 3600
 # Frames of garbage, 1000 a second.
-GARBAGE = 10_000
+GARBAGE = 12_000
 # In a file system of its own, mounted in $0: the command that follows.
 MOUNTED = 'mount -t tmpfs -o size={size} none "$0" && mkdir "$0/bags" && {then} exec "$@"'
 
@@ -331,23 +332,29 @@ def _second_publishers(outcome: Outcome, options: Mapping[str, Any], rng: random
 
 def _stopped_beside_garbage(outcome: Outcome, options: Mapping[str, Any], rng: random.Random,
                             folder: Path) -> None:
-    """Garbage may lead a drive astray that stands still; once it is over, the drive comes back."""
+    """Stop a node beside garbage: a short stop costs no run, and no stop costs the drive."""
     speaker = (sys.executable, '-m', 'antenna_drive.campaign.impostor', 'garbage',
                str(rng.randrange(2**32)), str(GARBAGE))
+    stop_s = rng.choice([rng.uniform(1.0, 3.0), rng.uniform(6.0, 8.0)])
     with Rig(outcome, commands={'impostor': speaker}, observers=[OBSERVER], pace=0.0,
              exchange=rng.choice(['python', 'auto']), settings=random_settings(rng),
              keep=10**6) as rig:
         rig.start()
         impostor, victim = rig.processes.process('impostor'), rng.choice(UNITS)
         rig.until(lambda: 'started' in rig.processes.log('impostor'), 'an impostor')
+        time.sleep(1.0)
         for number in (signal.SIGSTOP, signal.SIGCONT):
             rig.processes.process(victim).send_signal(number)
             if number == signal.SIGSTOP:
-                time.sleep(rng.uniform(1.0, 3.0))
+                time.sleep(stop_s)
         rig.until(lambda: impostor.poll() is not None, 'the end of the garbage')
         over = time.monotonic()
-        outcome.figures.update(victim=victim, runs=len(rig.watcher.runs))
         outcome.figures['went_on_after_s'] = rig.until(
             lambda: rig.watcher.moved_s > over and rig.watcher.step >= 300,
             'the drive to go on after the garbage', 20.0)
+        runs = len(rig.watcher.runs)
+        outcome.figures.update(victim=victim, stop_s=stop_s, runs=runs)
+        if stop_s < DECEIVED_STANDSTILL_S and runs != 1:
+            outcome.find(f'a stop of {stop_s:.1f} s beside garbage began {runs - 1} runs',
+                         'new_runs')
         rig.compare()

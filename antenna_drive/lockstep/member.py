@@ -37,6 +37,12 @@ MEMORY = 1000
 # How far an observer may fall behind: half of that.
 SLACK = MEMORY // 2
 
+# A run that goes on makes a step within this [s]; else another that was announced takes its place.
+# The second holds where somebody has announced a run falsely in the last second of steps: who
+# does so waits for the run to stall, and a node that was stopped may go on.
+STANDSTILL_S = 0.2
+DECEIVED_STANDSTILL_S = 5.0
+
 # Progress of an observer that has not begun the run: it is waited for before the first step, as
 # it could not keep what it gets of a run that it has yet to begin.
 _NOT_BEGUN = -1.0
@@ -51,9 +57,9 @@ class Member:
 
     Anybody can publish an announcement. The conductor makes no step of a run once it has
     announced the next; so whoever announces a run while this one goes on is not the conductor.
-    An announcement waits until the run stands still, and is refused if the run goes on. Should
-    it have been an invention all the same, the conductor's next announcement is followed from
-    there, whichever of the two runs has the greater id.
+    An announcement waits until the run stands still, for longer after a false one, and is refused
+    if the run goes on. Should it have been an invention all the same, the conductor's next
+    announcement is followed from there, whichever of the two runs has the greater id.
 
     Attributes
     ----------
@@ -112,6 +118,7 @@ class Member:
         self.fault = ''
         self._announced: Frame | None = None
         self._announced_at = 0
+        self._deceived_at: int | None = None  # the step of the last false announcement
         # one memory: a numpy array is slow to write single numbers to
         self._numbers = array('d', bytes(2 * 8 * len(columns)))
         self._inputs = np.asarray(self._numbers).reshape(-1, 2)
@@ -189,12 +196,19 @@ class Member:
         if self._announced is not None:
             if self.inbox.reached(self.conductor) > self._announced_at:
                 self._announced = None
+                self._deceived_at = self.step
                 self.inbox.refuse(self.conductor, Refusal.WRONG_RUN)
             elif stands_still or self.run == NO_RUN or self.fault:
                 return self._begin_announced(self._announced)
         if self.run == NO_RUN or self.fault:
             return None
         return None if self.inbox.missing() else self._advance()
+
+    @property
+    def patience_s(self) -> float:
+        """Return how long the run must stand still before it is left for another [s]."""
+        deceived = self._deceived_at is not None and self.step - self._deceived_at <= MEMORY
+        return DECEIVED_STANDSTILL_S if deceived else STANDSTILL_S
 
     def lost(self, peer: str) -> int:
         """Return how many frames came too far ahead of one of the peer's that is missing."""
@@ -223,6 +237,8 @@ class Member:
         return self.layout.encode(self.run, self.step, self.step_s, self.packed)
 
     def _begin(self, run: float, step_s: float, step: int = 0) -> FloatArray | None:
+        if self._deceived_at is not None:
+            self._deceived_at -= self.step - step
         self.inbox.begin(run, step)
         self.step = step
         self.step_s = step_s

@@ -37,7 +37,6 @@ from antenna_drive.lockstep.frame import NO_RUN
 from antenna_drive.lockstep.inbox import Frame
 from antenna_drive.lockstep.member import Guest, Member
 from antenna_drive.lockstep.readings import CHANGES_QOS
-from antenna_drive.lockstep.report import STANDSTILL_S
 from antenna_drive.lockstep.ros_link import FRAME_QOS, FrameLink
 from antenna_drive.lockstep.run_control import PAUSED
 from antenna_drive.lockstep.run_services import StateReader
@@ -187,7 +186,7 @@ class Observer:
             if member.go_on(stands_still) is None:
                 now = time.monotonic()
                 waiting_since = now if waiting_since is None else waiting_since
-                stands_still = now - waiting_since >= STANDSTILL_S
+                stands_still = now - waiting_since >= member.patience_s
                 if not self._take():
                     if stands_still:
                         self._look_ahead()

@@ -30,8 +30,6 @@ from rclpy.node import Node
 PERIOD_S = 1.0
 # A wait is reported after this.
 PATIENCE_S = 0.9
-# A run that goes on makes a step within this; else another that was announced takes its place.
-STANDSTILL_S = 0.2
 
 
 class Report:
@@ -108,8 +106,9 @@ class Report:
                 f'run {member.run:.0f} ends at step {member.step}', *told))))
 
     def stands_still(self, now: float) -> bool:
-        """Tell at `now` [s] whether the node has made no step for a while."""
-        return self._waiting_since is not None and now - self._waiting_since >= STANDSTILL_S
+        """Tell at `now` [s] whether the node has made no step for so long that it may leave."""
+        return (self._waiting_since is not None
+                and now - self._waiting_since >= self._member.patience_s)
 
     def hurry(self) -> None:
         """Let people who watch /diagnostics hear of it at once."""

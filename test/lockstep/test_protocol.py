@@ -30,7 +30,9 @@ from antenna_drive.lockstep import compiled_loop
 from antenna_drive.lockstep.compiled_unit import CompiledForm, FORMS
 from antenna_drive.lockstep.exchange import Exchange
 from antenna_drive.lockstep.inbox import DEPTH, Inbox, Refusal
-from antenna_drive.lockstep.member import Conductor, Guest, Member, SLACK
+from antenna_drive.lockstep.member import (
+    Conductor, DECEIVED_STANDSTILL_S, Guest, Member, MEMORY, SLACK, STANDSTILL_S,
+)
 from antenna_drive.physics.compiling import inner
 from hypothesis import example, given, settings, strategies as st
 from memory_channel import MemoryChannel
@@ -727,3 +729,22 @@ def test_an_observer_that_reads_on_has_not_left() -> None:
     conductor.go_on()
     assert conductor.missing()[-1:] == ('recorder',)
     assert conductor.new_run(20.0, stands_still=True) is None
+
+
+@none_some_all
+def test_who_was_deceived_is_patient_for_a_second_of_steps(in_loops: Collection[str]) -> None:
+    network = begun_network(in_loops)
+    network.stands_still = False
+    motor = network.members['motor_1']
+    assert motor.patience_s == STANDSTILL_S
+    invent(network, 'motor_1', 7.0)
+    network.settle(4)
+    assert motor.patience_s == DECEIVED_STANDSTILL_S
+    assert network.members['plant'].patience_s == STANDSTILL_S, 'it has heard nothing'
+    network.stands_still = True
+    network.start('plant')  # the next run is no reason to forget it
+    network.settle(40)
+    assert motor.run == network.members['test_signal'].run > 0.0
+    assert motor.patience_s == DECEIVED_STANDSTILL_S
+    motor.follow(motor.step + MEMORY + 1, np.zeros((2, 2)))
+    assert motor.patience_s == STANDSTILL_S
