@@ -111,13 +111,14 @@ def _variable(head: bytes, order: str) -> tuple[str, bool]:
     kind, place = flags & 0xff, 16
     if kind != _OPAQUE:
         *_, place = _element(head, place, order)  # the dimensions
-    _, name, place = _element(head, place, order)
-    if kind in _CLASSES and not flags & _COMPLEX:
-        stored, *_ = _element(head, place, order)
-        if stored not in _STORED:
-            raise ValueError(f'numbers of type {stored}, which the format does not have')
-        return name.decode('latin1') or _NAMELESS, True
-    return name.decode('latin1') or _NAMELESS, False
+    _, text, place = _element(head, place, order)
+    name = text.decode('latin1') or _NAMELESS
+    if kind not in _CLASSES or flags & _COMPLEX:
+        return name, False
+    stored, *_ = _element(head, place, order)
+    if stored not in _STORED:
+        raise ValueError(f'numbers of type {stored}, which the format does not have')
+    return name, True
 
 
 def _element(head: bytes, place: int, order: str) -> tuple[int, bytes, int]:
