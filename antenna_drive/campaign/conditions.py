@@ -343,10 +343,9 @@ def _stopped_beside_garbage(outcome: Outcome, options: Mapping[str, Any], rng: r
         impostor, victim = rig.processes.process('impostor'), rng.choice(UNITS)
         rig.until(lambda: 'started' in rig.processes.log('impostor'), 'an impostor')
         time.sleep(1.0)
-        for number in (signal.SIGSTOP, signal.SIGCONT):
-            rig.processes.process(victim).send_signal(number)
-            if number == signal.SIGSTOP:
-                time.sleep(stop_s)
+        rig.processes.process(victim).send_signal(signal.SIGSTOP)
+        time.sleep(stop_s)
+        rig.processes.process(victim).send_signal(signal.SIGCONT)
         rig.until(lambda: impostor.poll() is not None, 'the end of the garbage')
         over = time.monotonic()
         outcome.figures['went_on_after_s'] = rig.until(

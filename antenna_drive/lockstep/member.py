@@ -38,8 +38,8 @@ MEMORY = 1000
 SLACK = MEMORY // 2
 
 # A run that goes on makes a step within this [s]; else another that was announced takes its place.
-# The second holds where somebody has announced a run falsely in the last MEMORY steps: who does so
-# waits for the run to stall, and a node that was stopped may go on.
+# The second holds where somebody has announced a run falsely in the last MEMORY steps: they may be
+# waiting for the run to stall, and a node that was stopped may go on.
 STANDSTILL_S = 0.2
 DECEIVED_STANDSTILL_S = 5.0
 
@@ -238,7 +238,7 @@ class Member:
 
     def _begin(self, run: float, step_s: float, step: int = 0) -> FloatArray | None:
         if self._deceived_at is not None:
-            self._deceived_at -= self.step - step
+            self._deceived_at -= self.step - step  # as many steps ago as before
         self.inbox.begin(run, step)
         self.step = step
         self.step_s = step_s

@@ -661,51 +661,49 @@ def test_a_guest_joins_again_behind_a_hole_in_what_it_is_told_of_the_past(
         assert read.tobytes() == np.array([history[name][k][0] for name in UNITS]).tobytes()
 
 
-def test_the_conductor_waits_for_an_observer_that_falls_behind() -> None:
-    unit = Chaotic('test_signal')
-    conductor = Conductor(unit, 1.0, 1e-3, SLACK + 20, OUTPUTS, observers=('recorder',))
+def conductor_with_recorder(last_step: int | None = None) -> Conductor:
+    """Return a conductor that has begun a run, for which its recorder has yet to begin."""
+    conductor = Conductor(Chaotic('test_signal'), 1.0, 1e-3, last_step, OUTPUTS, ('recorder',))
     for name in (*UNITS[1:], 'recorder'):
-        frame = (0.0, 2.0, 0.0, *([] if name == 'recorder' else [0.0] * 4))
-        conductor.receive(name, frame)
+        conductor.receive(name, (0.0, 2.0, 0.0, *([] if name == 'recorder' else [0.0] * 4)))
     assert conductor.new_run(10.0) is not None
+    return conductor
+
+
+def step_as_far_as_possible(conductor: Conductor) -> int:
+    for _ in range(SLACK + 50):
+        for name in UNITS[1:]:
+            if name in conductor.missing():
+                conductor.receive(name, (conductor.run, float(conductor.step), 1e-3, *[0.5] * 4))
+        conductor.go_on()
+    return conductor.step
+
+
+def test_the_conductor_waits_for_an_observer_that_falls_behind() -> None:
+    conductor = conductor_with_recorder(SLACK + 20)
     run = conductor.run
-
-    def step_as_far_as_possible() -> int:
-        for _ in range(SLACK + 50):
-            for name in UNITS[1:]:
-                if name in conductor.missing():
-                    conductor.receive(name, (run, float(conductor.step), 1e-3, *[0.5] * 4))
-            conductor.go_on()
-        return conductor.step
-
-    assert step_as_far_as_possible() == 0, 'the recorder has not begun the run'
+    assert step_as_far_as_possible(conductor) == 0, 'the recorder has not begun the run'
     assert conductor.missing() == ('recorder',)
     conductor.receive('recorder', (run, 0.0, 1e-3))
-    assert step_as_far_as_possible() == SLACK + 1
+    assert step_as_far_as_possible(conductor) == SLACK + 1
     assert conductor.missing() == ('recorder',)
     conductor.receive('recorder', (run, 5.0, 1e-3))
-    assert step_as_far_as_possible() == SLACK + 6
+    assert step_as_far_as_possible(conductor) == SLACK + 6
     conductor.receive('recorder', (run, 500.0, 1e-3))
-    assert step_as_far_as_possible() == SLACK + 21, 'one more than the last: nobody uses it'
+    assert step_as_far_as_possible(conductor) == SLACK + 21, (
+        'one more than the last: nobody uses it')
     assert not conductor.ended
     assert conductor.missing() == ('recorder',)
     conductor.receive('recorder', (run, SLACK + 21.0, 1e-3))
-    step_as_far_as_possible()
+    step_as_far_as_possible(conductor)
     assert conductor.ended
 
 
 def waiting_for_its_recorder() -> Conductor:
     """Return a conductor that has made every step that its recorder, at step 5, lets it make."""
-    conductor = Conductor(Chaotic('test_signal'), 1.0, 1e-3, None, OUTPUTS, ('recorder',))
-    for name in (*UNITS[1:], 'recorder'):
-        conductor.receive(name, (0.0, 2.0, 0.0, *([] if name == 'recorder' else [0.0] * 4)))
-    assert conductor.new_run(10.0) is not None
+    conductor = conductor_with_recorder()
     conductor.receive('recorder', (conductor.run, 5.0, 1e-3))
-    for _ in range(SLACK + 10):
-        for name in UNITS[1:]:
-            if name in conductor.missing():
-                conductor.receive(name, (conductor.run, float(conductor.step), 1e-3, *[0.5] * 4))
-        conductor.go_on()
+    step_as_far_as_possible(conductor)
     assert conductor.missing() == ('recorder',)
     return conductor
 
@@ -724,9 +722,7 @@ def test_an_observer_that_reads_on_has_not_left() -> None:
     conductor = waiting_for_its_recorder()
     conductor.receive('recorder', (conductor.run + 7.0, 0.0, 1e-3))
     conductor.receive('recorder', (conductor.run, 6.0, 1e-3))
-    for name in UNITS[1:]:
-        conductor.receive(name, (conductor.run, float(conductor.step), 1e-3, *[0.5] * 4))
-    conductor.go_on()
+    step_as_far_as_possible(conductor)
     assert conductor.missing()[-1:] == ('recorder',)
     assert conductor.new_run(20.0, stands_still=True) is None
 
