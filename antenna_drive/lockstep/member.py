@@ -37,9 +37,9 @@ MEMORY = 1000
 # How far an observer may fall behind: half of that.
 SLACK = MEMORY // 2
 
-# A run that goes on makes a step within this [s]; else another that was announced takes its place.
-# The second holds where somebody has announced a run falsely in the last MEMORY steps: they may be
-# waiting for the run to stall, and a node that was stopped may go on.
+# A run that goes on makes a step within this [s]; else another may take its place. The second
+# holds where somebody has spoken falsely in a peer's name in the last MEMORY steps: a node that
+# was stopped may go on, and what speaks against it may be false again.
 STANDSTILL_S = 0.2
 DECEIVED_STANDSTILL_S = 5.0
 
@@ -118,7 +118,7 @@ class Member:
         self.fault = ''
         self._announced: Frame | None = None
         self._announced_at = 0
-        self._deceived_at: int | None = None  # the step of the last false announcement
+        self._deceived_at: int | None = None  # the step at which a frame was last found false
         # one memory: a numpy array is slow to write single numbers to
         self._numbers = array('d', bytes(2 * 8 * len(columns)))
         self._inputs = np.asarray(self._numbers).reshape(-1, 2)
@@ -136,7 +136,7 @@ class Member:
 
     def receive(self, peer: str, frame: Frame) -> None:
         """Take in a frame or refuse it."""
-        if self.inbox.accept(peer, frame) or not self.inbox.well_formed(peer, frame):
+        if self.inbox.accept(peer, frame) or not self._well_formed(peer, frame):
             return
         if peer == self.conductor:
             self._receive_from_conductor(frame)
@@ -146,6 +146,13 @@ class Member:
         else:
             self.inbox.offer(peer, frame)
             self.inbox.hellos.clear()
+
+    def _well_formed(self, peer: str, frame: Frame) -> bool:
+        if self.inbox.well_formed(peer, frame):
+            return True
+        # No node makes such a frame: somebody else speaks in its name.
+        self._deceived_at = self.step
+        return False
 
     def _receive_from_conductor(self, frame: Frame) -> None:
         run, step, step_s = frame[:3]
@@ -396,7 +403,7 @@ class Conductor(Member):
 
     def receive(self, peer: str, frame: Frame) -> None:
         """Take in a frame or refuse it; note who is there."""
-        if self.inbox.accept(peer, frame) or not self.inbox.well_formed(peer, frame):
+        if self.inbox.accept(peer, frame) or not self._well_formed(peer, frame):
             return
         if self.run == NO_RUN:
             self._heard.setdefault(peer, 0.0)
@@ -418,6 +425,8 @@ class Conductor(Member):
                 self._heard[name] = max(self._heard[name], birth)
                 if name in self.used or self.ended or self.fault:
                     self._begin_again = True
+                if self._went_on_after_hello(name):
+                    self._deceived_at = self.step
                 self._hello_at[name] = self.step
             self.inbox.hellos.clear()
 
@@ -426,6 +435,16 @@ class Conductor(Member):
         known = frame[1] if frame[0] == NO_RUN else frame[0]
         if known < LATEST_BIRTH:
             self._heard[peer] = max(self._heard[peer], known)
+
+    def _went_on_after_hello(self, name: str) -> bool:
+        """Tell whether a hello in a member's name was false: it was not started again."""
+        return self.step - self._hello_at.get(name, self.step) > DEPTH
+
+    @property
+    def patience_s(self) -> float:
+        """Return how long the run must stand still before somebody is believed to be gone [s]."""
+        false = any(map(self._went_on_after_hello, self._hello_at))
+        return DECEIVED_STANDSTILL_S if false else super().patience_s
 
     def _left(self, at: Mapping[str, int], peers: Collection[str]) -> bool:
         """Tell whether one of the peers has gone since: whoever goes on was spoken for."""
@@ -474,25 +493,15 @@ class Conductor(Member):
         now
             wall time [us]; the run's id, unless somebody was born later by his own clock
         stands_still
-            whether the run in progress has made no step for a while: only then is a member
-            that speaks of another run believed to be in it, and one that said hello believed
-            to be gone although its frame of this step is here
+            whether the run in progress has made no step for `patience_s`: only then is a member
+            that said hello, or speaks of another run, believed to be gone
 
         Returns
         -------
         array of shape (len(outputs), 2), to be published as frame 0; None if no run is due
 
         """
-        missing = self.inbox.missing()
-        if missing and self.run != NO_RUN and not self.ended:
-            # The last frame of a killed member may have reached us and not those who now wait
-            # for it: then they are missing, and it is not.
-            gone = self.peers if stands_still else missing
-            if (self._left(self._hello_at, gone)
-                    or stands_still and self._left(self._elsewhere_at, missing)):
-                self._begin_again = True
-        if stands_still and any(self._strayed_at.get(name) == self.used[name]
-                                for name in self._behind()):
+        if stands_still and self._somebody_left():
             self._begin_again = True
         if not self._begin_again or self.unheard():
             return None
@@ -505,6 +514,14 @@ class Conductor(Member):
         run = max(float(int(now)), self.birth + 1.0, self.run + 1.0,
                   *(heard + 1.0 for heard in self._heard.values()))
         return self._begin(run, self.wanted_step_s)
+
+    def _somebody_left(self) -> bool:
+        missing = () if self.run == NO_RUN or self.ended else self.inbox.missing()
+        # The last frame of a killed member may have reached us and not those who now wait for it:
+        # then they are missing, and it is not.
+        return (bool(missing) and self._left(self._hello_at, self.peers)
+                or self._left(self._elsewhere_at, missing)
+                or any(self._strayed_at.get(name) == self.used[name] for name in self._behind()))
 
     def begin_again(self) -> None:
         """Leave the run in progress, if any, for a new one."""

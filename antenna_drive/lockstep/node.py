@@ -426,7 +426,7 @@ class DriveNode:
         assert isinstance(member, Conductor) and self._control is not None
         held = self._held()
         if self._quiet:
-            outputs = member.new_run(time.time_ns() / 1e3, stands_still=True)
+            outputs = member.new_run(time.time_ns() / 1e3, self._stands_still)
             if outputs is not None:
                 self._pace.begin()
                 self._control.begun()

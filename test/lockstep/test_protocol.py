@@ -132,7 +132,6 @@ class Network:
         self.last_step = last_step
         self.quiet = True  # nothing has come to the conductor for a while
         self.stands_still = True  # as each member sees it
-        self.long_quiet = False  # long enough for the conductor to believe that a member left
 
     def start(self, name: str) -> None:
         """Start a node, or start it again after it was killed."""
@@ -208,7 +207,7 @@ class Network:
         outputs = None
         if isinstance(member, Conductor) and self.quiet and not self._has_arrived(name):
             self.clock += 1.0
-            outputs = member.new_run(self.clock, self.long_quiet)
+            outputs = member.new_run(self.clock, self.stands_still)
         if outputs is None:
             outputs = member.go_on(self.stands_still)
         if outputs is not None:
@@ -308,7 +307,6 @@ def test_a_node_started_again_lets_everybody_start_afresh(
     if victim == 'test_signal':
         network.hello_to_late()
     shake(network, after)
-    network.long_quiet = True
     network.settle(80)
     runs = {member.run for member in network.members.values()}
     assert len(runs) == 1
@@ -402,7 +400,6 @@ def test_who_was_led_into_an_invented_run_comes_back(
         invent(network, target, invented)
         network.act(target)  # the run stood still just then: it is followed
         assert network.members[target].run != network.members['test_signal'].run
-    network.long_quiet = True
     network.settle(80)
     shake(network, choices)
     if again:
@@ -423,7 +420,6 @@ def test_an_invented_run_before_the_first_does_not_keep_anybody_from_it(
         network.act(name)
     network.start('test_signal')
     network.hello_to_late()
-    network.long_quiet = True
     network.settle(80)
     assert len({member.run for member in network.members.values()}) == 1
     assert_as_expected(network, at_least=10)
@@ -744,3 +740,38 @@ def test_who_was_deceived_is_patient_for_a_second_of_steps(in_loops: Collection[
     assert motor.patience_s == DECEIVED_STANDSTILL_S
     motor.follow(motor.step + MEMORY + 1, np.zeros((2, 2)))
     assert motor.patience_s == STANDSTILL_S
+
+
+@pytest.mark.parametrize('frame', [
+    (9.0, 0.0, 1e-3), (math.nan, 0.0, 1e-3, *[0.5] * 4), (9.0, 0.5, 1e-3, *[0.5] * 4)])
+@none_some_all
+def test_a_frame_that_no_node_makes_is_a_warning(
+        in_loops: Collection[str], frame: tuple[float, ...]) -> None:
+    network = begun_network(in_loops)
+    for name in ('plant', 'test_signal'):
+        member = network.members[name]
+        assert member.patience_s == STANDSTILL_S
+        network.attack('motor_1', name, frame)
+        network.settle(4)
+        assert member.patience_s == DECEIVED_STANDSTILL_S
+        member.follow(member.step + MEMORY + 8, np.zeros((2, 2)))
+        assert member.patience_s == STANDSTILL_S
+
+
+def test_a_member_that_went_on_after_a_hello_in_its_name_was_spoken_for() -> None:
+    conductor = conductor_with_recorder()
+    hello = (0.0, 5.0, 0.0, *[0.0] * 4)
+    conductor.receive('recorder', (conductor.run, 0.0, 1e-3))
+    conductor.receive('plant', hello)
+    assert conductor.patience_s == STANDSTILL_S, 'it may be true'
+    step_as_far_as_possible(conductor)
+    assert conductor.patience_s == DECEIVED_STANDSTILL_S
+    conductor.receive('plant', hello)  # nothing is known of this one yet
+    assert conductor.patience_s == DECEIVED_STANDSTILL_S
+
+
+def test_a_hello_begins_a_new_run_only_where_the_drive_stands_still() -> None:
+    conductor = conductor_with_recorder()
+    conductor.receive('plant', (0.0, 12.0, 0.0, *[0.0] * 4))
+    assert conductor.new_run(20.0) is None
+    assert conductor.new_run(20.0, stands_still=True) is not None
