@@ -24,12 +24,15 @@ from antenna_drive.lockstep.member import Conductor, Member
 from antenna_drive.lockstep.pace import Pace
 from antenna_drive.lockstep.partner_link import PartnerLink
 from antenna_drive.lockstep.run_control import PAUSED, RunState
+from antenna_drive.lockstep.shared_memory import is_cut_off
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
 PERIOD_S = 1.0
 # A wait is reported after this.
 PATIENCE_S = 0.9
+CUT_OFF = ('; it cannot hear them: it did not run for a second or more, and Fast DDS gave its '
+           'shared memory away. Start this node again')
 
 
 class Report:
@@ -137,9 +140,9 @@ class Report:
     def _waits_for(self) -> str:
         member = self._member
         names = ', '.join(member.missing()) or 'nobody'
-        if member.run == 0.0:
-            return f'waiting for {names} to begin a run'
-        return f'waiting for {names} at step {member.step} of run {member.run:.0f}'
+        where = (f'at step {member.step} of run {member.run:.0f}' if member.run else
+                 'to begin a run')
+        return f'waiting for {names} {where}' + (CUT_OFF if is_cut_off() else '')
 
     def publish_if_due(self, now: float) -> None:
         """Publish the state at `now` [s] if the last report is one period old."""

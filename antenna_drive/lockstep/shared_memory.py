@@ -1,0 +1,57 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Whether the shared memory through which others reach this process is still theirs.
+
+A process that opens a port of Fast DDS waits a second for whoever listens there, and removes the
+port if it does not answer: it takes a process that was stopped, or starved of the processor, for a
+dead one. That process then listens to memory that nobody writes to any more. It can send, but it
+hears nobody, and does not notice.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+import re
+
+# Whoever listens at a port holds a lock on a file beside it. Others map the port only.
+_LOCK = re.compile(r'/(\w*_port\d+)_el$')
+_REMOVED = re.compile(r'/(\w*_port\d+) \(deleted\)$', re.MULTILINE)
+
+
+def is_cut_off(process: Path = Path('/proc/self')) -> bool:
+    """
+    Return whether a port at which the process listens has been removed.
+
+    Parameters
+    ----------
+    process
+        its folder in /proc; where there is none, nothing is known, and the answer is False
+
+    """
+    try:
+        removed = set(_REMOVED.findall((process / 'maps').read_text(encoding='utf-8')))
+        return bool(removed) and any(
+            (lock := _LOCK.search(target)) and lock[1] in removed
+            for target in map(_target, (process / 'fd').iterdir()))
+    except OSError:
+        return False
+
+
+def _target(descriptor: Path) -> str:
+    try:
+        # the lock's file may be gone too
+        return str(descriptor.readlink()).removesuffix(' (deleted)')
+    except OSError:
+        return ''  # closed since
