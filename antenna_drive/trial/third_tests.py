@@ -54,6 +54,8 @@ BUILT_IN: Mapping[str, Callable[[np.random.Generator], dict[str, Any]]] = {
     'chirp': lambda random: programme.chirp(DURATION_S, random)}
 RULES = (*DESIGNED, *BUILT_IN)
 TWO = 'two.json'
+# Cases for each job that open ones are looked for among: who has finished one takes the next.
+_AT_ONCE = 4
 
 
 def run_trial(folder: Path, manifest: dict[str, Any], wanted: int, jobs: int, limit: float,
@@ -87,8 +89,8 @@ def run_trial(folder: Path, manifest: dict[str, Any], wanted: int, jobs: int, li
     names, results = list(manifest['seals']), TrialResults(folder, manifest)
     found: list[str] = []
     done(0, wanted)
-    for first in range(0, len(names), jobs):
-        part = names[first:first + jobs]
+    for first in range(0, len(names), _AT_ONCE * jobs):
+        part = names[first:first + _AT_ONCE * jobs]
         tasks = [(folder, sealing.open_truth(folder, name, manifest), results, limit, options)
                  for name in part]
         with workers(jobs, threads=True) as pool:
