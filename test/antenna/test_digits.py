@@ -24,6 +24,7 @@ from antenna_drive.diagnosis import FloatArray
 from antenna_drive.machines.antenna.excitation import Bias, Longest, schedule, SheetCommand
 from antenna_drive.machines.antenna.field_test import CHANNELS, ENCODER
 from antenna_drive.machines.antenna.machine import AntennaMachine
+from antenna_drive.machines.antenna.planned_tests import planned
 from antenna_drive.machines.antenna.sensors import digit_of
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.sets import Drive
@@ -33,6 +34,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
+
+WAVEFORM = Square(0.05, 3.0, 0.25)
+SHEET = TestSheet(waveform=WAVEFORM, parameter_tolerance=0.02)
 
 
 @settings(max_examples=60, deadline=None)
@@ -63,10 +67,9 @@ def test_reading_with_noise_behind_its_digits_has_none() -> None:
 def recorded(drive: Drive, digit: float, rounding: Callable[[FloatArray], FloatArray],
              ) -> Recording:
     """Return a square wave as the model itself would show it, through an encoder of digits."""
-    waveform = Square(0.05, 3.0, 0.25)
-    sheet = TestSheet(waveform=waveform, parameter_tolerance=0.02)
+    sheet = SHEET
     time = np.arange(601) / 100.0
-    signals = {'test_signal/rate_command': SheetCommand(waveform)(time)}
+    signals = {'test_signal/rate_command': SheetCommand(WAVEFORM)(time)}
     signals.update({name: np.zeros(time.size) for name in CHANNELS})
     model = AntennaMachine({'a': Recording.from_arrays(time, signals, sheet=sheet)}, drive, 1)
     shown, when = readings_of(model, {}), model.experiments[0].time
@@ -97,6 +100,20 @@ def test_angle_within_the_digit_that_was_read_is_no_residual(
     assert np.abs(measured - plain).max() > 0.4 * digit
     known = readings_of(model, {step.name: digit, edge.name: turn})[:, ENCODER]
     assert np.abs(measured - known).max() < 1e-9
+
+
+def test_planned_test_is_read_in_the_digits_that_were_seen() -> None:
+    """A verdict that saw digits leads to a next test, whose readings are whole digits."""
+    drive, digit = load(), 2e-4
+    seen = AntennaMachine({'a': recorded(drive, digit, np.floor)}, drive, 1)
+    [form] = seen.effects['encoder.quantisation'].forms
+    next_test = AntennaMachine({'b': planned(replace(SHEET, waveform=Square(0.1, 4.0, 0.0)),
+                                             5.0, 100.0)}, drive, 1)
+    own = next_test.form_named(next_test.effects['encoder.quantisation'], form.name)
+    assert {p.name for p in own.parameters} <= {p.name for p in form.parameters}
+    read = readings_of(next_test, {own.parameters[0].name: digit})[:, ENCODER]
+    assert np.ptp(read) > 10 * digit, 'it moves'
+    assert np.abs(read / digit - np.round(read / digit)).max() < 1e-6
 
 
 def test_fine_encoder_has_the_digits_of_its_sheet() -> None:

@@ -46,6 +46,8 @@ _FLOW_INDEX = (0.5, 2.0, 0.02)
 MOTOR_ORDERS = tuple(float(k) for k in range(1, 49))
 _RAIL_ORDERS = tuple(20.0 * 1.03 ** k for k in range(200))
 _ENCODER_ORDERS = tuple(20.0 * 1.01 ** k for k in range(830))
+# The form of a quantisation whose digit the readings tell.
+DIGITS_SEEN = 'digits seen'
 EXTRA_MODES = tuple(0.6 * 1.14 ** k for k in range(23))
 # The mode of that effect: the record has room for it, the configuration does not have it.
 EXTRA_MODE = 3
@@ -322,7 +324,7 @@ def _quantisation(digit: float) -> Form:
     if not digit:
         return _form(_number('step', 'rad', 0.0, 1e-2, 1e-5, Digit()))
     turn = AntennaParameter('turn', '1', -1.0, 1.0, 0.02, is_shape=True, modifier=DigitTurn())
-    return _form(_number('step', 'rad', 0.0, digit, digit, Digit()), turn, name='digits seen')
+    return _form(_number('step', 'rad', 0.0, digit, digit, Digit()), turn, name=DIGITS_SEEN)
 
 
 def catalogue(durations_s: Sequence[float] = (), encoder_digit: float = 0.0) -> dict[str, Effect]:
