@@ -56,9 +56,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     parser.add_argument('verdict', nargs='?', type=Path, metavar='VERDICT',
                         help='JSON of a diagnosis; not needed with --objective detect')
-    parser.add_argument('--objective', choices=_OBJECTIVES, default='separate',
+    parser.add_argument('--objective', choices=_OBJECTIVES,
                         help='tell the answers apart, make numbers more certain, or find effects '
-                             'at all (default: separate)')
+                             'at all (default: separate, or detect if there is one answer)')
     parser.add_argument('--suspect', nargs='+', default=[], metavar='EFFECT',
                         help='effects that --objective detect looks for (default: all)')
     parser.add_argument('--limits', type=Path, metavar='FILE',
@@ -88,12 +88,14 @@ def run(arguments: argparse.Namespace) -> int:
     """Search, and write what was asked for; 1 if no test within the limits helps."""
     check_options(arguments, jobs=Entry('', 1, whole=True), duration=Entry('s', 5.0, 600.0),
                   rate=Entry('Hz', 20.0, 10000.0), seed=Entry('', 0, whole=True))
-    objective = arguments.rule or arguments.objective
-    planning = _planning(arguments)
-    rivals, inflated = _rivals(arguments, planning, objective)
-    space = (_tests_of_own if arguments.model else _tests_of_drive)(arguments, planning)
-    from antenna_drive.diagnosis import TestDesign
+    from antenna_drive.diagnosis import objective_for, TestDesign
     from antenna_drive.diagnosis.proposal import as_data, contents, lines
+    planning = _planning(arguments)
+    rivals, inflated = _rivals(arguments, planning)
+    objective = arguments.rule or arguments.objective or objective_for(rivals)
+    if objective == 'detect':
+        rivals = []
+    space = (_tests_of_own if arguments.model else _tests_of_drive)(arguments, planning)
     began = time.monotonic()
     with Progress('proposal', 1.0) as progress:
         try:
@@ -113,7 +115,10 @@ def run(arguments: argparse.Namespace) -> int:
         with replaced(arguments.report) as stream:
             shown = contents(found, space)
             stream.write(render('proposal.html', **{**vars(shown), 'data': data}).encode())
-    give(data, arguments.json, '\n'.join(lines(data)))
+    told = lines(data)
+    if objective == 'detect' and not arguments.objective:
+        told.insert(0, 'there is one answer only, and nothing to tell apart: this test detects')
+    give(data, arguments.json, '\n'.join(told))
     return 0 if found.tests else 1
 
 
@@ -122,8 +127,8 @@ def _planning(arguments: argparse.Namespace) -> dict[str, Any]:
     path = arguments.verdict
     if path is None:
         if arguments.objective != 'detect':
-            raise UserError(f'which verdict? --objective {arguments.objective} needs the JSON of '
-                            'a diagnosis; without one there is --objective detect')
+            raise UserError('which verdict? The JSON of a diagnosis is needed; without one there '
+                            'is --objective detect')
         return {}
     try:
         data = json.loads(path.read_text(encoding='utf-8'))
@@ -136,9 +141,9 @@ def _planning(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def _rivals(arguments: argparse.Namespace, planning: dict[str, Any],
-            objective: str) -> tuple[list[Rival], float]:
+            ) -> tuple[list[Rival], float]:
     from antenna_drive.diagnosis import Rival
-    if objective == 'detect':
+    if arguments.objective == 'detect':
         return [], 1.0
     try:
         return ([Rival.of_data(item) for item in planning['rivals']],

@@ -20,7 +20,9 @@ This is its public face; machines import nothing else of it.
 from antenna_drive.diagnosis.by_label import ByLabel, without_labels
 from antenna_drive.diagnosis.check import check_machine, idle_effects, MachineError
 from antenna_drive.diagnosis.confusability import Confusability, confusability
-from antenna_drive.diagnosis.design import DesignEffort, Judged, Proposal, TestDesign, TestSpace
+from antenna_drive.diagnosis.design import (
+    DesignEffort, Judged, objective_for, Proposal, TestDesign, TestSpace,
+)
 from antenna_drive.diagnosis.diagnosis import diagnose, Diagnosis, Progress
 from antenna_drive.diagnosis.diagram import Diagram, DiagramBlock
 from antenna_drive.diagnosis.evidence import Evidence
@@ -41,7 +43,8 @@ __all__ = [
     'as_data', 'ByLabel', 'check_machine', 'Colour', 'Confusability', 'confusability', 'Course',
     'courses', 'DEFAULT', 'DesignEffort', 'diagnose', 'Diagnosis', 'Diagram', 'DiagramBlock',
     'DisturbanceInput', 'Effect', 'Evidence', 'Experiment', 'FloatArray', 'Form', 'Hypothesis',
-    'idle_effects', 'Judged', 'LeastSquares', 'Machine', 'MachineError', 'Motion', 'Parameter',
-    'Point', 'Progress', 'Proposal', 'rank_hypotheses', 'Ranking', 'Regimes', 'Rival', 'Settings',
-    'TestDesign', 'TestSpace', 'TimeScales', 'with_initial_conditions', 'without_labels',
+    'idle_effects', 'Judged', 'LeastSquares', 'Machine', 'MachineError', 'Motion',
+    'objective_for', 'Parameter', 'Point', 'Progress', 'Proposal', 'rank_hypotheses', 'Ranking',
+    'Regimes', 'Rival', 'Settings', 'TestDesign', 'TestSpace', 'TimeScales',
+    'with_initial_conditions', 'without_labels',
 ]

@@ -23,7 +23,7 @@ the others: what derivatives promise is not always kept.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from itertools import combinations
@@ -59,6 +59,11 @@ CRITERIA: Mapping[str, str] = {
 _NEVER = 1e3
 
 Progress = Callable[[float, str], None]
+
+
+def objective_for(rivals: Collection[Rival]) -> str:
+    """Return what the next test is for: with a single answer there is nothing to tell apart."""
+    return SEPARATE if len(rivals) > 1 else DETECT
 
 
 class TestSpace(ABC):

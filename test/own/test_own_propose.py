@@ -88,13 +88,33 @@ def test_wrong_declarations_are_refused(changes: dict[str, Any], words: str) -> 
         model(**changes)
 
 
+def written(folder: Path, answers: int) -> Path:
+    """Return a verdict with so many answers, beside the model that it is of."""
+    (folder / 'my_swing.py').write_text(
+        'from own.test_own_propose import model\nmachine = model()\n')
+    verdict = folder / 'verdict.json'
+    verdict.write_text(json.dumps({'planning': {
+        'inflation': 1.0, 'rivals': [rival.as_data() for rival in rivals()[:answers]]}}))
+    return verdict
+
+
+@pytest.mark.parametrize('asked, objective', [([], 'detect'),
+                                              (['--objective', 'sharpen'], 'sharpen')])
+def test_beside_a_single_answer_something_else_is_looked_for(
+        tmp_path: Path, asked: list[str], objective: str,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    code = main(['propose', str(written(tmp_path, 1)), *asked,
+                 '--model', str(tmp_path / 'my_swing.py'), '--duration', '10', '--jobs', '1',
+                 '--json', str(tmp_path / 'next.json')])
+    assert code == 0
+    data = json.loads((tmp_path / 'next.json').read_text())
+    assert data['objective'] == objective and data['test']
+    assert ('nothing to tell apart' in capsys.readouterr().out) == (not asked)
+
+
 def test_the_command_writes_the_commands_of_the_test(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / 'my_swing.py').write_text(
-        'from own.test_own_propose import model\nmachine = model()\n')
-    verdict = tmp_path / 'verdict.json'
-    verdict.write_text(json.dumps({'planning': {
-        'inflation': 1.0, 'rivals': [rival.as_data() for rival in rivals()]}}))
+    verdict = written(tmp_path, 2)
     code = main(['propose', str(verdict), '--model', str(tmp_path / 'my_swing.py'),
                  '--duration', '10', '--jobs', '1', '--out', str(tmp_path / 'next.csv'),
                  '--json', str(tmp_path / 'next.json'), '--report', str(tmp_path / 'next.html')])

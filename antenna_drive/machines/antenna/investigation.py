@@ -29,7 +29,7 @@ import shutil
 from typing import Any
 
 from antenna_drive.diagnosis import (
-    as_data, DEFAULT, DesignEffort, Diagnosis, Rival, Settings, TestDesign,
+    as_data, DEFAULT, DesignEffort, Diagnosis, objective_for, Rival, Settings, TestDesign,
 )
 from antenna_drive.drafts import drafted
 from antenna_drive.errors import UserError
@@ -180,8 +180,7 @@ class Investigation:
             planning = (_read(self._path('verdict', number - 1, '.json')) or {})['planning']
             rivals = [Rival.of_data(item) for item in planning['rivals']]
             inflated = planning['inflation']
-        # with a single answer there is nothing to tell apart: what else is there, then?
-        objective = 'separate' if len(rivals) > 1 else 'detect'
+        objective = objective_for(rivals)
         found = TestDesign(
             self._space, rivals if len(rivals) > 1 else (), inflated, objective,
             threads=self._threads, settings=self._settings, effort=self._effort,
