@@ -31,12 +31,13 @@ import warnings
 
 from antenna_drive.campaign.domains import DomainClaim
 from antenna_drive.campaign.rig import (
-    Diagnostics, MEMBERS, OBSERVER, random_settings, RECORDER, Rig,
+    Diagnostics, InVainError, MEMBERS, OBSERVER, random_settings, RECORDER, Rig,
 )
 from antenna_drive.campaign.starts import check_bag
 from antenna_drive.campaign.trials import Outcome
 from antenna_drive.emulator.wiring import UNITS
 from antenna_drive.lockstep.member import DECEIVED_STANDSTILL_S
+from antenna_drive.lockstep.report import CUT_OFF
 from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.recording import RecordingError, RecordingWarning
 from rcl_interfaces.srv import SetParameters
@@ -53,6 +54,9 @@ CHANGES_PER_MINUTE = 1000
 HOUR_S = 3600
 # Frames of garbage, 1000 a second.
 GARBAGE = 12_000
+# Stops of a node while others join.
+STOPS = 8
+LISTENER = 'antenna_drive.campaign.listener'
 # In a file system of its own, mounted in $0: the command that follows.
 MOUNTED = 'mount -t tmpfs -o size={size} none "$0" && mkdir "$0/bags" && {then} exec "$@"'
 
@@ -66,7 +70,8 @@ def run(name: str, options: Mapping[str, Any], rng: random.Random) -> Outcome:
         'clock_set': _clock_set, 'suspended': _suspended, 'many_drives': _many_drives,
         'slow_observer': _slow_observer, 'many_changes': _many_changes,
         'second_publishers': _second_publishers,
-        'stopped_beside_garbage': _stopped_beside_garbage}
+        'stopped_beside_garbage': _stopped_beside_garbage,
+        'stopped_while_others_join': _stopped_while_others_join}
     with tempfile.TemporaryDirectory() as folder:
         conditions[name.rpartition('_')[0]](outcome, options, rng, Path(folder))
     return outcome
@@ -356,4 +361,44 @@ def _stopped_beside_garbage(outcome: Outcome, options: Mapping[str, Any], rng: r
         if stop_s < DECEIVED_STANDSTILL_S and runs != 1:
             outcome.find(f'a stop of {stop_s:.1f} s beside garbage began {runs - 1} runs',
                          'new_runs')
+        rig.compare()
+
+
+def _stopped_while_others_join(outcome: Outcome, options: Mapping[str, Any], rng: random.Random,
+                               folder: Path) -> None:
+    """Stop nodes while others join: each goes on, or says that it was cut off from the others."""
+    with Rig(outcome, pace=0.0, exchange=rng.choice(['python', 'auto']),
+             settings=random_settings(rng), keep=10**6) as rig:
+        rig.start()
+        rig.until_step(300)
+        cut_off = 0
+        for _ in range(STOPS):
+            victim = rng.choice(UNITS)
+            rig.processes.process(victim).send_signal(signal.SIGSTOP)
+            joining = [subprocess.Popen((sys.executable, '-m', LISTENER, '6'),
+                                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+                       for _ in range(2)]
+            time.sleep(rng.uniform(2.5, 5.0))
+            rig.processes.process(victim).send_signal(signal.SIGCONT)
+            resumed, runs = time.monotonic(), len(rig.watcher.runs)
+
+            def goes_on(since: float = resumed, run: int = runs) -> bool:
+                return rig.watcher.moved_s > since and (
+                    rig.watcher.step >= 300 or len(rig.watcher.runs) == run)
+
+            def is_cut_off(name: str = victim) -> bool:
+                said = rig.said.last(name)
+                return said is not None and CUT_OFF in said.message
+
+            try:
+                rig.until(goes_on, 'the drive to go on', 10.0)
+            except InVainError:
+                rig.until(is_cut_off, f'{victim} to say that it is cut off', 10.0)
+                cut_off += 1
+                rig.processes.kill(victim)
+                rig.processes.start(victim)
+                rig.until_step(300, runs + 1)
+            for process in joining:
+                process.wait()
+        outcome.figures.update(stops=STOPS, cut_off=cut_off)
         rig.compare()

@@ -48,7 +48,7 @@ READERS = ('csv', 'bag', 'bag_part', 'bag_unchecked', 'bag_metadata', 'sheet', '
            'manifest', 'scored_cases', 'fit_log', 'servo_log', 'change', 'frame')
 CONDITIONS = ('full_disk', 'read_only_folder', 'removed_folder', 'full_disk_for_commands',
               'clock_set', 'suspended', 'many_drives', 'slow_observer', 'many_changes',
-              'second_publishers', 'stopped_beside_garbage')
+              'second_publishers', 'stopped_beside_garbage', 'stopped_while_others_join')
 CHECKS = ('another_network', 'security')
 
 
