@@ -331,6 +331,7 @@ def test_foreign_frames_change_nothing_and_are_counted(
         network.start(name)
     network.hello_to_late()
     network.settle(10)
+    network.stands_still = False
     run = network.members['plant'].run
     past = {sent_in for _, sent_in in network.sent} - {run}
     counted = 0
