@@ -23,6 +23,7 @@ that test_signal plays and `diagnose` reads:
   antenna-drive propose verdict.json --out next.yaml --report next.html
   ros2 run antenna_drive test_signal --ros-args -p sheet:=next.yaml
 
+If the verdict has one answer only, the test looks for other effects, as with --objective detect.
 --objective sharpen asks for the test that makes the numbers of the likeliest answer most certain.
 --objective detect needs no verdict: it asks for the first test, for the effects of --suspect or
 for the whole catalogue. limits.yaml may hold rate_deg_s, acceleration_deg_s2, travel_deg,
@@ -88,13 +89,11 @@ def run(arguments: argparse.Namespace) -> int:
     """Search, and write what was asked for; 1 if no test within the limits helps."""
     check_options(arguments, jobs=Entry('', 1, whole=True), duration=Entry('s', 5.0, 600.0),
                   rate=Entry('Hz', 20.0, 10000.0), seed=Entry('', 0, whole=True))
+    planning = _planning(arguments)
     from antenna_drive.diagnosis import objective_for, TestDesign
     from antenna_drive.diagnosis.proposal import as_data, contents, lines
-    planning = _planning(arguments)
     rivals, inflated = _rivals(arguments, planning)
     objective = arguments.rule or arguments.objective or objective_for(rivals)
-    if objective == 'detect':
-        rivals = []
     space = (_tests_of_own if arguments.model else _tests_of_drive)(arguments, planning)
     began = time.monotonic()
     with Progress('proposal', 1.0) as progress:
@@ -117,7 +116,7 @@ def run(arguments: argparse.Namespace) -> int:
             stream.write(render('proposal.html', **{**vars(shown), 'data': data}).encode())
     told = lines(data)
     if objective == 'detect' and not arguments.objective:
-        told.insert(0, 'there is one answer only, and nothing to tell apart: this test detects')
+        told.insert(0, 'one answer only, and nothing to tell apart: this test looks for others')
     give(data, arguments.json, '\n'.join(told))
     return 0 if found.tests else 1
 

@@ -437,8 +437,8 @@ class Conductor(Member):
             self._heard[peer] = max(self._heard[peer], known)
 
     def _went_on_after_hello(self, name: str) -> bool:
-        """Tell whether a hello in a member's name was false: it was not started again."""
-        return self.step - self._hello_at.get(name, self.step) > DEPTH
+        """Tell whether a hello in a member's name was false, in the last MEMORY steps."""
+        return DEPTH < self.step - self._hello_at.get(name, self.step) <= MEMORY
 
     @property
     def patience_s(self) -> float:

@@ -769,6 +769,8 @@ def test_a_member_that_went_on_after_a_hello_in_its_name_was_spoken_for() -> Non
     assert conductor.patience_s == DECEIVED_STANDSTILL_S
     conductor.receive('plant', hello)  # nothing is known of this one yet
     assert conductor.patience_s == DECEIVED_STANDSTILL_S
+    conductor.follow(conductor.step + MEMORY + 1, np.zeros((2, 2)))
+    assert conductor.patience_s == STANDSTILL_S, 'it is long ago'
 
 
 def test_a_hello_begins_a_new_run_only_where_the_drive_stands_still() -> None:

@@ -109,6 +109,7 @@ def test_beside_a_single_answer_something_else_is_looked_for(
     assert code == 0
     data = json.loads((tmp_path / 'next.json').read_text())
     assert data['objective'] == objective and data['test']
+    assert len(data['rivals']) == 1, 'it must stay within the limits with that answer too'
     assert ('nothing to tell apart' in capsys.readouterr().out) == (not asked)
 
 

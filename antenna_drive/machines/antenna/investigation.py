@@ -180,9 +180,8 @@ class Investigation:
             planning = (_read(self._path('verdict', number - 1, '.json')) or {})['planning']
             rivals = [Rival.of_data(item) for item in planning['rivals']]
             inflated = planning['inflation']
-        objective = objective_for(rivals)
         found = TestDesign(
-            self._space, rivals if len(rivals) > 1 else (), inflated, objective,
+            self._space, rivals, inflated, objective_for(rivals),
             threads=self._threads, settings=self._settings, effort=self._effort,
             seed=self._plan.seed + number).run(
                 lambda share, doing: progress(f'design of test {number}', share))
