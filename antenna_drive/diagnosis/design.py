@@ -47,7 +47,9 @@ SEPARATE, SHARPEN, DETECT = OBJECTIVES = ('separate', 'sharpen', 'detect')
 D_OPTIMAL, RANDOM = 'd-optimal', 'random'
 CRITERIA: Mapping[str, str] = {
     SEPARATE: 'T-optimality with prior probabilities: expected information between the rivals, '
-              'all tolerances free (Atkinson and Fedorov 1975; Ponce de Leon and Atkinson 1991)',
+              'all tolerances free (Atkinson and Fedorov 1975; Ponce de Leon and Atkinson 1991); '
+              'with a smaller weight the rule of detect, in case none of them is true '
+              '(compound design: Atkinson, Donev and Tobias 2007, chapter 21)',
     SHARPEN: "D_s-optimality: determinant of the covariance of the likeliest rival's effects, all "
              'tolerances free (Atkinson, Donev and Tobias 2007, section 10.3)',
     DETECT: 'smallest size of each effect that shows beside all tolerances, over that in the '
@@ -164,6 +166,8 @@ class Judged:
     family, test : as the test space has drawn it
     use : share of each limit that it uses, the worst of all rivals
     score : by the criterion; the larger the better
+    coarseness : smallest size of each effect of the catalogue that shows, over that in the best
+        test that was judged, in the geometric mean; NaN where it was not asked for
     told : how well it tells the rivals apart to first order
     confirmed : the same with every rival fitted to the readings of the others
     deviations : of each number of the effects, its standard deviation before and after
@@ -175,6 +179,7 @@ class Judged:
     test: Any
     use: Mapping[str, float]
     score: float = 0.0
+    coarseness: float = math.nan
     told: Separation | None = None
     confirmed: Separation | None = None
     deviations: Mapping[str, tuple[float, float]] = field(default_factory=dict)
@@ -285,22 +290,22 @@ class TestDesign:
             if self._objective == RANDOM:
                 return self._proposal(allowed[:1], refused, (), len(drawn))
             progress(0.3, 'the best with all tolerances free')
-            judged = _best(pool.map(self._judge, _of_each_family(allowed, effort.judged)))
+            judged = self._compared(pool.map(self._judge, _of_each_family(
+                allowed, effort.judged)))
             progress(0.55, 'variants of the best')
             variants = [replace(test, test=self._space.nearby(test.family, test.test,
                                                               self._random))
                         for test in judged[:effort.varied] for _ in range(effort.variants)]
             tried = [test for test in pool.map(self._screened, variants) if self._allowed(test)]
-            judged = _best([*self._relative(judged), *pool.map(self._judge, tried)])
-            judged = _best(self._relative(judged))
+            judged = self._compared([*judged, *pool.map(self._judge, tried)])
             progress(0.8, 'each rival fitted to the others')
             if self._objective == SEPARATE:
-                judged = _best([*pool.map(self._confirmed, judged[:effort.confirmed])]) + (
-                    judged[effort.confirmed:])
+                judged = self._compared([*pool.map(self._confirmed, judged[:effort.confirmed]),
+                                         *judged[effort.confirmed:]])
             helpful = [test for test in judged if self._helps(test)]
-            beyond: Iterable[Judged] = ()
+            beyond: Sequence[Judged] = ()
             if not helpful:
-                beyond = _best(pool.map(self._judge, _of_each_family(
+                beyond = self._compared(pool.map(self._judge, _of_each_family(
                     [test for test in screened if not self._allowed(test)], effort.varied)))
         progress(1.0, 'done')
         return self._proposal(helpful, refused, [test for test in beyond if self._helps(test)],
@@ -345,16 +350,15 @@ class TestDesign:
         return replace(test, use=use, score=self._score(told))
 
     def _separated(self, test: Judged) -> Judged:
-        """Judge a test with all tolerances free, to first order."""
+        """Judge a test with all tolerances free, to first order, and what else it shows."""
         told = separation(self._space.machine(test.test), self._rivals, self._inflated,
                           self._settings)
-        return replace(test, told=told, score=self._score(told))
+        return replace(self._detected(test), told=told)
 
     def _confirmed(self, test: Judged) -> Judged:
         """Fit each rival to the readings of the others."""
-        told = refitted(self._space.machine(test.test), self._rivals, self._inflated,
-                        self._settings)
-        return replace(test, confirmed=told, score=self._score(told))
+        return replace(test, confirmed=refitted(
+            self._space.machine(test.test), self._rivals, self._inflated, self._settings))
 
     def _sharpened(self, test: Judged) -> Judged:
         """Judge how well a test determines the numbers of the likeliest rival."""
@@ -373,7 +377,7 @@ class TestDesign:
 
     def _detected(self, test: Judged) -> Judged:
         """Find the smallest size of each effect that shows in a test."""
-        machine = self._space.machine(test.test)
+        machine = self._space.machine(test.test).low_fidelity()
         machine = machine.with_experiments([
             replace(e, measured=machine.predict({}, k))
             for k, e in enumerate(machine.experiments)])
@@ -384,15 +388,21 @@ class TestDesign:
             name: (float(size), unit) for name, size, unit in zip(
                 found.effects, found.detectable, found.units, strict=True)})
 
-    def _relative(self, tests: Sequence[Judged]) -> list[Judged]:
-        """Return tests with scores that compare them; only smallest sizes need it."""
-        if self._objective != DETECT:
-            return list(tests)
-        least = {name: min(test.sizes[name][0] for test in tests)
-                 for name in (tests[0].sizes if tests else ())}
-        return [replace(test, score=-float(np.mean([
-            math.log(min(size / least[name], _NEVER)) if math.isfinite(least[name]) else 0.0
-            for name, (size, _) in test.sizes.items()]))) for test in tests]
+    def _compared(self, tests: Iterable[Judged]) -> list[Judged]:
+        """Return judged tests by their scores, the best first, confirmed ones before others."""
+        found = list(tests)
+        if self._objective in (SEPARATE, DETECT):
+            found = [replace(test, coarseness=coarseness, score=self._compound(test, coarseness))
+                     for test, coarseness in zip(found, _coarseness(found), strict=True)]
+        return sorted(found, key=lambda test: (test.confirmed is None, -test.score))
+
+    def _compound(self, test: Judged, coarseness: float) -> float:
+        """Return what a test tells of the rivals and of other effects, by their weights."""
+        if test.separation is None:
+            return -math.log(coarseness)
+        unlisted = self._settings.planning.unlisted
+        return ((1.0 - unlisted) * self._score(test.separation)
+                - unlisted * math.log(coarseness))
 
     # -- what no test tells --------------------------------------------------------------------
 
@@ -418,14 +428,23 @@ class TestDesign:
         return dict(sorted(unread.items(), key=lambda item: -item[1]))
 
 
-def _best(tests: Iterable[Judged]) -> list[Judged]:
-    return sorted(tests, key=lambda test: -test.score)
+def _coarseness(tests: Sequence[Judged]) -> list[float]:
+    """Return for each test the sizes that show, over the least of all, in the geometric mean."""
+    if not tests:
+        return []
+    sizes = np.array([[size for size, _ in test.sizes.values()] for test in tests])
+    shown = sizes[:, np.isfinite(sizes).any(axis=0)]
+    if not shown.size:
+        return [1.0] * len(tests)
+    over = np.minimum(shown / shown.min(axis=0), _NEVER)
+    return np.exp(np.mean(np.log(over), axis=1)).tolist()
 
 
 def _of_each_family(tests: Sequence[Judged], most: int) -> list[Judged]:
     """Return the best tests of every family in turn: rough scores compare no families."""
+    best = sorted(tests, key=lambda test: -test.score)
     families: dict[str, list[Judged]] = {}
-    for test in _best(tests):
+    for test in best:
         families.setdefault(test.family, []).append(test)
     rank = {id(test): k for group in families.values() for k, test in enumerate(group)}
-    return sorted(_best(tests), key=lambda test: rank[id(test)])[:most]
+    return sorted(best, key=lambda test: rank[id(test)])[:most]

@@ -81,6 +81,9 @@ def as_data(proposal: Proposal, space: TestSpace, settings: Settings = DEFAULT) 
 def _told(test: Judged, rivals: Sequence[Rival], settings: Settings) -> dict[str, Any]:
     """Return what a test is expected to tell, as plain data."""
     found: dict[str, Any] = {'score': test.score}
+    if test.deviations:
+        found['deviations'] = {name: {'before': before, 'after': after}
+                               for name, (before, after) in test.deviations.items()}
     told, first = test.separation, test.told
     if told is not None:
         temperature, sure = settings.verdict.temperature, settings.planning.sure
@@ -98,10 +101,8 @@ def _told(test: Judged, rivals: Sequence[Rival], settings: Settings) -> dict[str
         if first is not None:
             found['channels'] = dict(first.channels)
             found['expected']['promised'] = first.expected(temperature)
-    if test.deviations:
-        found['deviations'] = {name: {'before': before, 'after': after}
-                               for name, (before, after) in test.deviations.items()}
-    if test.sizes:
+        found['sizes_over_least'] = test.coarseness
+    elif test.sizes:
         found['smallest_sizes'] = {
             name: {'size': size if math.isfinite(size) else None, 'unit': unit}
             for name, (size, unit) in test.sizes.items()}
@@ -150,13 +151,16 @@ def _promises(data: Mapping[str, Any]) -> list[str]:
         expected = data['expected']
         how = ('each rival fitted to the others' if expected['confirmed'] else
                'to first order, not confirmed by fits')
-        found.append(f'  the true one of {len(expected["each"])} rivals is expected to get '
+        found.append(f'  if one of {len(expected["each"])} rivals is true, it is expected to get '
                      f'{100.0 * expected["right_after"]:.0f} % after it '
                      f'({100.0 * expected["right_before"]:.0f} % now; {how})')
         found.append(f'  the answer is then {100.0 * expected["sure"]:.0f} % sure or more with '
                      f'probability {expected["surely"]:.2f}')
         found += [f'  {100.0 * item["before"]:5.1f} % now, {100.0 * item["after_if_true"]:5.1f} % '
                   f'after if true: {" + ".join(item["effects"])}' for item in expected['each']]
+        found.append('  if none of them is true: it shows other effects from '
+                     f'{data["sizes_over_least"]:.1f} times the least size of all tests that were '
+                     'judged (in the mean)')
     for name, item in list(data.get('deviations', {}).items())[:_SIZES]:
         found.append(f'  {name}: standard deviation {item["before"]:.3g} now, '
                      f'{item["after"]:.3g} after')

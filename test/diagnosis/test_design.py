@@ -163,6 +163,65 @@ def test_a_suspicion_is_looked_for_alone() -> None:
     assert found.tests[0].test == greatest
 
 
+def test_variants_are_of_the_tests_that_detect_most() -> None:
+    class Varied(Loads):
+        def __init__(self) -> None:
+            super().__init__(1.6)
+            self.varied: list[float] = []
+
+        def nearby(self, family: str, test: Any, random: np.random.Generator) -> Any:
+            self.varied.append(test)
+            return super().nearby(family, test, random)
+
+    space = Varied()
+    TestDesign(space, objective='detect', effort=SMALL).run()
+    assert len(space.varied) == SMALL.varied * SMALL.variants
+    # the stronger the load, the more shows
+    assert min(space.varied) >= 0.5
+
+
+class Heated(Loads):
+    """The same loads, with heat or without: only heat shows how the lever expands."""
+
+    families = ('cold', 'hot')
+
+    def draw(self, family: str, random: np.random.Generator) -> Any:
+        return float(random.uniform(1.0, 1.4)), family == 'hot'
+
+    def machine(self, test: Any) -> Lever:
+        load, hot = test
+        lever = HotLever(load) if hot else Lever(load)
+        lever.effects = {**lever.effects, EXPANSION.id: EXPANSION}
+        return lever
+
+
+EXPANSION = Effect('lever.expansion', 'lever', '', '', (Form('', (
+    Parameter('lever.expansion', '1', -10.0, 10.0, 0.01),)),))
+
+
+class HotLever(Lever):
+    """The lever in an oven."""
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        warmth = self.experiments[0].time[:, None] ** 2
+        return np.asarray(super().predict(point, experiment)
+                          + point.get('lever.expansion', 0.0) * warmth)
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_of_tests_that_tell_the_rivals_apart_one_that_shows_more_is_proposed(seed: int) -> None:
+    found = TestDesign(Heated(1.6), HARD, 1.0, effort=SMALL, seed=seed).run()
+    best, cold = found.tests[0], next(t for t in found.tests if not t.test[1])
+    for test in (best, cold):
+        assert test.told is not None and test.told.expected(8.0) > 0.95
+    assert best.test[1]
+    # the expansion, one effect of four, counts as a thousand times too large in the cold
+    assert cold.coarseness / best.coarseness == pytest.approx(1000.0 ** 0.25, rel=0.2)
+    data = as_data(found, Heated(1.6))
+    assert data['sizes_over_least'] == best.coarseness
+    assert any(f'{best.coarseness:.1f} times the least size' in line for line in lines(data))
+
+
 def test_the_same_seed_proposes_the_same_test() -> None:
     one, other, third = (TestDesign(Loads(1.6), HARD, 1.0, effort=SMALL, seed=seed).run().tests[0]
                          for seed in (3, 3, 4))
