@@ -18,11 +18,11 @@ Make a trial of the twin: sealed antennas of an independent program, played to i
   --kind healthy   nothing happens in an hour (--duration); each alarm is a false one
   --kind verdict   the three recordings of an ordinary sealed case, diagnosed as they grow
 
-The antennas have the tolerances and the imperfections of wild cases (docs/trial.md). The twin is
-played in simulated time, as fast as the computer goes. Truths are sealed in DIR before anything
-is simulated, as by `antenna-drive trial`; DIR/results.jsonl is what the twin said. The same
-command resumes an interrupted trial. To continue on another machine, put that file into a new
-DIR.
+The antennas have the tolerances and, but for --kind verdict, the imperfections of wild cases
+(docs/trial.md). The twin is played in simulated time, as fast as the computer goes. Truths are
+sealed in DIR before anything is simulated, as by `antenna-drive trial`; DIR/results.jsonl is what
+the twin said. The same command resumes an interrupted trial. To continue on another machine, put
+that file into a new DIR.
 
 For example:
   antenna-drive twin-trial --kind onset --cases 20 --seed 7 --out onsets
@@ -44,6 +44,8 @@ from antenna_drive.errors import UserError
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.trial import cases, onset, sealing
 from antenna_drive.trial.results import TrialResults
+from antenna_drive.trial.scorecard import Case, score
+from antenna_drive.trial.verdict import content_of, parse_verdict
 from antenna_drive.workers import workers
 
 TOLERANCE = 0.02
@@ -51,8 +53,9 @@ WITHIN_S = 10.0
 # An effect that changes the readings by less within that time does not show in the test: half a
 # chi-square, the price of an effect in a diagnosis.
 HIDDEN = 30.0
-# Seconds of testing at which a growing verdict is looked at; recordings of 30 s each.
-LOOKS_S = (15.0, 30.0, 45.0, 60.0, 75.0, 90.0)
+# Seconds of testing at which a growing verdict is looked at; three recordings of 30 s each. It
+# cannot be decided before the second one.
+LOOKS_S = (30.0, 45.0, 60.0, 75.0, 90.0)
 RECORDED_S = 30.0
 
 
@@ -137,40 +140,13 @@ def outcome(truth: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, Any
 
 
 def _grown(truth: dict[str, Any]) -> dict[str, Any]:
-    """Return the looks at a case as its recordings grow, and where the rule stops."""
-    from antenna_drive.parameters.loading import load
-    from antenna_drive.recording.recording import Recording
-    from antenna_drive.twin.growing import diagnosed, look_of
-    from antenna_drive.twin.proving import recording_of
-    from antenna_drive.twin.sequential import decided, Look, Rule
-    whole = [recording_of(cases.make_recording(truth, k), truth['sheets'][k]) for k in range(3)]
-    looks: list[Look] = []
-    stopped = None
-    for seconds in LOOKS_S:
-        # once stopped, the answer after all tests is all that is still asked for
-        if stopped is not None and seconds < LOOKS_S[-1]:
-            continue
-        there: dict[str, Recording] = {}
-        for k, recording in enumerate(whole):
-            length = min(seconds - k * RECORDED_S, RECORDED_S)
-            if length > 0.0:
-                there[f'rec_{"abc"[k]}'] = recording.between(0.0, length + 1e-6)
-        looks.append(look_of(diagnosed(there, load()), seconds))
-        if stopped is None and decided(looks, Rule()):
-            stopped = seconds
-    end = next((look for look in looks if look.seconds == stopped), looks[-1])
-    true = tuple(sorted(entry['id'] for entry in truth['effects'])) or ('none',)
-    if truth['kind'] == 'outside':
-        true = ('unknown',)
-
-    def right(look: Look) -> bool:
-        return Look(0.0, {look.first: 0.6, true: 0.4}, look.confusable).confidence > 0.9
-
-    return {'stopped_s': stopped, 'first': list(end.first), 'confidence': end.confidence,
-            'right': right(end), 'whole_first': list(looks[-1].first),
-            'whole_confidence': looks[-1].confidence, 'whole_right': right(looks[-1]),
-            'looks': [{'seconds': look.seconds, 'first': list(look.first),
-                       'confidence': look.confidence} for look in looks]}
+    """Return the verdicts on a case as its recordings grow, and when the rule stopped."""
+    from antenna_drive.twin.proving import grown, recording_of
+    tests = [recording_of(cases.make_recording(truth, k), truth['sheets'][k]) for k in range(3)]
+    stopped, looks = grown(tests, [RECORDED_S] * len(tests), LOOKS_S)
+    return {'stopped_s': stopped, 'looks': [
+        {'seconds': look.seconds, 'verdict': content_of(parse_verdict(result))}
+        for look, result in looks]}
 
 
 def of_onsets(results: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -204,16 +180,30 @@ def of_healthy(results: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def of_verdicts(results: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return what a trial of growing verdicts shows, in lines."""
-    def named(effects: Sequence[str]) -> str:
-        return ' + '.join(effects)
+    def at(item: Mapping[str, Any], seconds: float | None) -> Case:
+        look = next(look for look in item['looks'] if look['seconds'] == (seconds or LOOKS_S[-1]))
+        return Case(dict(item), parse_verdict(look['verdict']))
 
-    lines = [f'{named([e["id"] for e in item["effects"]]) or "none":40s} '
-             + ('stopped at {stopped_s:g} s: '.format(**item) if item['stopped_s']
-                else 'not stopped: ')
-             + f'{named(item["first"])} {item["confidence"]:.2f}, '
-             f'after 90 s: {named(item["whole_first"])} {item["whole_confidence"]:.2f}'
-             for item in results]
+    def said(case: Case) -> str:
+        assert case.verdict is not None
+        first = case.verdict.which[0]
+        return (f'{" + ".join(sorted(first.effects))} {first.probability:.2f}, '
+                + ('right' if case.right else 'not right'))
+
+    stopped = [at(item, item['stopped_s']) for item in results]
+    whole = [at(item, None) for item in results]
+    lines = [f'{case.label:40s} ' + (f'stopped at {item["stopped_s"]:g} s: '
+                                     if item['stopped_s'] else 'not stopped: ')
+             + f'{said(case)}; after {LOOKS_S[-1]:g} s: {said(last)}'
+             for item, case, last in zip(results, stopped, whole, strict=True)]
+    for name, group in (('stopped', stopped), (f'after {LOOKS_S[-1]:g} s', whole)):
+        figures = score(group)
+        lines.append(f'{name}: right {sum(case.right for case in group)} of {len(group)}; '
+                     + '; '.join(f'{key} {figures[key]:.3f}' for key in (
+                         'top1', 'no_gap_on_none', 'ece')))
+    same = [case.verdict and last.verdict and case.verdict.means(
+        case.verdict.which[0].effects, last.verdict.which[0].effects)
+        for case, last in zip(stopped, whole, strict=True)]
     seconds = [item['stopped_s'] or LOOKS_S[-1] for item in results]
-    return [*lines, f'right {sum(item["right"] for item in results)} of {len(results)}, '
-            f'after 90 s {sum(item["whole_right"] for item in results)}; median '
-            f'{median(seconds):g} s of testing']
+    return [*lines, f'same answer as after {LOOKS_S[-1]:g} s: {sum(map(bool, same))} of '
+            f'{len(same)}; median {median(seconds):g} s of testing']

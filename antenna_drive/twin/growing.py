@@ -22,7 +22,7 @@ those of the one before: the engine has no way in for them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import Executor, Future
 from typing import Any
 
@@ -32,7 +32,8 @@ from antenna_drive.recording.recording import Recording
 from antenna_drive.twin.intake import COMMAND
 from antenna_drive.twin.sequential import Answer, decided, Look, Rule
 
-# The first look [s of testing], and how much more there has to be for the next one.
+# The first look [s of testing], and how much more there has to be for the next one. A test that
+# is shorter than the first look has not shown much, and does not count as one.
 FIRST_S, GROWTH = 15.0, 1.3
 
 
@@ -49,13 +50,14 @@ def diagnosed(recordings: Mapping[str, Recording], drive: Drive) -> dict[str, An
     return diagnose_recordings(recordings, drive, threads=1).result
 
 
-def look_of(result: Mapping[str, Any], seconds: float) -> Look:
-    """Return what a diagnosis said, as a look at so many seconds of testing."""
+def look_of(result: Mapping[str, Any], lengths_s: Collection[float]) -> Look:
+    """Return what a diagnosis said, as a look at tests of these lengths [s]."""
     probabilities: dict[Answer, float] = {}
     for entry in result['which']:
         answer = tuple(sorted(entry['effects']))
         probabilities[answer] = probabilities.get(answer, 0.0) + entry['probability']
-    return Look(seconds, probabilities, tuple(map(frozenset, result['confusable'])))
+    return Look(sum(lengths_s), sum(length >= FIRST_S for length in lengths_s), probabilities,
+                tuple(map(frozenset, result['confusable'])))
 
 
 class GrowingVerdict:
@@ -87,7 +89,7 @@ class GrowingVerdict:
         self._executor, self._drive, self._diagnose = executor, drive, diagnose
         self.rule = rule or Rule()
         self._tests: dict[str, Recording] = {}
-        self._running: tuple[Future[dict[str, Any]], float] | None = None
+        self._running: tuple[Future[dict[str, Any]], list[float]] | None = None
         self.looks: list[Look] = []
         self.fault = ''
 
@@ -111,17 +113,17 @@ class GrowingVerdict:
     def begin(self, test: Recording) -> None:
         """Look at the present test and those before it."""
         tests = {**self._tests, f'test {len(self._tests) + 1}': test}
-        total = sum(map(_length, tests.values()))
-        self._running = self._executor.submit(self._diagnose, tests, self._drive), total
+        self._running = (self._executor.submit(self._diagnose, tests, self._drive),
+                         [_length(item) for item in tests.values()])
 
     def take(self) -> bool:
         """Take the result of a look that has ended; return whether one has."""
         if self._running is None or not self._running[0].done():
             return False
-        future, seconds = self._running
+        future, lengths_s = self._running
         self._running = None
         try:
-            self.looks.append(look_of(future.result(), seconds))
+            self.looks.append(look_of(future.result(), lengths_s))
             self.fault = ''
         except UserError as error:
             self.fault = str(error)
@@ -148,7 +150,11 @@ class GrowingVerdict:
         now = self.looks[-1]
         what = 'no gap' if now.first == ('none',) else ' and '.join(now.first)
         said = f'{what}, {100.0 * now.confidence:.0f} % after {now.seconds:.0f} s'
-        return f'decided, you can stop: {said}' if self.decided else f'go on: {said}'
+        if self.decided:
+            return f'decided, you can stop: {said}'
+        if now.tests < self.rule.tests:
+            return f'go on, and make another test: {said}'
+        return f'go on: {said}'
 
 
 def _length(test: Recording) -> float:

@@ -20,7 +20,7 @@ is what it would have said in real time.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from antenna_drive.emulator.unit import FloatArray
@@ -29,6 +29,8 @@ from antenna_drive.parameters.loading import load
 from antenna_drive.recording.csv_format import FIELD_COLUMNS
 from antenna_drive.recording.recording import make_channel, NANOSECONDS, Recording, unit_of
 from antenna_drive.recording.sheet import parse_sheet
+from antenna_drive.twin.growing import diagnosed, look_of
+from antenna_drive.twin.sequential import decided, Look, Rule
 from antenna_drive.twin.watch import GAP, Twin, TwinSettings
 import numpy as np
 
@@ -125,3 +127,40 @@ def watched(columns: Mapping[str, FloatArray], sheet: Mapping[str, Any], onset_s
         before = twin.state
     return {'alarms': alarms, **told, 'tuning': twin.tuned,
             'judged': twin.blocks - twin.unjudged, 'unjudged': twin.unjudged}
+
+
+def grown(tests: Sequence[Recording], lengths_s: Sequence[float], looks_s: Sequence[float],
+          rule: Rule = Rule()) -> tuple[float | None, list[tuple[Look, dict[str, Any]]]]:
+    """
+    Return what looks at tests tell while they are made, one after the other.
+
+    Parameters
+    ----------
+    tests, lengths_s
+        the recordings, and how long each of them is [s]
+    looks_s
+        when to look [s of testing]; once the rule has stopped, only the last look is made
+    rule
+        when to stop
+
+    Returns
+    -------
+    when the rule stopped, None if it did not; and each look with the result of its diagnosis
+
+    """
+    drive, found, stopped = load(), [], None
+    for seconds in looks_s:
+        if stopped is not None and seconds < looks_s[-1]:
+            continue
+        there, lengths, left = {}, [], seconds
+        for number, (test, length) in enumerate(zip(tests, lengths_s, strict=True), 1):
+            if left > 0.0:
+                lengths.append(min(left, length))
+                # the last sample is within, whatever its time is rounded to
+                there[f'test {number}'] = test.between(0.0, lengths[-1] + 1e-6)
+            left -= length
+        result = diagnosed(there, drive)
+        found.append((look_of(result, lengths), result))
+        if stopped is None and decided([look for look, _ in found], rule):
+            stopped = seconds
+    return stopped, found

@@ -28,8 +28,9 @@ Bayes' rule make repeated looks harmless:
   probabilities are what they say (D. V. Lindley, Biometrika 44 (1957) 187).
 
 Both hold exactly for exact probabilities. Those of a diagnosis are as good as trials show them to
-be (expected calibration error). The same first answer is therefore asked for in two looks, one
-after the other.
+be (expected calibration error), and they are of what the tests can show. One motion does not show
+every effect: a slow square wave calls a machine healthy whose fault a fast triangle shows. The
+same first answer is therefore asked for in two looks, one after the other, and in a second test.
 """
 
 from __future__ import annotations
@@ -51,12 +52,14 @@ class Rule:
     false_alarm : greatest probability that a gap is ever decided on a healthy machine
     error : greatest mean error of a decided answer
     looks : so many looks in a row must have the same first answer
+    tests : the last look must be based on so many tests
 
     """
 
     false_alarm: float = 0.05
     error: float = 0.1
     looks: int = 2
+    tests: int = 2
 
 
 @dataclass(frozen=True)
@@ -67,12 +70,14 @@ class Look:
     Attributes
     ----------
     seconds : of testing that it was based on [s]
+    tests : that it was based on, those that are long enough to count
     probabilities : of the answers; they sum to 1
     confusable : groups of effects that the data cannot tell apart
 
     """
 
     seconds: float
+    tests: int
     probabilities: Mapping[Answer, float]
     confusable: Sequence[frozenset[str]] = ()
 
@@ -115,6 +120,6 @@ def decided(looks: Sequence[Look], rule: Rule) -> bool:
                                      for look in last):
         return False
     now = last[-1]
-    if now.confidence < 1.0 - rule.error:
+    if now.tests < rule.tests or now.confidence < 1.0 - rule.error:
         return False
     return now.first == NONE or now.evidence >= 1.0 / rule.false_alarm

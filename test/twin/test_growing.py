@@ -89,17 +89,23 @@ def look(growing: GrowingVerdict, later: Later, seconds: float) -> None:
 
 
 def test_looks_come_at_growing_distances_until_it_is_decided() -> None:
-    growing, later, _ = grown(0.6, 0.8, 0.94)
+    growing, later, _ = grown(0.6, 0.94, 0.94, 0.94, 0.94)
     assert not growing.due(FIRST_S - 0.1)
     look(growing, later, 16.0)
     assert not growing.due(20.0)
     look(growing, later, 21.0)
-    assert not growing.decided
-    assert growing.message()['say'].startswith('go on: motor_1.gap, 80 % after 21 s')
     look(growing, later, 28.0)
+    assert not growing.decided
+    assert growing.message()['say'].startswith(
+        'go on, and make another test: motor_1.gap, 94 % after 28 s')
+    growing.complete(test_of(30.0))
+    look(growing, later, 7.0)
+    assert not growing.decided, 'seconds of a second test are no second test'
+    look(growing, later, 19.0)
     assert growing.decided
     assert growing.message()['say'].startswith('decided, you can stop')
-    assert [item['seconds'] for item in growing.message()['looks']] == [16.0, 21.0, 28.0]
+    assert [item['seconds'] for item in growing.message()['looks']] == [
+        16.0, 21.0, 28.0, 37.0, 49.0]
     assert not growing.due(1e6)
 
 
@@ -123,7 +129,8 @@ def test_look_that_fails_is_told_and_the_next_one_made() -> None:
 
 def test_probabilities_of_a_look_are_those_of_the_diagnosis() -> None:
     result = Diagnoses(0.7)({}, load())
-    found = look_of(result, 5.0)
+    found = look_of(result, [20.0, 5.0])
+    assert (found.seconds, found.tests) == (25.0, 1)
     assert found.first == ('motor_1.gap',)
     assert sum(found.probabilities.values()) == pytest.approx(1.0)
     assert found.evidence == pytest.approx(99.0)

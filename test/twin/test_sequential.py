@@ -34,7 +34,7 @@ def looks_of(truth: int, random: np.random.Generator) -> list[Look]:
     weights = np.exp(logs - logs.max(axis=1, keepdims=True))
     weights /= weights.sum(axis=1, keepdims=True)
     names = [('none',), *((effect,) for effect in EFFECTS)]
-    return [Look(float(k + 1), dict(zip(names, row.tolist(), strict=True)))
+    return [Look(float(k + 1), 2, dict(zip(names, row.tolist(), strict=True)))
             for k, row in enumerate(weights)]
 
 
@@ -88,13 +88,22 @@ def test_stopped_answers_are_as_often_wrong_as_stated() -> None:
 def test_confusable_effects_count_together(
         probabilities: dict[tuple[str, ...], float], confusable: tuple[set[str], ...],
         confidence: float) -> None:
-    look = Look(1.0, probabilities, tuple(map(frozenset, confusable)))
+    look = Look(1.0, 1, probabilities, tuple(map(frozenset, confusable)))
     assert look.confidence == pytest.approx(confidence)
 
 
 def test_an_answer_has_to_last() -> None:
-    sure = Look(20.0, {('a',): 0.95, ('none',): 0.01, ('b',): 0.04})
-    other = Look(15.0, {('b',): 0.95, ('none',): 0.01, ('a',): 0.04})
+    sure = Look(20.0, 2, {('a',): 0.95, ('none',): 0.01, ('b',): 0.04})
+    other = Look(15.0, 2, {('b',): 0.95, ('none',): 0.01, ('a',): 0.04})
     assert not decided([sure], Rule())
     assert not decided([other, sure], Rule())
     assert decided([other, sure, sure], Rule())
+
+
+@pytest.mark.parametrize('answer', [('a',), ('none',)])
+def test_an_answer_has_to_last_in_a_second_test(answer: tuple[str, ...]) -> None:
+    first, second = (Look(seconds, tests, {answer: 0.95, ('b',): 0.05})
+                     for seconds, tests in ((30.0, 1), (45.0, 2)))
+    assert not decided([first, first], Rule())
+    assert decided([first, first, second], Rule())
+    assert decided([first, first], Rule(tests=1))
