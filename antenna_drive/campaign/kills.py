@@ -21,7 +21,6 @@ run begins without a restart of the others, and its bits are those of one proces
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from itertools import pairwise
 from pathlib import Path
 import random
 import re
@@ -80,7 +79,6 @@ def run(name: str, options: Mapping[str, Any], rng: random.Random) -> Outcome:
             rig.until_step(300)
             for number in range(options['kills']):
                 session.strike(number, options['longest_stop_s'])
-            session.note_lost_steps()
         session.check_bags()
     return outcome
 
@@ -99,11 +97,11 @@ def _field(path: Path, rng: random.Random) -> Callable[[int], FloatArray]:
     return expected
 
 
-def _lost_steps(log: str) -> list[list[int]]:
-    """Return what each recorder in a log has said of steps lost so far, in order."""
-    # the first bag of a recorder has no number at its end
-    return [[int(total) for total in re.findall(r'(\d+) steps lost', said)]
-            for said in re.split(r'/start_\d+\n', log)]
+def _lost_steps(log: str) -> int:
+    """Return how many steps the recorders of a log have said to lack."""
+    # the first bag of a recorder has no number at its end; each says its total so far
+    return sum(int(([0, *re.findall(r'(\d+) steps lost', said)])[-1])
+               for said in re.split(r'/start_\d+\n', log))
 
 
 class _Session:
@@ -118,6 +116,7 @@ class _Session:
         self._expected = expected
         # bags of recorders that were killed, and the step up to which each must be readable
         self._least: dict[str, int] = {}
+        self._lost = 0
 
     def strike(self, number: int, longest_stop_s: float) -> None:
         """Strike one member at a random moment, and see the drive recover."""
@@ -166,6 +165,7 @@ class _Session:
             rig.until(lambda: len(rig.watcher.runs) > runs and rig.watcher.step >= 300,
                       f'a new run after {detail}')
         outcome.count('recovered')
+        self._note_lost_steps(detail)
         for other in rig.names:
             if other != victim and rig.pid(other) != pids[other] or (
                     rig.processes.process(other).poll() is not None):
@@ -208,13 +208,13 @@ class _Session:
             worst = self._outcome.figures.get('longest_to_name_s', 0.0)
             self._outcome.figures['longest_to_name_s'] = max(worst, round(took, 3))
 
-    def note_lost_steps(self) -> None:
-        """Count the steps that recorders lacked because a node took its last frames along."""
-        lost = [total - before for totals in _lost_steps(self._rig.processes.log(RECORDER))
-                for before, total in pairwise([0, *totals])]
-        self._outcome.count('steps_lost_with_nodes', sum(lost))
-        if max(lost, default=0) > LOST_WITH_NODE:
-            self._outcome.find(f'a recorder lacks {max(lost)} steps of a run', 'lost_steps')
+    def _note_lost_steps(self, detail: Mapping[str, Any]) -> None:
+        """Count the steps that a recorder lacks because a node took its last frames along."""
+        total = _lost_steps(self._rig.processes.log(RECORDER))
+        lost, self._lost = total - self._lost, total
+        self._outcome.count('steps_lost_with_nodes', lost)
+        if lost > LOST_WITH_NODE:
+            self._outcome.find(f'a recorder lacks {lost} steps of a run', 'lost_steps', **detail)
 
     def _note_bag(self, least: int) -> None:
         """Note the bag that a killed recorder has left open, and how long it must be."""

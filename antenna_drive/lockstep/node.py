@@ -49,6 +49,8 @@ from std_msgs.msg import Float64
 
 # No wait is longer than this [s]: signals and reports are served in between.
 _LONGEST_WAIT_S = 0.2
+# How long a node that ends waits for others to receive its last frames [s].
+_DELIVERY_S = 1.0
 
 _AMPERES = 'armature.physical_amperes_per_article_ampere'
 
@@ -340,6 +342,7 @@ class DriveNode:
             self._report.ended()
             serving.close()
             self._exchange = None
+            self._link.delivered(_DELIVERY_S)
             if self._channel is not None:
                 self._channel.close()
 

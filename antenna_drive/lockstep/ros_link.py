@@ -30,6 +30,7 @@ from antenna_drive.lockstep.member import MEMORY
 from antenna_drive.physics.arrays import FloatArray
 import numpy as np
 from rclpy.callback_groups import CallbackGroup
+from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -145,6 +146,20 @@ class FrameLink:
         wait_set.wait(max(0, int(timeout_s * 1e9)))
         return [peer for index, peer in enumerate(peers)
                 if wait_set.is_ready('subscription', index)]
+
+    def delivered(self, patience_s: float) -> bool:
+        """
+        Wait until everybody who listens has received what was published.
+
+        Whoever leaves has to wait: Fast DDS forgets a writer that says goodbye, with what of it is
+        still on its way.
+
+        Returns
+        -------
+        False if somebody has not after `patience_s` [s]
+
+        """
+        return bool(self._publisher.wait_for_all_acked(Duration(seconds=patience_s)))
 
     def wake(self) -> None:
         """End a wait, from any thread."""

@@ -23,6 +23,7 @@ import struct
 import subprocess
 import sys
 from threading import Thread
+import time
 from typing import Any
 
 from antenna_drive.cli import main
@@ -74,6 +75,7 @@ class Drive:
     def __init__(self, observers: Sequence[str] = (), **run: Any) -> None:
         self.step = -1
         self.runs: list[int] = []
+        self.ended_at: list[int] = []  # the step before each run began
         self.changed_at: list[int] = []
         self._observer = Observer('watcher', self._on_step, on_begin=self._on_begin,
                                   on_change=self._on_change)
@@ -84,6 +86,7 @@ class Drive:
 
     def _on_begin(self, run: int, step_s: float) -> None:
         self.runs.append(run)
+        self.ended_at.append(self.step)
         self.step = -1
 
     def _on_step(self, k: int, time_s: float, samples: Any) -> None:
@@ -295,6 +298,27 @@ def test_a_new_run_gets_a_new_bag(tmp_path: Path, fresh_domain: int) -> None:
         for steps in steps_by_rosbags(tmp_path / name).values():
             assert steps == list(range(steps[0], steps[-1] + 1))
     assert read_bag(tmp_path / 'run_run_2').start_ns == 0
+
+
+def test_what_a_node_has_sent_before_it_ends_reaches_a_busy_recorder(
+        tmp_path: Path, fresh_domain: int) -> None:
+    out = tmp_path / 'run'
+    with Drive(['recorder'], pace=KEPT_PACE) as drive, recorder(f'out:={out}') as process:
+        drive.until(lambda: drive.step > 500)
+        process.process.send_signal(signal.SIGSTOP)
+        stopped_at = drive.step
+        # the drive goes on for 500 steps without an observer
+        drive.until(lambda: drive.step > stopped_at + 200)
+        leaving = drive.processes.process('motor_1')
+        leaving.send_signal(signal.SIGTERM)
+        time.sleep(0.3)
+        process.process.send_signal(signal.SIGCONT)
+        assert leaving.wait(5.0) == 0
+        drive.processes.start('motor_1')
+        drive.until(lambda: len(drive.runs) == 2 and drive.step > 100)
+        assert process.end() == 0, process.lines
+    for topic, steps in steps_by_rosbags(out).items():
+        assert steps == list(range(len(steps))) and len(steps) > drive.ended_at[1], topic
 
 
 def test_an_existing_target_is_refused_at_once(tmp_path: Path, fresh_domain: int) -> None:

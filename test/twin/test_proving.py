@@ -57,9 +57,8 @@ def test_tests_grow_until_the_rule_stops_and_are_looked_at_whole(
 def test_answers_are_scored_where_the_rule_stopped_and_after_all_tests() -> None:
     def case(kind: str, true: tuple[str, ...], stopped: float | None,
              *looks: tuple[float, tuple[str, ...]]) -> dict[str, Any]:
-        return {'kind': kind, 'effects': [{'id': name, 'size': 0.5, 'parameters': {'factor': 2.0}}
-                                                   for name in true],
-                'stopped_s': stopped, 'looks': [
+        effects = [{'id': name, 'size': 0.5, 'parameters': {'factor': 2.0}} for name in true]
+        return {'kind': kind, 'effects': effects, 'stopped_s': stopped, 'looks': [
                     {'seconds': seconds, 'verdict': answer(first, 0.95)}
                     for seconds, first in looks]}
 
