@@ -13,15 +13,11 @@
 # limitations under the License.
 """Let `python -m antenna_drive` be the antenna-drive command."""
 
-import os
 import sys
 
 from antenna_drive.cli import main
-from antenna_drive.programs import end_with_parent, PARENT
+from antenna_drive.programs import end_with_starter
 
 if __name__ == '__main__':
-    if PARENT in os.environ:
-        end_with_parent()
-        if os.getppid() != int(os.environ[PARENT]):
-            sys.exit()
+    end_with_starter()
     sys.exit(main())

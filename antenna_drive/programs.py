@@ -16,6 +16,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+import os
+from pathlib import Path
 import signal
 import sys
 
@@ -76,3 +78,28 @@ def end_with_parent() -> None:
         import ctypes
         pr_set_pdeathsig = 1  # linux/prctl.h
         ctypes.CDLL(None).prctl(pr_set_pdeathsig, int(signal.SIGTERM))
+
+
+def end_with_starter() -> None:
+    """
+    End with the process that has started this one, if the environment has its number.
+
+    The kernel tells of the end of a parent only if it was asked before. A starter that has ended
+    by then ends this process at once, also while it is a zombie that nobody has waited for.
+    """
+    if PARENT in os.environ:
+        end_with_parent()
+        if not _runs(int(os.environ[PARENT])):
+            os._exit(OK)
+
+
+def _runs(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+        if sys.platform.startswith('linux'):
+            return Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0] not in 'ZX'
+    except PermissionError:
+        return True  # of another user
+    except OSError:
+        return False
+    return True

@@ -31,7 +31,7 @@ from types import FrameType
 from typing import Any, TYPE_CHECKING
 
 from antenna_drive.errors import UserError
-from antenna_drive.programs import end_with_parent, OK, PARENT, run_program
+from antenna_drive.programs import end_with_starter, OK, run_program
 
 if TYPE_CHECKING:
     from antenna_drive.emulator.unit import Unit
@@ -164,9 +164,7 @@ def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None,
          fed_by_topic: Sequence[str], description: str, wiring: str,
          read_sheet: ReadSheet | None = None) -> int:
     ending = _Ending()
-    if PARENT in os.environ:
-        end_with_parent()
-        _end_without(int(os.environ[PARENT]))
+    end_with_starter()
 
     def act(arguments: list[str]) -> int:
         _run_node(default_name, make, arguments, fed_by_topic, wiring, ending, read_sheet)
@@ -203,14 +201,6 @@ class _Ending:
     def by(self, stop: Callable[[], None]) -> None:
         """From now on end by calling `stop`."""
         self._stop = stop
-
-
-def _end_without(parent: int) -> None:
-    """End at once if the parent has ended before the kernel was told to watch it."""
-    try:
-        os.kill(parent, 0)
-    except ProcessLookupError:
-        os._exit(OK)
 
 
 @contextmanager

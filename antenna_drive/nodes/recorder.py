@@ -34,10 +34,9 @@ power fails, what was written since the last sync may be lost.
 from __future__ import annotations
 
 from collections.abc import Sequence
-import os
 import sys
 
-from antenna_drive.programs import end_with_parent, PARENT, run_program
+from antenna_drive.programs import end_with_starter, run_program
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -46,8 +45,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: list[str]) -> int:
-    if PARENT in os.environ:
-        end_with_parent()
+    end_with_starter()
     # without ROS 2 this import is what says so
     from antenna_drive.nodes.recorder_node import run
     return run(arguments)

@@ -65,6 +65,20 @@ def test_a_command_ends_with_a_parent_that_is_killed(tmp_path: Path) -> None:
         time.sleep(0.02)
 
 
+@pytest.mark.skipif(not sys.platform.startswith('linux'), reason='the kernel of Linux tells')
+@pytest.mark.parametrize('module', [
+    'antenna_drive', 'antenna_drive.nodes.rate_loop_plant', 'antenna_drive.nodes.recorder'])
+def test_a_process_ends_at_once_if_its_starter_is_dead_and_not_yet_buried(module: str) -> None:
+    with subprocess.Popen([sys.executable, '-c', '']) as starter:
+        while _runs(starter.pid):
+            time.sleep(0.02)
+        assert Path('/proc', str(starter.pid)).exists(), 'a zombie: nobody has waited for it'
+        done = subprocess.run(
+            [sys.executable, '-m', module], cwd=ROOT, capture_output=True, text=True,
+            env={**os.environ, 'ANTENNA_DRIVE_PARENT': str(starter.pid)}, timeout=PATIENCE_S)
+    assert (done.returncode, done.stdout, done.stderr) == (0, '', '')
+
+
 def _runs(pid: int) -> bool:
     try:
         os.kill(pid, 0)
