@@ -104,6 +104,11 @@ def _of_rules(found: Mapping[str, Any]) -> list[str]:
             lines.append(f'{rule:15s} {item["cases"]:5d}  {_share(item["top1"], item["ci95"])}    '
                          f'{item["median_set_before"]:g}, {item["median_set"]:g}               '
                          f'{item["violations"]}')
+    promise = found['promise']
+    if promise['cases']:
+        lines.append(f'the true answer was to get {promise["expected"]:.2f} by the proposals of '
+                     f'{promise["cases"]} cases; of what unknown left it got '
+                     f'{promise["obtained"]:.2f}')
     return lines
 
 

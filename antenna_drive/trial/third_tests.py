@@ -38,7 +38,7 @@ from antenna_drive.trial.further_tests import (
 )
 from antenna_drive.trial.results import TrialResults
 from antenna_drive.trial.scorecard import Case, rate
-from antenna_drive.trial.verdict import read_verdict, Verdict, VerdictError
+from antenna_drive.trial.verdict import read_verdict, UNKNOWN, Verdict, VerdictError
 from antenna_drive.workers import workers
 import numpy as np
 import yaml
@@ -196,7 +196,9 @@ def answer_of(path: Path, truth: Truth) -> dict[str, Any]:
     case = Case(truth, verdict)
     return {'right': case.named_among(1, exactly=True), 'set': set_of(verdict),
             'first': sorted(verdict.which[0].effects),
-            'probability': verdict.which[0].probability}
+            'probability': verdict.which[0].probability,
+            'true_probability': case.probability_of_truth,
+            'unknown': verdict.probability_of(UNKNOWN)}
 
 
 def summary(results: TrialResults) -> dict[str, Any]:
@@ -205,7 +207,8 @@ def summary(results: TrialResults) -> dict[str, Any]:
 
     For each rule: `cases`, exact `top1` with `ci95`, the `median_set` before and after, and
     `violations`, tests that exceeded a limit on the independent antenna. `best_built_in` takes in
-    each case the best of the standard kinds, in hindsight.
+    each case the best of the standard kinds, in hindsight. `promise` compares what a proposal
+    expected for the true answer with the share that it got of what 'unknown' left.
     """
     tests: dict[str, dict[str, Any]] = {
         name: results[name]['tests'] for name in results if 'tests' in results[name]}
@@ -232,7 +235,16 @@ def summary(results: TrialResults) -> dict[str, Any]:
             'violations': sum(any(item['reached'][key] > limit for key, limit in item.get(
                 'limits', {}).items() if key in item['reached'])
                 for _, item in judged if 'reached' in item)}
+    kept = [(item['expected'], item['true_probability'] / (1.0 - item['unknown']))
+            for _, item in rows['proposed']
+            if item.get('expected') is not None and item.get('unknown', 1.0) < 1.0]
+    found['promise'] = {'cases': len(kept), 'expected': _mean([e for e, _ in kept]),
+                        'obtained': _mean([o for _, o in kept])}
     return found
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(np.mean(values)) if values else math.nan
 
 
 def _median(values: Sequence[float]) -> float:

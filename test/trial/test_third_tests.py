@@ -22,7 +22,7 @@ from typing import Any
 
 from antenna_drive.trial import batch, further_tests, third_tests
 from antenna_drive.trial.results import FILE, TrialResults
-from antenna_drive.trial.third_tests import is_open, run_trial, set_of
+from antenna_drive.trial.third_tests import is_open, run_trial, set_of, summary
 from antenna_drive.trial.verdict import parse_verdict, Verdict
 import pytest
 import yaml
@@ -116,3 +116,17 @@ def test_open_cases_get_third_tests_on_the_independent_antenna_and_a_trial_goes_
     assert len(commands.words) == asked
     run_trial(tmp_path / 'two', again, 2, 1, 60.0, rules=[*rules, 'triangle'])
     assert len(commands.words) == asked + 2  # the verdict on two recordings, and that on three
+
+
+def test_a_promise_is_compared_with_what_unknown_has_left(tmp_path: Path) -> None:
+    manifest = batch.prepare(tmp_path, **SETTINGS, wild=True)  # type: ignore[arg-type]
+    results = TrialResults(tmp_path, manifest)
+    told = {'right': True, 'set': 2, 'probability': 0.66, 'first': ['axis.inertia']}
+    for name, more in (
+            ('case_0001', {'expected': 1.0, 'true_probability': 0.66, 'unknown': 0.34}),
+            ('case_0002', {'expected': 0.8, 'true_probability': 0.0, 'unknown': 0.05}),
+            ('case_0003', {'expected': None, 'true_probability': 0.9, 'unknown': 0.05})):
+        results.put(name, open=True, set_before=2, tests={'proposed': {**told, **more}})
+    promise = summary(results)['promise']
+    assert promise == {'cases': 2, 'expected': pytest.approx(0.9),
+                       'obtained': pytest.approx(0.5)}
