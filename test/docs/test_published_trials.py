@@ -15,9 +15,11 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 import re
 
+from antenna_drive.cli.twin_trial import of_verdicts
 from antenna_drive.trial.scorecard import score
 from antenna_drive.trial.scored_cases import read_scored
 import pytest
@@ -75,3 +77,19 @@ def test_figures_of_a_tame_trial_are_those_of_its_cases(key: str) -> None:
     assert stated is not None
     assert float(stated.group()) == pytest.approx(
         figures[key], abs=0.5001 if key == 'seconds_median' else 0.005001)
+
+
+def test_figures_of_growing_verdicts_are_those_of_their_cases() -> None:
+    file = DOCS / 'trials' / 'growing_verdict_2.jsonl'
+    *_, stopped, whole, same = of_verdicts(
+        [json.loads(line) for line in file.read_text(encoding='utf-8').splitlines()])
+    text = (DOCS / 'twin.md').read_text(encoding='utf-8')
+    rows = {cells[0]: cells[1:] for line in text.splitlines() if len(cells := [
+        cell.strip() for cell in line.strip('|').split('|')]) == 4}
+    for column, line in enumerate((stopped, whole)):
+        assert f'right {rows["right answers"][column].partition(" (")[0]};' in line
+        assert line.endswith(f'ece {rows["calibration error"][column]}')
+    assert same.startswith(rows['right answers'][2].removeprefix('the ').replace(
+        ':', ' as after 90 s:'))
+    seconds = rows['seconds of testing, median'][0].partition(' (')[0]
+    assert same.endswith(f'median {seconds} s of testing')
