@@ -89,11 +89,12 @@ def end_with_starter() -> None:
     """
     if PARENT in os.environ:
         end_with_parent()
-        if not _runs(int(os.environ[PARENT])):
+        if not runs(int(os.environ[PARENT])):
             os._exit(OK)
 
 
-def _runs(pid: int) -> bool:
+def runs(pid: int) -> bool:
+    """Return whether a process is there and no zombie that nobody has waited for."""
     try:
         os.kill(pid, 0)
         if sys.platform.startswith('linux'):

@@ -21,6 +21,8 @@ from pathlib import Path
 import signal
 import time
 
+from antenna_drive.programs import runs
+
 # Set by the campaign for a trial; whatever the trial starts inherits it.
 TOKEN = 'ANTENNA_DRIVE_CAMPAIGN'
 
@@ -37,15 +39,11 @@ def alive(marks: Mapping[str, str]) -> list[int]:
         if folder.name.isdigit() and int(folder.name) != os.getpid():
             try:
                 environment = set((folder / 'environ').read_bytes().split(b'\0'))
-                if wanted <= environment and _runs(folder):
+                if wanted <= environment and runs(int(folder.name)):
                     found.append(int(folder.name))
             except OSError:
                 continue
     return found
-
-
-def _runs(folder: Path) -> bool:
-    return (folder / 'stat').read_text().rpartition(')')[2].split()[0] not in 'ZX'
 
 
 def wait_for_none(token: str, patience_s: float) -> list[int]:
