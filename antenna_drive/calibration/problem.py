@@ -38,6 +38,7 @@ from antenna_drive.article.experiments import DriveExperiment
 from antenna_drive.article.measures import (
     article_experiments, article_measures, Measure, OLD_CIRCUIT, Readout, Results,
 )
+from antenna_drive.errors import one_line
 from antenna_drive.parameters import Drive, load, ParameterError
 from antenna_drive.parameters.loading import find, MOTOR_SECTIONS, PLACES, SECTIONS
 from antenna_drive.parameters.plain_yaml import read_yaml
@@ -311,7 +312,7 @@ def _number(key: str, value: Any, low: float = -math.inf, high: float = math.inf
 
 
 def _free(name: str, body: Any) -> Free:
-    key = f'free.{name}'
+    key = f'free.{one_line(name)}'
     table = mapping_of(key, body, ('low', 'high', 'scale'))
     item = _LIST_ITEM.fullmatch(name)
     section, _, entry_name = (item['key'] if item else name).partition('.')
@@ -334,7 +335,7 @@ def _free(name: str, body: Any) -> Free:
 
 
 def _target(name: str, body: Any) -> Target:
-    key = f'targets.{name}'
+    key = f'targets.{one_line(name)}'
     table = mapping_of(key, body, (*KINDS, 'tolerance', 'weight'))
     kinds = [kind for kind in KINDS if kind in table]
     if len(kinds) != 1:

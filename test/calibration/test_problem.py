@@ -131,6 +131,15 @@ def test_mistakes_are_told_in_one_line(tmp_path: Path, old: str, new: str, says:
     assert '\n' not in str(raised.value)
 
 
+@pytest.mark.parametrize('section', ['free', 'targets'])
+def test_a_name_without_end_is_not_printed_whole(tmp_path: Path, section: str) -> None:
+    text = TARGETS.replace(f'{section}:\n', f'{section}:\n  ? {"x" * 100_000}\n  : {{a: 1}}\n')
+    assert text != TARGETS
+    with pytest.raises(ParameterError) as raised:
+        read_problem(written(tmp_path, text))
+    assert f'{section}.xxx' in str(raised.value) and len(str(raised.value)) < 1000
+
+
 def test_the_shipped_targets_are_valid() -> None:
     problem = read_problem(config_dir() / 'calibration' / 'article.yaml')
     assert isinstance(problem, CalibrationProblem)
