@@ -94,7 +94,7 @@ def end_with_starter() -> None:
 
 
 def runs(pid: int) -> bool:
-    """Return whether a process is there and no zombie that nobody has waited for."""
+    """Return whether a process is there and is no zombie."""
     try:
         os.kill(pid, 0)
         if sys.platform.startswith('linux'):

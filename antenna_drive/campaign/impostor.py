@@ -37,7 +37,7 @@ from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL, UNITS
 from antenna_drive.lockstep.frame import FrameLayout
 from antenna_drive.lockstep.readings import CHANGES_QOS
 from antenna_drive.lockstep.ros_link import FRAME_QOS, FrameLink
-from antenna_drive.programs import end_with_parent
+from antenna_drive.programs import end_with_starter
 import rclpy
 from rclpy.node import Node
 from std_msgs.msg import Float64, Float64MultiArray, String
@@ -179,7 +179,7 @@ def echo(node: Node) -> None:
 
 def main(arguments: list[str]) -> int:
     """Speak until done, or until SIGTERM."""
-    end_with_parent()
+    end_with_starter()
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(0))
     cut = arguments.index('--ros-args')
     rclpy.init(args=['impostor', *arguments[cut:]])

@@ -100,7 +100,7 @@ def _field(path: Path, rng: random.Random) -> Callable[[int], FloatArray]:
 def _lost_steps(log: str) -> int:
     """Return how many steps the recorders of a log have said to lack."""
     # the first bag of a recorder has no number at its end; each says its total so far
-    return sum(int(([0, *re.findall(r'(\d+) steps lost', said)])[-1])
+    return sum(int([0, *re.findall(r'(\d+) steps lost', said)][-1])
                for said in re.split(r'/start_\d+\n', log))
 
 

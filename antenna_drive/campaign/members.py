@@ -31,12 +31,12 @@ import sys
 import time
 from types import FrameType
 
-from antenna_drive.programs import end_with_parent
+from antenna_drive.programs import end_with_starter
 
 
 def main(arguments: list[str]) -> int:
     """Be a member until SIGINT or SIGTERM."""
-    end_with_parent()
+    end_with_starter()
     kind, *own = arguments[:arguments.index('--ros-args')]
     ros = arguments[arguments.index('--ros-args'):]
     if kind == 'recorder':

@@ -180,8 +180,8 @@ def of_healthy(results: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def of_verdicts(results: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return what a trial of growing verdicts shows, in lines."""
-    def at(item: Mapping[str, Any], seconds: float | None) -> Case:
-        look = next(look for look in item['looks'] if look['seconds'] == (seconds or LOOKS_S[-1]))
+    def at(item: Mapping[str, Any], seconds: float) -> Case:
+        look = next(look for look in item['looks'] if look['seconds'] == seconds)
         return Case(dict(item), parse_verdict(look['verdict']))
 
     def said(case: Case) -> str:
@@ -190,13 +190,15 @@ def of_verdicts(results: Sequence[Mapping[str, Any]]) -> list[str]:
         return (f'{" + ".join(sorted(first.effects))} {first.probability:.2f}, '
                 + ('right' if case.right else 'not right'))
 
-    stopped = [at(item, item['stopped_s']) for item in results]
-    whole = [at(item, None) for item in results]
+    end = LOOKS_S[-1]
+    seconds = [item['stopped_s'] or end for item in results]
+    stopped = [at(item, tested) for item, tested in zip(results, seconds, strict=True)]
+    whole = [at(item, end) for item in results]
     lines = [f'{case.label:40s} ' + (f'stopped at {item["stopped_s"]:g} s: '
                                      if item['stopped_s'] else 'not stopped: ')
-             + f'{said(case)}; after {LOOKS_S[-1]:g} s: {said(last)}'
+             + f'{said(case)}; after {end:g} s: {said(last)}'
              for item, case, last in zip(results, stopped, whole, strict=True)]
-    for name, group in (('stopped', stopped), (f'after {LOOKS_S[-1]:g} s', whole)):
+    for name, group in (('stopped', stopped), (f'after {end:g} s', whole)):
         figures = score(group)
         lines.append(f'{name}: right {sum(case.right for case in group)} of {len(group)}; '
                      + '; '.join(f'{key} {figures[key]:.3f}' for key in (
@@ -204,6 +206,5 @@ def of_verdicts(results: Sequence[Mapping[str, Any]]) -> list[str]:
     same = [case.verdict and last.verdict and case.verdict.means(
         case.verdict.which[0].effects, last.verdict.which[0].effects)
         for case, last in zip(stopped, whole, strict=True)]
-    seconds = [item['stopped_s'] or LOOKS_S[-1] for item in results]
-    return [*lines, f'same answer as after {LOOKS_S[-1]:g} s: {sum(map(bool, same))} of '
+    return [*lines, f'same answer as after {end:g} s: {sum(map(bool, same))} of '
             f'{len(same)}; median {median(seconds):g} s of testing']

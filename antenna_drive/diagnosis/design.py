@@ -351,9 +351,10 @@ class TestDesign:
 
     def _separated(self, test: Judged) -> Judged:
         """Judge a test with all tolerances free, to first order, and what else it shows."""
-        told = separation(self._space.machine(test.test), self._rivals, self._inflated,
-                          self._settings)
-        return replace(self._detected(test), told=told)
+        machine = self._space.machine(test.test)
+        told = separation(machine, self._rivals, self._inflated, self._settings)
+        # no size is told, only their mean is compared
+        return replace(test, told=told, sizes=self._sizes(machine.low_fidelity()))
 
     def _confirmed(self, test: Judged) -> Judged:
         """Fit each rival to the readings of the others."""
@@ -376,17 +377,19 @@ class TestDesign:
             for j in wanted})
 
     def _detected(self, test: Judged) -> Judged:
-        """Find the smallest size of each effect that shows in a test."""
-        machine = self._space.machine(test.test).low_fidelity()
+        """Judge a test by what it shows."""
+        return replace(test, sizes=self._sizes(self._space.machine(test.test)))
+
+    def _sizes(self, machine: Machine) -> dict[str, tuple[float, str]]:
+        """Return the smallest size of each effect that shows in a test, and its unit."""
         machine = machine.with_experiments([
             replace(e, measured=machine.predict({}, k))
             for k, e in enumerate(machine.experiments)])
         machine.effects = {name: effect for name, effect in machine.effects.items()
                            if not self._suspected or name in self._suspected}
         found = confusability(machine, settings=self._settings)
-        return replace(test, sizes={
-            name: (float(size), unit) for name, size, unit in zip(
-                found.effects, found.detectable, found.units, strict=True)})
+        return {name: (float(size), unit) for name, size, unit in zip(
+            found.effects, found.detectable, found.units, strict=True)}
 
     def _compared(self, tests: Iterable[Judged]) -> list[Judged]:
         """Return judged tests by their scores, the best first, confirmed ones before others."""

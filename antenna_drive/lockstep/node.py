@@ -342,7 +342,7 @@ class DriveNode:
             self._report.ended()
             serving.close()
             self._exchange = None
-            self._link.delivered(_DELIVERY_S)
+            self._link.await_delivery(_DELIVERY_S)
             if self._channel is not None:
                 self._channel.close()
 

@@ -22,6 +22,7 @@ nobody but the lock-step thread ever touches them.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 from antenna_drive.limits import FRAME
@@ -147,19 +148,16 @@ class FrameLink:
         return [peer for index, peer in enumerate(peers)
                 if wait_set.is_ready('subscription', index)]
 
-    def delivered(self, patience_s: float) -> bool:
+    def await_delivery(self, patience_s: float) -> None:
         """
-        Wait until everybody who listens has received what was published.
+        Wait until all who listen have received what was published, for `patience_s` [s] at most.
 
-        Whoever leaves has to wait: Fast DDS forgets a writer that says goodbye, with what of it is
-        still on its way.
-
-        Returns
-        -------
-        False if somebody has not after `patience_s` [s]
-
+        A node that leaves has to wait: Fast DDS forgets a writer that says goodbye, and what it
+        has sent and nobody has taken yet is lost.
         """
-        return bool(self._publisher.wait_for_all_acked(Duration(seconds=patience_s)))
+        # RuntimeError: this middleware has no acknowledgements
+        with suppress(RuntimeError):
+            self._publisher.wait_for_all_acked(Duration(seconds=patience_s))
 
     def wake(self) -> None:
         """End a wait, from any thread."""

@@ -198,7 +198,7 @@ def answer_of(path: Path, truth: Truth) -> dict[str, Any]:
             'first': sorted(verdict.which[0].effects),
             'probability': verdict.which[0].probability,
             'true_probability': case.probability_of_truth,
-            'unknown': verdict.probability_of(UNKNOWN)}
+            'unknown': verdict.probability_of(UNKNOWN), 'kind': case.kind}
 
 
 def summary(results: TrialResults) -> dict[str, Any]:
@@ -235,7 +235,9 @@ def summary(results: TrialResults) -> dict[str, Any]:
             'violations': sum(any(item['reached'][key] > limit for key, limit in item.get(
                 'limits', {}).items() if key in item['reached'])
                 for _, item in judged if 'reached' in item)}
-    kept = [(item['expected'], item['true_probability'] / (1.0 - item['unknown']))
+    # no answer stands for a cause from outside the catalogue
+    kept = [(item['expected'], 0.0 if item['kind'] == 'outside' else
+             item['true_probability'] / (1.0 - item['unknown']))
             for _, item in rows['proposed']
             if item.get('expected') is not None and item.get('unknown', 1.0) < 1.0]
     found['promise'] = {'cases': len(kept), 'expected': _mean([e for e, _ in kept]),

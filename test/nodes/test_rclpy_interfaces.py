@@ -82,6 +82,39 @@ def test_method_is_there(method: str) -> None:
 
 
 @ros_installed
+def test_acknowledgements_can_be_waited_for() -> None:
+    from rclpy.publisher import Publisher
+    assert '`Publisher.wait_for_all_acked`' in PAGE
+    assert 'timeout' in inspect.signature(Publisher.wait_for_all_acked).parameters
+
+
+@ros_installed
+@pytest.mark.usefixtures('fresh_domain')
+def test_a_node_ends_where_the_middleware_has_no_acknowledgements(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    from antenna_drive.lockstep.ros_link import FrameLink
+    from rclpy.context import Context
+    from rclpy.node import Node
+    from rclpy.publisher import Publisher
+    asked = []
+
+    def unsupported(publisher: object, timeout: object) -> bool:
+        asked.append(timeout)
+        raise RuntimeError('unsupported')
+
+    monkeypatch.setattr(Publisher, 'wait_for_all_acked', unsupported)
+    context = Context()
+    context.init(args=[])
+    node = Node('leaver', context=context)
+    try:
+        FrameLink(node, {}).await_delivery(1.0)
+    finally:
+        node.destroy_node()
+        context.try_shutdown()
+    assert len(asked) == 1
+
+
+@ros_installed
 def test_what_is_not_public_is_there() -> None:
     from rclpy.impl.implementation_singleton import rclpy_implementation
     assert {'add_guard_condition', 'add_subscription', 'clear_entities', 'is_ready', 'wait'} <= {

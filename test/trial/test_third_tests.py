@@ -126,7 +126,17 @@ def test_a_promise_is_compared_with_what_unknown_has_left(tmp_path: Path) -> Non
             ('case_0001', {'expected': 1.0, 'true_probability': 0.66, 'unknown': 0.34}),
             ('case_0002', {'expected': 0.8, 'true_probability': 0.0, 'unknown': 0.05}),
             ('case_0003', {'expected': None, 'true_probability': 0.9, 'unknown': 0.05})):
-        results.put(name, open=True, set_before=2, tests={'proposed': {**told, **more}})
+        results.put(name, open=True, set_before=2, tests={
+            'proposed': {'kind': 'single', **told, **more}})
     promise = summary(results)['promise']
     assert promise == {'cases': 2, 'expected': pytest.approx(0.9),
                        'obtained': pytest.approx(0.5)}
+
+
+def test_no_answer_keeps_its_promise_for_a_cause_from_outside(tmp_path: Path) -> None:
+    manifest = batch.prepare(tmp_path, **SETTINGS, wild=True)  # type: ignore[arg-type]
+    results = TrialResults(tmp_path, manifest)
+    results.put('case_0001', open=True, set_before=2, tests={'proposed': {
+        'right': True, 'set': 2, 'probability': 0.7, 'first': ['unknown'], 'expected': 0.9,
+        'true_probability': 0.7, 'unknown': 0.7, 'kind': 'outside'}})
+    assert summary(results)['promise'] == {'cases': 1, 'expected': 0.9, 'obtained': 0.0}
