@@ -192,6 +192,7 @@ def _loopback() -> Finding:
     from rclpy.node import Node
     from std_msgs.msg import Float64
     from antenna_drive.lockstep.entry import choose_transport
+    from antenna_drive.lockstep.leaving import leave
     choose_transport(os.environ)
     context = Context()
     context.init(args=[])
@@ -208,7 +209,7 @@ def _loopback() -> Finding:
             publisher.publish(Float64(data=1.0))
             executor.spin_once(timeout_sec=0.1)
         executor.shutdown()
-        node.destroy_node()
+        leave(node)
     finally:
         context.try_shutdown()
     if got:

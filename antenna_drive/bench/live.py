@@ -165,10 +165,10 @@ class _Steps:
         from rclpy.context import Context
         from rclpy.executors import SingleThreadedExecutor
         from rclpy.node import Node
-        self._context = Context()
-        self._context.init(args=[])
-        self._node = Node('bench_live', context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
+        context = Context()
+        context.init(args=[])
+        self._node = Node('bench_live', context=context)
+        self._executor = SingleThreadedExecutor(context=context)
         self._executor.add_node(self._node)
         self._said: list[tuple[float, int]] = []
         self._node.create_subscription(DiagnosticArray, '/diagnostics', self._hear, 50)
@@ -195,9 +195,9 @@ class _Steps:
         return self
 
     def __exit__(self, *error: object) -> None:
+        from antenna_drive.lockstep.leaving import leave
         self._executor.shutdown()
-        self._node.destroy_node()
-        self._context.try_shutdown()
+        leave(self._node)
 
 
 def _resident_MB(number: int) -> float:

@@ -36,6 +36,7 @@ from antenna_drive.campaign.trials import Outcome
 from antenna_drive.emulator.run import simulate
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.emulator.wiring import TEST_SIGNAL, UNITS
+from antenna_drive.lockstep.leaving import leave
 from antenna_drive.lockstep.observer import Observer
 from antenna_drive.lockstep.processes import DriveProcesses
 from antenna_drive.lockstep.serving import Serving
@@ -88,9 +89,9 @@ class Diagnostics:
         """Begin to listen."""
         self.said: deque[Said] = deque(maxlen=keep)
         self.count = 0
-        self._context = Context()
-        self._context.init(args=[])
-        self.node = Node('campaign', context=self._context)
+        context = Context()
+        context.init(args=[])
+        self.node = Node('campaign', context=context)
         self.node.create_subscription(DiagnosticArray, '/diagnostics', self._take, 1000)
         self._serving = Serving(self.node)
 
@@ -114,8 +115,7 @@ class Diagnostics:
     def close(self) -> None:
         """Listen no more."""
         self._serving.close()
-        self.node.destroy_node()
-        self._context.try_shutdown()
+        leave(self.node)
 
 
 class Watcher:

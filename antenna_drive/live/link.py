@@ -37,6 +37,7 @@ from antenna_drive.live.parameter_table import Description, table
 from antenna_drive.lockstep.changes import CHANGES, read_record, SETTINGS
 from antenna_drive.lockstep.entry import choose_transport
 from antenna_drive.lockstep.frame import FrameLayout
+from antenna_drive.lockstep.leaving import leave
 from antenna_drive.lockstep.readings import CHANGES_QOS
 from antenna_drive.lockstep.ros_link import FrameLink
 from antenna_drive.lockstep.run_services import StateReader
@@ -79,9 +80,9 @@ class DriveLink:
         choose_transport(os.environ)
         self._board = board
         self.namespace = '/' + namespace.strip('/') if namespace.strip('/') else ''
-        self._context = Context()
-        self._context.init(args=[], domain_id=domain_id)
-        self._node = Node(f'live_{os.getpid()}', namespace=self.namespace, context=self._context)
+        context = Context()
+        context.init(args=[], domain_id=domain_id)
+        self._node = Node(f'live_{os.getpid()}', namespace=self.namespace, context=context)
         self.history = History({unit: len(signals) for unit, signals in OUTPUTS.items()},
                                TEST_SIGNAL)
         self._frames = FrameLink(self._node, {
@@ -112,8 +113,7 @@ class DriveLink:
         self._stop.set()
         self._thread.join()
         self._serving.close()
-        self._node.destroy_node()
-        self._context.try_shutdown()
+        leave(self._node)
 
     # ---- what comes in
 

@@ -230,6 +230,7 @@ def ros_node(name: str, arguments: Sequence[str], example: str,
     import rclpy
     from rclpy.exceptions import InvalidParameterTypeException
     from rclpy.node import Node
+    from antenna_drive.lockstep.leaving import leave
     choose_transport(os.environ)
     _init_ros(name, arguments, example)
     try:
@@ -241,7 +242,7 @@ def ros_node(name: str, arguments: Sequence[str], example: str,
         try:
             yield node
         finally:
-            node.destroy_node()
+            leave(node)
     finally:
         rclpy.try_shutdown()
 

@@ -35,6 +35,7 @@ from antenna_drive.lockstep.changes import read_record
 from antenna_drive.lockstep.entry import choose_transport
 from antenna_drive.lockstep.frame import NO_RUN
 from antenna_drive.lockstep.inbox import Frame
+from antenna_drive.lockstep.leaving import leave
 from antenna_drive.lockstep.member import Guest, Member
 from antenna_drive.lockstep.readings import CHANGES_QOS
 from antenna_drive.lockstep.ros_link import FRAME_QOS, FrameLink
@@ -119,9 +120,9 @@ class Observer:
         self.names = tuple(
             f'{unit}/{signal.name}' for unit, signals in outputs.items() for signal in signals)
         self._on_begin = on_begin
-        self._context = Context()
-        self._context.init(args=[], domain_id=domain_id)
-        self._node = Node(name, namespace=namespace, context=self._context)
+        context = Context()
+        context.init(args=[], domain_id=domain_id)
+        self._node = Node(name, namespace=namespace, context=context)
         birth = float(time.time_ns() // 1000)
         reader = _Reader(name, self.names, on_step)
         self._member = Guest(reader, outputs) if guest else Member(reader, birth, outputs)
@@ -252,8 +253,7 @@ class Observer:
         """Leave the drive."""
         if self._serving is not None:
             self._serving.close()
-        self._node.destroy_node()
-        self._context.try_shutdown()
+        leave(self._node)
 
     def __enter__(self) -> Observer:
         """Return the observer."""

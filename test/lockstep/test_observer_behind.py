@@ -24,6 +24,7 @@ import pytest
 pytest.importorskip('rclpy', reason='there is no ROS 2 here')
 
 from antenna_drive.lockstep.frame import FrameLayout  # noqa: E402, I100
+from antenna_drive.lockstep.leaving import leave  # noqa: E402
 from antenna_drive.lockstep.observer import Observer  # noqa: E402
 from antenna_drive.lockstep.ros_link import FRAME_QOS  # noqa: E402
 from rclpy.context import Context  # noqa: E402
@@ -38,9 +39,9 @@ class Speaker:
     """Publishes frames in the name of every unit of a drive."""
 
     def __init__(self) -> None:
-        self._context = Context()
-        self._context.init(args=[])
-        self._node = Node('speaker', context=self._context)
+        context = Context()
+        context.init(args=[])
+        self._node = Node('speaker', context=context)
         self._publishers = {unit: self._node.create_publisher(
             Float64MultiArray, f'{unit}/frame', FRAME_QOS) for unit in OUTPUTS}
         self.run = float(time.time_ns() // 1000) + 1e6  # younger than the observer
@@ -52,8 +53,7 @@ class Speaker:
                 layout.encode(run, step, 1e-3, bytes(layout.packed_size)))
 
     def close(self) -> None:
-        self._node.destroy_node()
-        self._context.try_shutdown()
+        leave(self._node)
 
 
 @pytest.fixture

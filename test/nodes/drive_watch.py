@@ -23,6 +23,7 @@ from typing import Any
 
 from antenna_drive.emulator.unit import FloatArray, Signal
 from antenna_drive.emulator.wiring import OUTPUTS
+from antenna_drive.lockstep.leaving import leave
 from antenna_drive.lockstep.observer import Observer
 from antenna_drive.lockstep.ros_link import FRAME_QOS
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -64,8 +65,7 @@ class Watch:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  traceback: TracebackType | None) -> None:
         self.executor.shutdown()
-        self.node.destroy_node()
-        self.context.try_shutdown()
+        leave(self.node)
 
     def until(self, true: Callable[[], bool], what: str) -> None:
         """Serve this node until something is true."""

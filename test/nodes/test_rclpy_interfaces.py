@@ -92,6 +92,7 @@ def test_acknowledgements_can_be_waited_for() -> None:
 @pytest.mark.usefixtures('fresh_domain')
 def test_a_node_ends_where_the_middleware_has_no_acknowledgements(
         monkeypatch: pytest.MonkeyPatch) -> None:
+    from antenna_drive.lockstep.leaving import leave
     from antenna_drive.lockstep.ros_link import FrameLink
     from rclpy.context import Context
     from rclpy.node import Node
@@ -109,8 +110,7 @@ def test_a_node_ends_where_the_middleware_has_no_acknowledgements(
     try:
         FrameLink(node, {}).await_delivery(1.0)
     finally:
-        node.destroy_node()
-        context.try_shutdown()
+        leave(node)
     assert len(asked) == 1
 
 

@@ -29,6 +29,7 @@ import pytest
 pytest.importorskip('rclpy', reason='there is no ROS 2 here')
 
 from antenna_drive.lockstep.entry import choose_transport  # noqa: E402, I100
+from antenna_drive.lockstep.leaving import leave  # noqa: E402
 from antenna_drive.programs import BAD_INPUT  # noqa: E402
 from antenna_drive.recording.csv_format import write_csv  # noqa: E402
 from antenna_drive.trial import onset  # noqa: E402
@@ -131,8 +132,7 @@ class Listener:
 
     def close(self) -> None:
         self._executor.shutdown()
-        self.node.destroy_node()
-        self.context.shutdown()
+        leave(self.node)
 
 
 @pytest.fixture

@@ -1,0 +1,134 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Nodes leave the graph when nobody comes or goes, and never hang when they leave together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import multiprocessing
+from multiprocessing.synchronize import Barrier
+import random
+import time
+
+import pytest
+
+pytest.importorskip('rclpy', reason='there is no ROS 2 here')
+
+from antenna_drive.lockstep.leaving import leave  # noqa: E402, I100
+from rclpy.context import Context  # noqa: E402
+from rclpy.node import Node  # noqa: E402
+from std_msgs.msg import Float64MultiArray  # noqa: E402
+
+LEAVERS = 5
+TURNS = 300
+# Each of five that leave together takes 0.2 s; a hang has no end.
+HANGS_S = 20.0
+
+
+def node_of(name: str) -> Node:
+    context = Context()
+    context.init(args=[])
+    return Node(name, context=context)
+
+
+@pytest.fixture
+def other(fresh_domain: int) -> Iterator[Node]:
+    found = node_of('other')
+    yield found
+    leave(found)
+
+
+def test_others_see_that_a_node_has_left(other: Node) -> None:
+    node = node_of('leaver')
+    node.create_publisher(Float64MultiArray, 'said', 1)
+    end = time.monotonic() + 30.0
+    while other.count_publishers('said') == 0:
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    leave(node)
+    assert not node.context.ok()
+    while 'leaver' in other.get_node_names() or other.count_publishers('said'):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def test_a_node_waits_while_others_come_and_go(
+        other: Node, monkeypatch: pytest.MonkeyPatch) -> None:
+    node = node_of('leaver')
+    done: list[str] = []
+
+    def sleep(seconds: float) -> None:
+        """Let somebody come three times."""
+        if len(done) < 3:
+            name = f'topic_{len(done)}'
+            other.create_publisher(Float64MultiArray, name, 1)
+            while node.count_publishers(name) == 0:
+                pass
+            done.append('came')
+        else:
+            done.append('quiet')
+
+    destroy = node.destroy_node
+
+    def destroyed() -> None:
+        done.append('left')
+        destroy()
+
+    monkeypatch.setattr('antenna_drive.lockstep.leaving.time.sleep', sleep)
+    monkeypatch.setattr(node, 'destroy_node', destroyed)
+    leave(node)
+    assert done == ['came', 'came', 'came', 'quiet', 'left']
+
+
+def test_a_node_leaves_though_others_never_rest(
+        fresh_domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    node = node_of('leaver')
+    restless = iter(range(1_000_000))
+    monkeypatch.setattr(node, 'count_publishers', lambda topic: next(restless))
+    leave(node)
+    assert not node.context.ok()
+
+
+def come_and_leave(name: str, together: Barrier, turns: int) -> None:
+    """Come and leave, again and again, with the others who have the same barrier."""
+    for _ in range(turns):
+        node = node_of(name)
+        for k in range(12):
+            node.create_publisher(Float64MultiArray, f'{name}/{k}', 10)
+        for k in range(LEAVERS):
+            node.create_subscription(Float64MultiArray, f'leaver_{k}/0', print, 10)
+        together.wait(HANGS_S)
+        time.sleep(0.3)  # until each knows the others
+        together.wait(HANGS_S)
+        time.sleep(random.uniform(0.0, 0.03))
+        leave(node)
+        together.wait(HANGS_S)
+
+
+@pytest.mark.trial
+def test_nodes_that_leave_together_do_not_hang(fresh_domain: int) -> None:
+    # without waiting for quiet, one of about 500 hung
+    spawning = multiprocessing.get_context('spawn')
+    together = spawning.Barrier(LEAVERS)
+    processes = [spawning.Process(target=come_and_leave, args=(f'leaver_{k}', together, TURNS))
+                 for k in range(LEAVERS)]
+    for process in processes:
+        process.start()
+    while all(process.exitcode is None for process in processes):
+        time.sleep(0.5)
+    for process in processes:
+        process.join(HANGS_S)
+        process.kill()
+        process.join()
+    assert [process.exitcode for process in processes] == [0] * LEAVERS
