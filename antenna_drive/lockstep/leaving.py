@@ -24,44 +24,63 @@ good. Callbacks run while somebody else comes or goes, so we leave when nobody d
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+import errno
+import socket
+import sys
 import time
 
 from rclpy.node import Node
 
-# The graph is quiet if it is the same after this time; measured, see docs/decisions.md.
+# The graph is quiet if it is the same after this time.
 _QUIET_S = 0.05
 _PATIENCE_S = 1.0
+_LOOK_S = 0.01
 
 
 def leave(node: Node) -> None:
     """
     Destroy the only node of a context, and the context, when nobody comes or goes.
 
-    The node's publishers, subscriptions, clients and services go first, at once: of those who
-    leave together, each hears of the others' in the time in which none can hang. Then it waits
-    for quiet, a second at most.
+    Processes of one machine take turns, because those that leave together would wait for quiet
+    together, too. Waits for a second at most.
     """
-    for publisher in list(node.publishers):
-        node.destroy_publisher(publisher)
-    for subscription in list(node.subscriptions):
-        node.destroy_subscription(subscription)
-    for client in list(node.clients):
-        node.destroy_client(client)
-    for service in list(node.services):
-        node.destroy_service(service)
-    end = time.monotonic() + _PATIENCE_S
-    before, now = None, _graph(node)
-    while now != before and time.monotonic() < end:
-        time.sleep(_QUIET_S)
-        before, now = now, _graph(node)
+    deadline = time.monotonic() + _PATIENCE_S
     context = node.context
-    node.destroy_node()
-    context.try_shutdown()
+    with _turn(f'antenna_drive/leaving/{context.get_domain_id()}', deadline):
+        before, now = None, _graph(node)
+        while now != before and time.monotonic() < deadline:
+            time.sleep(_QUIET_S)
+            before, now = now, _graph(node)
+        node.destroy_node()
+        context.try_shutdown()
 
 
 def _graph(node: Node) -> object:
+    """Return what the node knows of the graph; None if it knows nothing any more."""
     if not node.context.ok():
         return None
     return (node.get_node_names_and_namespaces(),
             [(topic, node.count_publishers(topic), node.count_subscribers(topic))
              for topic, _ in node.get_topic_names_and_types()])
+
+
+@contextmanager
+def _turn(name: str, deadline: float) -> Iterator[None]:
+    """Be the only process in here, or one of several after the deadline."""
+    if sys.platform != 'linux':
+        yield
+        return
+    # A name in the abstract namespace is nobody's file and vanishes with its process.
+    with socket.socket(socket.AF_UNIX) as taken:
+        while time.monotonic() < deadline:
+            try:
+                taken.bind(f'\0{name}')
+            except OSError as error:
+                if error.errno != errno.EADDRINUSE:
+                    break
+                time.sleep(_LOOK_S)
+            else:
+                break
+        yield

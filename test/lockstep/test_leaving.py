@@ -15,10 +15,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import multiprocessing
 from multiprocessing.synchronize import Barrier
 import random
+import socket
+import sys
 import time
 
 import pytest
@@ -63,6 +65,19 @@ def test_others_see_that_a_node_has_left(other: Node) -> None:
         time.sleep(0.01)
 
 
+def noted(node: Node, done: list[str], sleep: Callable[[float], None],
+          monkeypatch: pytest.MonkeyPatch) -> None:
+    """Call `sleep` in place of waiting, and note when the node leaves."""
+    destroy = node.destroy_node
+
+    def destroyed() -> None:
+        done.append('left')
+        destroy()
+
+    monkeypatch.setattr('antenna_drive.lockstep.leaving.time.sleep', sleep)
+    monkeypatch.setattr(node, 'destroy_node', destroyed)
+
+
 def test_a_node_waits_while_others_come_and_go(
         other: Node, monkeypatch: pytest.MonkeyPatch) -> None:
     node = node_of('leaver')
@@ -79,16 +94,29 @@ def test_a_node_waits_while_others_come_and_go(
         else:
             done.append('quiet')
 
-    destroy = node.destroy_node
-
-    def destroyed() -> None:
-        done.append('left')
-        destroy()
-
-    monkeypatch.setattr('antenna_drive.lockstep.leaving.time.sleep', sleep)
-    monkeypatch.setattr(node, 'destroy_node', destroyed)
+    noted(node, done, sleep, monkeypatch)
     leave(node)
     assert done == ['came', 'came', 'came', 'quiet', 'left']
+
+
+@pytest.mark.skipif(sys.platform != 'linux', reason='turns are names that Linux has')
+def test_a_node_waits_for_its_turn(fresh_domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    node = node_of('leaver')
+    done: list[str] = []
+    taken = socket.socket(socket.AF_UNIX)
+    taken.bind(f'\0antenna_drive/leaving/{fresh_domain}')
+
+    def sleep(seconds: float) -> None:
+        """Let the other have left at the third look."""
+        done.append('quiet' if taken.fileno() < 0 else 'not my turn')
+        if len(done) == 3:
+            taken.close()
+
+    noted(node, done, sleep, monkeypatch)
+    leave(node)
+    assert done == ['not my turn', 'not my turn', 'not my turn', 'quiet', 'left']
+    with socket.socket(socket.AF_UNIX) as following:
+        following.bind(f'\0antenna_drive/leaving/{fresh_domain}')
 
 
 def test_a_node_leaves_though_others_never_rest(
