@@ -46,8 +46,11 @@ def leave(node: Node) -> None:
     Processes of one machine take turns, because those that leave together would wait for quiet
     together, too. Waits for a second at most.
     """
-    deadline = time.monotonic() + _PATIENCE_S
     context = node.context
+    if not context.ok():  # shut down by a signal, say: nothing can be asked of it any more
+        node.destroy_node()
+        return
+    deadline = time.monotonic() + _PATIENCE_S
     with _turn(f'antenna_drive/leaving/{context.get_domain_id()}', deadline):
         before, now = None, _graph(node)
         while now != before and time.monotonic() < deadline:
@@ -58,9 +61,7 @@ def leave(node: Node) -> None:
 
 
 def _graph(node: Node) -> object:
-    """Return what the node knows of the graph; None if it knows nothing any more."""
-    if not node.context.ok():
-        return None
+    """Return what the node knows of the graph."""
     return (node.get_node_names_and_namespaces(),
             [(topic, node.count_publishers(topic), node.count_subscribers(topic))
              for topic, _ in node.get_topic_names_and_types()])

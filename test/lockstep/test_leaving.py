@@ -128,6 +128,13 @@ def test_a_node_leaves_though_others_never_rest(
     assert not node.context.ok()
 
 
+def test_a_node_leaves_a_context_that_was_shut_down(fresh_domain: int) -> None:
+    node = node_of('leaver')
+    node.context.shutdown()
+    leave(node)
+    assert not node.context.ok()
+
+
 def come_and_leave(name: str, together: Barrier, turns: int) -> None:
     """Come and leave, again and again, with the others who have the same barrier."""
     for _ in range(turns):
