@@ -44,8 +44,11 @@ def mark(worker: bool) -> None:
 
 def started() -> set[int]:
     """Return the processes that this process has started, and theirs (on Linux)."""
-    return set(leftovers.alive({
-        name: os.environ[name] for name in (SESSION, WORKER) if name in os.environ}))
+    found = leftovers.alive({
+        name: os.environ[name] for name in (SESSION, WORKER) if name in os.environ})
+    # the helper of multiprocessing ends with the process that has it
+    return {number for number, command in leftovers.commands(sorted(found)).items()
+            if 'multiprocessing.resource_tracker' not in command}
 
 
 def end(processes: set[int]) -> list[str]:

@@ -140,9 +140,9 @@ def come_and_leave(name: str, together: Barrier, turns: int) -> None:
     for _ in range(turns):
         node = node_of(name)
         for k in range(12):
-            node.create_publisher(Float64MultiArray, f'{name}/{k}', 10)
+            node.create_publisher(Float64MultiArray, f'{name}/topic_{k}', 10)
         for k in range(LEAVERS):
-            node.create_subscription(Float64MultiArray, f'leaver_{k}/0', print, 10)
+            node.create_subscription(Float64MultiArray, f'leaver_{k}/topic_0', print, 10)
         together.wait(HANGS_S)
         time.sleep(0.3)  # until each knows the others
         together.wait(HANGS_S)
