@@ -35,6 +35,7 @@ from typing import Any
 
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL, UNITS
 from antenna_drive.lockstep.frame import FrameLayout
+from antenna_drive.lockstep.leaving import leave
 from antenna_drive.lockstep.readings import CHANGES_QOS
 from antenna_drive.lockstep.ros_link import FRAME_QOS, FrameLink
 from antenna_drive.programs import end_with_starter
@@ -184,10 +185,13 @@ def main(arguments: list[str]) -> int:
     cut = arguments.index('--ros-args')
     rclpy.init(args=['impostor', *arguments[cut:]])
     node = Node('impostor')
-    if arguments[0] == 'echo':
-        echo(node)
-    else:
-        garbage(node, int(arguments[1]), int(arguments[2]))
+    try:
+        if arguments[0] == 'echo':
+            echo(node)
+        else:
+            garbage(node, int(arguments[1]), int(arguments[2]))
+    finally:
+        leave(node)
     return 0
 
 

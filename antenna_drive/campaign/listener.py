@@ -27,6 +27,7 @@ import time
 
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.lockstep.frame import FrameLayout
+from antenna_drive.lockstep.leaving import leave
 from antenna_drive.lockstep.ros_link import FrameLink
 import rclpy
 from rclpy.node import Node
@@ -45,6 +46,7 @@ def main(arguments: list[str]) -> int:
             frames += 1
         nodes.update(node.get_node_names())
     print(json.dumps({'nodes': sorted(nodes), 'frames': frames}))
+    leave(node)
     return 0
 
 

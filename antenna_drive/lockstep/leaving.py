@@ -73,15 +73,17 @@ def _turn(name: str, deadline: float) -> Iterator[None]:
     if sys.platform != 'linux':
         yield
         return
-    # A name in the abstract namespace is nobody's file and vanishes with its process.
-    with socket.socket(socket.AF_UNIX) as taken:
-        while time.monotonic() < deadline:
-            try:
-                taken.bind(f'\0{name}')
-            except OSError as error:
-                if error.errno != errno.EADDRINUSE:
-                    break
-                time.sleep(_LOOK_S)
-            else:
-                break
+    # A name in the abstract namespace is no file and vanishes with its process.
+    with socket.socket(socket.AF_UNIX) as place:
+        while _is_taken(place, name) and time.monotonic() < deadline:
+            time.sleep(_LOOK_S)
         yield
+
+
+def _is_taken(place: socket.socket, name: str) -> bool:
+    """Take a name, unless another process has it."""
+    try:
+        place.bind(f'\0{name}')
+    except OSError as error:
+        return error.errno == errno.EADDRINUSE
+    return False

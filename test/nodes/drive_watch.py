@@ -45,10 +45,10 @@ class Watch:
     """A ROS 2 node of the test's own."""
 
     def __init__(self, namespace: str = '', domain_id: int | None = None) -> None:
-        self.context = Context()
-        self.context.init(args=[], domain_id=domain_id)
-        self.node = Node('watch', namespace=namespace, context=self.context)
-        self.executor = SingleThreadedExecutor(context=self.context)
+        context = Context()
+        context.init(args=[], domain_id=domain_id)
+        self.node = Node('watch', namespace=namespace, context=context)
+        self.executor = SingleThreadedExecutor(context=context)
         self.executor.add_node(self.node)
         self.reports: dict[str, DiagnosticStatus] = {}
         self.heard: list[DiagnosticStatus] = []

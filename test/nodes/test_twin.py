@@ -101,16 +101,16 @@ class Listener:
     def __init__(self) -> None:
         import os
         choose_transport(os.environ)
-        self.context = rclpy.Context()
-        rclpy.init(context=self.context)
-        self.node = rclpy.create_node('watcher', context=self.context)
+        context = rclpy.Context()
+        rclpy.init(context=context)
+        self.node = rclpy.create_node('watcher', context=context)
         self.said: list[tuple[str, dict[str, str]]] = []
         self.residuals: list[float] = []
         self.node.create_subscription(DiagnosticArray, '/diagnostics', self._hear, 100)
         self.node.create_subscription(Float64, 'twin/residual/motor_2/ammeter',
                                       lambda message: self.residuals.append(message.data), 1000)
         self.row = self.node.create_publisher(Float64MultiArray, '/real/row', 1000)
-        self._executor = SingleThreadedExecutor(context=self.context)
+        self._executor = SingleThreadedExecutor(context=context)
         self._executor.add_node(self.node)
 
     def _hear(self, message: Any) -> None:
