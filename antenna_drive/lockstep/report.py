@@ -33,6 +33,10 @@ PERIOD_S = 1.0
 PATIENCE_S = 0.9
 CUT_OFF = ('; it cannot hear them: it did not run for a second or more, and Fast DDS gave its '
            'shared memory away. Start this node again')
+# Fast DDS takes a process for gone that it has not heard of for so long (the lease duration).
+LEASE_S = 20.0
+# A wait that begins so soon after a sleep may be its consequence.
+SOON_S = 5.0
 
 
 class Report:
@@ -62,8 +66,12 @@ class Report:
         self._late_before = 0
         self._waiting_since: float | None = None
         self._told = False
+        self._told_why = ''
         self._fault_told = ''
         self._next_s = 0.0
+        self._awake_s: float | None = None
+        self._slept_s = 0.0
+        self._woke_s = 0.0
         self._ended_run = 0.0
         self.last_change = ''
         self.refused_values = 0
@@ -84,6 +92,7 @@ class Report:
 
     def waiting(self, now: float) -> None:
         """Note at `now` [s] that the node cannot go on; say so in the log if it lasts."""
+        self._awake(now)
         if self._waiting_since is None:
             self._waiting_since = now
         if self._paused_at() is not None:
@@ -93,9 +102,12 @@ class Report:
             self._node.get_logger().error(f'{fault}; stopped until a new run begins')
         self._fault_told = fault
         if not self._told and not fault and self._waits_long(now):
-            self._node.get_logger().warning(f'{self._waits_for()}')
-            self._told = True
+            self._warn()
             self._next_s = now  # people who watch /diagnostics hear of it at once too
+
+    def _warn(self) -> None:
+        self._told, self._told_why = True, self._why()
+        self._node.get_logger().warning(self._waits_for())
 
     def ended(self) -> None:
         """Say once for each run how its steps and its partner's answers came."""
@@ -142,15 +154,35 @@ class Report:
         names = ', '.join(member.missing()) or 'nobody'
         where = (f'at step {member.step} of run {member.run:.0f}' if member.run else
                  'to begin a run')
-        return f'waiting for {names} {where}' + (CUT_OFF if is_cut_off() else '')
+        return f'waiting for {names} {where}{self._why()}'
+
+    def _why(self) -> str:
+        """Say why the node may wait in vain, if there is a reason to think so."""
+        if is_cut_off():
+            return CUT_OFF
+        return forgotten(self._slept_s) if self._has_just_slept() else ''
+
+    def _awake(self, now: float) -> None:
+        """Note that the node runs at `now` [s], and whether it did not for long."""
+        if self._awake_s is not None and now - self._awake_s > LEASE_S:
+            self._slept_s, self._woke_s = now - self._awake_s, now
+        self._awake_s = now
+
+    def _has_just_slept(self) -> bool:
+        """Tell whether the node waits since it slept, or since soon after."""
+        return (self._slept_s > 0.0 and self._waiting_since is not None
+                and self._waiting_since < self._woke_s + SOON_S)
 
     def publish_if_due(self, now: float) -> None:
         """Publish the state at `now` [s] if the last report is one period old."""
+        self._awake(now)
         if now < self._next_s:
             return
         self._next_s = now + PERIOD_S
         if self._waiting_since is not None:
             self.waiting(now)  # the log never says less than the report
+            if self._told and self._why() != self._told_why:
+                self._warn()
         level, message = self._judge(now)
         self._topic.publish(diagnostics(self._node, level, message, self._values(now)))
 
@@ -209,6 +241,12 @@ class Report:
             values += self.partner.values()
         values.append(('last change', self.last_change))
         return values
+
+
+def forgotten(slept_s: float) -> str:
+    """Say what to do if a node waits on after it did not run for `slept_s` [s]."""
+    return (f'; this node did not run for {slept_s:.0f} s, and others forget a process after '
+            f'{LEASE_S:.0f} s. If this lasts, start it again')
 
 
 def _unknown() -> None:
