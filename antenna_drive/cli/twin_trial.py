@@ -19,13 +19,15 @@ Make a trial of the twin: sealed antennas of an independent program, played to i
   --kind verdict   the three recordings of an ordinary sealed case, diagnosed as they grow
 
 The antennas have the tolerances and, but for --kind verdict, the imperfections of wild cases
-(docs/trial.md). The twin is played in simulated time, as fast as the computer goes. Truths are
-sealed in DIR before anything is simulated, as by `antenna-drive trial`; DIR/results.jsonl is what
-the twin said. The same command resumes an interrupted trial. To continue on another machine, put
-that file into a new DIR.
+(docs/trial.md). The twin is played in simulated time, as fast as the computer goes; with --topics
+its node hears the antenna on topics, at real time, six minutes a case. Truths are sealed in DIR
+before anything is simulated, as by `antenna-drive trial`; DIR/results.jsonl is what the twin said.
+The same command resumes an interrupted trial. To continue on another machine, put that file into a
+new DIR.
 
 For example:
   antenna-drive twin-trial --kind onset --cases 20 --seed 7 --out onsets
+  antenna-drive twin-trial --kind onset --cases 20 --seed 7 --out real_time --topics --jobs 5
   antenna-drive twin-trial --kind healthy --cases 4 --seed 8 --out hours
   antenna-drive twin-trial --kind verdict --cases 30 --seed 9 --out growing --jobs 2
 """
@@ -40,6 +42,7 @@ from typing import Any
 
 from antenna_drive.cli.output import check_options, Progress
 from antenna_drive.cli.sharing import add_worker_options
+from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.errors import UserError
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.trial import cases, onset, sealing
@@ -73,6 +76,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='length of a healthy test [s] (default: %(default)g)')
     parser.add_argument('--alarms-per-day', type=float, default=1.0, metavar='N',
                         help='false alarms that the twin may give a day (default: %(default)g)')
+    parser.add_argument('--topics', action='store_true',
+                        help='play to the node of the twin on topics, at real time; not for '
+                             '--kind verdict')
     add_worker_options(parser, 1)
     parser.add_argument('--quiet', action='store_true', help='show no progress')
 
@@ -82,6 +88,8 @@ def run(arguments: argparse.Namespace) -> int:
     check_options(arguments, cases=Entry('', 1, whole=True), seed=Entry('', 0, whole=True),
                   jobs=Entry('', 1, whole=True), duration=Entry('s', 180.0, 1e5),
                   alarms_per_day=Entry('1', 1e-6, 1e4))
+    if arguments.topics and arguments.kind == 'verdict':
+        raise UserError('--topics: --kind verdict reads whole recordings; leave one of them out')
     manifest = _prepared(arguments)
     folder, names = arguments.out, list(manifest['seals'])
     print(f'{folder}: {len(names)} truths sealed, manifest {sealing.manifest_seal(manifest)}',
@@ -107,7 +115,8 @@ def _prepared(arguments: argparse.Namespace) -> dict[str, Any]:
     """Return the manifest of the trial, sealed now if there is none."""
     settings = {'kind': arguments.kind, 'cases': arguments.cases, 'seed': arguments.seed,
                 'duration_s': arguments.duration, 'tolerance': TOLERANCE,
-                'alarms_per_day': arguments.alarms_per_day}
+                'alarms_per_day': arguments.alarms_per_day,
+                **({'topics': True} if arguments.topics else {})}
     folder = arguments.out
     if (folder / sealing.MANIFEST).exists():
         manifest = sealing.read_manifest(folder)
@@ -128,15 +137,23 @@ def outcome(truth: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, Any
     kept = {'effects': truth['effects'], 'kind': truth['kind']}
     if settings['kind'] == 'verdict':
         return {**kept, **_grown(truth)}
-    from antenna_drive.twin.proving import watched
-    from antenna_drive.twin.watch import TwinSettings
     columns = onset.make_recording(truth)
     if truth['effects']:
         kept['shows_by'] = onset.shows_by(truth, columns, WITHIN_S)
     return {**kept, 'waveform': truth['sheets'][0]['waveform']['type'],
-            'onset_s': truth['onset_s'], **watched(
-                columns, truth['sheets'][0], truth['onset_s'],
-                TwinSettings(alarms_per_day=settings['alarms_per_day']))}
+            'onset_s': truth['onset_s'], **_watched(
+                columns, truth['sheets'][0], truth['onset_s'], settings)}
+
+
+def _watched(columns: Mapping[str, FloatArray], sheet: Mapping[str, Any], onset_s: float,
+             settings: Mapping[str, Any]) -> dict[str, Any]:
+    if settings.get('topics'):
+        from antenna_drive.campaign.twin_on_topics import watched_on_topics
+        return watched_on_topics(columns, sheet, onset_s, settings['alarms_per_day'])
+    from antenna_drive.twin.proving import watched
+    from antenna_drive.twin.watch import TwinSettings
+    return watched(columns, sheet, onset_s,
+                   TwinSettings(alarms_per_day=settings['alarms_per_day']))
 
 
 def _grown(truth: dict[str, Any]) -> dict[str, Any]:
