@@ -41,6 +41,7 @@ from antenna_drive.twin import watch
 from antenna_drive.twin.baseline import Baseline
 from antenna_drive.twin.growing import GrowingVerdict
 from antenna_drive.twin.intake import COMMAND
+from antenna_drive.twin.regular_stamps import RegularSamples
 from antenna_drive.twin.topics import load_topics, own_topics, Topic, TopicMap
 from antenna_drive.twin.watch import Twin, TwinSettings
 from antenna_drive.workers import worker_processes
@@ -133,6 +134,7 @@ class _TwinNode:
         self._state = ''
         self._growing = _growing(stack, drive) if switches['verdict'] else None
         self._since: int | None = None
+        self._even = RegularSamples() if self._map.has_stamps_of_messages else None
         self._connect(self._map)
         self._stop = stopped_by_signals()
 
@@ -182,8 +184,9 @@ class _TwinNode:
                 topic, numbers, source, arrival = self._arrived.get_nowait()
             except NothingThere:
                 return
-            for name, stamp, value in self._map.read(topic, numbers, source, arrival):
-                self._twin.put(name, stamp, value)
+            for sample in self._map.read(topic, numbers, source, arrival):
+                for settled in self._even.put(*sample) if self._even else [sample]:
+                    self._twin.put(*settled)
 
     def _publish(self) -> None:
         for item in self._twin.advance(time.monotonic()):

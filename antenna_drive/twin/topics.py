@@ -84,6 +84,11 @@ class TopicMap:
     time_unit: int = 1
     offset_ns: int = 0
 
+    @property
+    def has_stamps_of_messages(self) -> bool:
+        """Whether a stamp is that of a message, not a number that the sender gives."""
+        return self.clock in (SOURCE, ARRIVAL)
+
     def read(self, topic: Topic, numbers: Sequence[float], source_ns: int,
              arrival_ns: int) -> list[tuple[str, int, float]]:
         """
@@ -102,7 +107,7 @@ class TopicMap:
 
         """
         stamp = source_ns if self.clock == SOURCE else arrival_ns
-        if self.clock not in (SOURCE, ARRIVAL):
+        if not self.has_stamps_of_messages:
             time = numbers[self.time_index] if self.time_index < len(numbers) else math.nan
             if not math.isfinite(time) or abs(time * self.time_unit) >= 2**63:
                 return []
