@@ -42,8 +42,10 @@ LEARNED = 100
 _ALIKE, _SHARE = 0.25, 0.7
 # Bandwidth of the loop after learning, and in the end [Hz].
 _BANDWIDTH_HZ = (0.5, 0.05)
-# Errors count up to this, in periods.
+# Errors count up to this, in periods; those of late stamps so much less, because stamps are seldom
+# early.
 _CLIP = 0.1
+_LATE_COUNTS = 0.3
 # How far ahead the stamps are looked at before one is settled [s].
 AHEAD_S = 0.25
 # So many errors of more than half a period in a row, and the sender has another rhythm.
@@ -157,9 +159,12 @@ class RegularStamps:
         index = np.cumsum([0, *(round(step / period) for step in steps)])
         self._zero = stamps[0]
         time = np.array(stamps) - self._zero
-        slope = float(np.polyfit(index, time, 1)[0])
-        self._period = slope
-        self._next = float(np.median(time - slope * index))
+        half = len(stamps) // 2
+        self._period = float(np.median((time[half:] - time[:-half])
+                                       / (index[half:] - index[:-half])))
+        # a first sample that was late is as many periods earlier as are needed for the others
+        first = float(np.min(index - np.arange(index.size)))
+        self._next = float(np.median(time - self._period * index)) + first * self._period
 
     def _settle(self) -> int:
         """Return the time of the oldest sample that waits."""
@@ -171,7 +176,7 @@ class RegularStamps:
         first, last = _BANDWIDTH_HZ
         omega = 2.0 * math.pi / rate * max(last, first / (1.0 + self._settled / rate))
         clip = _CLIP * self._period
-        counted = min(max(error, -clip), clip)
+        counted = max(error, -clip) if error < 0.0 else _LATE_COUNTS * min(error, clip)
         self._next += self._period + math.sqrt(2.0) * omega * counted
         self._period += omega * omega * counted
         self._astray = self._astray + 1 if abs(error) > 0.5 * self._period else 0
