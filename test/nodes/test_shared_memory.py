@@ -38,6 +38,10 @@ def ports(pid: int) -> list[Path]:
     return [Path(link.removesuffix('_el')) for link in links if '_port' in link]
 
 
+def number(port: Path) -> int:
+    return int(port.name.rpartition('port')[2])
+
+
 @pytest.fixture
 def plant() -> Iterator[DriveProcesses]:
     with DriveProcesses(order=('plant',)) as processes:
@@ -49,11 +53,13 @@ def test_a_node_whose_port_was_removed_says_that_it_hears_nobody(plant: DrivePro
     with Watch() as watch:
         pid = plant.process('plant').pid
         watch.until(lambda: watch.told().get('plant') == WAITS, 'a plant that waits')
-        own = ports(pid)
-        assert own
+        own = sorted(ports(pid), key=number)
+        assert len(own) == 2
         assert not is_cut_off(Path(f'/proc/{pid}'))
         # as another process does that takes this one for dead
         own[0].unlink()
+        assert not is_cut_off(Path(f'/proc/{pid}')), 'frames do not come that way'
+        own[1].unlink()
         assert is_cut_off(Path(f'/proc/{pid}'))
         assert not is_cut_off(), 'we only send to it'
         watch.until(lambda: watch.told()['plant'] == WAITS + CUT_OFF, 'what happened to it')
