@@ -20,14 +20,15 @@ Make a trial of the twin: sealed antennas of an independent program, played to i
 
 The antennas have the tolerances and, but for --kind verdict, the imperfections of wild cases
 (docs/trial.md). The twin is played in simulated time, as fast as the computer goes; with --topics
-its node hears the antenna on topics, at real time, six minutes a case. Truths are sealed in DIR
-before anything is simulated, as by `antenna-drive trial`; DIR/results.jsonl is what the twin said.
-The same command resumes an interrupted trial. To continue on another machine, put that file into a
-new DIR.
+its node hears the antenna on topics, at real time, six minutes a case, and no more cases at once
+than there are cores: a twin that gets no processor tells late. Truths are sealed in DIR before
+anything is simulated, as by `antenna-drive trial`; DIR/results.jsonl is what the twin said. The
+same command resumes an interrupted trial. To continue on another machine, put that file into a new
+DIR.
 
 For example:
   antenna-drive twin-trial --kind onset --cases 20 --seed 7 --out onsets
-  antenna-drive twin-trial --kind onset --cases 20 --seed 7 --out real_time --topics --jobs 5
+  antenna-drive twin-trial --kind onset --cases 20 --seed 7 --out real_time --topics --jobs 2
   antenna-drive twin-trial --kind healthy --cases 4 --seed 8 --out hours
   antenna-drive twin-trial --kind verdict --cases 30 --seed 9 --out growing --jobs 2
 """
@@ -36,6 +37,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
+import os
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -90,6 +92,9 @@ def run(arguments: argparse.Namespace) -> int:
                   alarms_per_day=Entry('1', 1e-6, 1e4))
     if arguments.topics and arguments.kind == 'verdict':
         raise UserError('--topics: --kind verdict reads whole recordings; leave one of them out')
+    if arguments.topics and arguments.jobs > (os.cpu_count() or 1):
+        raise UserError(f'--jobs {arguments.jobs}: allowed with --topics is at most '
+                        f'{os.cpu_count() or 1}, the number of cores')
     manifest = _prepared(arguments)
     folder, names = arguments.out, list(manifest['seals'])
     print(f'{folder}: {len(names)} truths sealed, manifest {sealing.manifest_seal(manifest)}',

@@ -91,3 +91,17 @@ def test_a_trial_of_the_twin_goes_on_in_another_folder(
     assert len(asked) == 5 and set(asked) == {f'case_000{k}' for k in (1, 2, 3, 4)}
     said = capsys.readouterr().out
     assert '1 alarms in 2.00 h' in said and said.count('1800 s judged') == 4
+
+
+@pytest.mark.parametrize(('words', 'said'), [
+    (['--kind', 'verdict'], '--kind verdict reads whole recordings'),
+    (['--kind', 'onset', '--jobs', '1000'], 'the number of cores'),
+])
+def test_what_cannot_be_played_on_topics_is_refused_before_anything_is_sealed(
+        words: list[str], said: str, tmp_path: Path,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / 'out'
+    assert main(['twin-trial', '--cases', '2', '--seed', '8', '--topics', '--out', str(out),
+                 *words]) == 2
+    assert said in capsys.readouterr().err
+    assert not out.exists()
