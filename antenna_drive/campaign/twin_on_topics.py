@@ -20,7 +20,7 @@ the player, the twin and whoever listens are processes in a ROS 2 domain of thei
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, ExitStack
 import os
 from pathlib import Path
@@ -69,7 +69,7 @@ def watched_on_topics(columns: Mapping[str, FloatArray], sheet: Mapping[str, Any
 
     Raises
     ------
-    RuntimeError : the player or the twin ended before its time, or said nothing
+    RuntimeError : the twin ended before its time, or nothing came of it or of the player
 
     """
     with ExitStack() as stack:
@@ -177,7 +177,7 @@ def _program(module: str, *arguments: str) -> Iterator[subprocess.Popen[bytes]]:
             process.wait()
 
 
-def _until(reached: Any, twin: subprocess.Popen[bytes], patience_s: float) -> None:
+def _until(reached: Callable[[], bool], twin: subprocess.Popen[bytes], patience_s: float) -> None:
     end = time.monotonic() + patience_s
     while not reached():
         if twin.poll() is not None:

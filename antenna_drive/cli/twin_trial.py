@@ -19,12 +19,12 @@ Make a trial of the twin: sealed antennas of an independent program, played to i
   --kind verdict   the three recordings of an ordinary sealed case, diagnosed as they grow
 
 The antennas have the tolerances and, but for --kind verdict, the imperfections of wild cases
-(docs/trial.md). The twin is played in simulated time, as fast as the computer goes; with --topics
-its node hears the antenna on topics, at real time, six minutes a case, and no more cases at once
-than there are cores: a twin that gets no processor tells late. Truths are sealed in DIR before
-anything is simulated, as by `antenna-drive trial`; DIR/results.jsonl is what the twin said. The
-same command resumes an interrupted trial. To continue on another machine, put that file into a new
-DIR.
+(docs/trial.md). The twin is played in simulated time, as fast as the computer goes. With --topics
+its node hears the antenna on topics at real time, six minutes a case. No more cases run at once
+than there are cores, because a twin without a processor tells late. Truths are sealed in DIR
+before anything is simulated, as by `antenna-drive trial`; DIR/results.jsonl is what the twin said.
+The same command resumes an interrupted trial. To continue on another machine, put that file into a
+new DIR.
 
 For example:
   antenna-drive twin-trial --kind onset --cases 20 --seed 7 --out onsets
@@ -92,9 +92,10 @@ def run(arguments: argparse.Namespace) -> int:
                   alarms_per_day=Entry('1', 1e-6, 1e4))
     if arguments.topics and arguments.kind == 'verdict':
         raise UserError('--topics: --kind verdict reads whole recordings; leave one of them out')
-    if arguments.topics and arguments.jobs > (os.cpu_count() or 1):
-        raise UserError(f'--jobs {arguments.jobs}: allowed with --topics is at most '
-                        f'{os.cpu_count() or 1}, the number of cores')
+    cores = os.cpu_count() or 1
+    if arguments.topics and arguments.jobs > cores:
+        raise UserError(f'--jobs {arguments.jobs}: allowed with --topics is at most {cores}, '
+                        'the number of cores')
     manifest = _prepared(arguments)
     folder, names = arguments.out, list(manifest['seals'])
     print(f'{folder}: {len(names)} truths sealed, manifest {sealing.manifest_seal(manifest)}',

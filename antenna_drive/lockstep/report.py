@@ -65,8 +65,7 @@ class Report:
         self._refused_before = 0
         self._late_before = 0
         self._waiting_since: float | None = None
-        self._told = False
-        self._told_why = ''
+        self._told: str | None = None  # why it may wait in vain, as the log has it; None: no word
         self._fault_told = ''
         self._next_s = 0.0
         self._awake_s: float | None = None
@@ -84,10 +83,10 @@ class Report:
     def stepped(self) -> None:
         """Note that the node has gone on."""
         if self._waiting_since is not None:
-            if self._told:
+            if self._told is not None:
                 self._node.get_logger().info(
                     f'going on at step {self._member.step} of run {self._member.run:.0f}')
-                self._told = False
+                self._told = None
             self._waiting_since = None
 
     def waiting(self, now: float) -> None:
@@ -101,12 +100,12 @@ class Report:
         if fault and fault != self._fault_told:
             self._node.get_logger().error(f'{fault}; stopped until a new run begins')
         self._fault_told = fault
-        if not self._told and not fault and self._waits_long(now):
+        if self._told is None and not fault and self._waits_long(now):
             self._warn()
             self._next_s = now  # people who watch /diagnostics hear of it at once too
 
     def _warn(self) -> None:
-        self._told, self._told_why = True, self._why()
+        self._told = self._why()
         self._node.get_logger().warning(self._waits_for())
 
     def ended(self) -> None:
@@ -181,7 +180,7 @@ class Report:
         self._next_s = now + PERIOD_S
         if self._waiting_since is not None:
             self.waiting(now)  # the log never says less than the report
-            if self._told and self._why() != self._told_why:
+            if self._told is not None and self._why() != self._told:
                 self._warn()
         level, message = self._judge(now)
         self._topic.publish(diagnostics(self._node, level, message, self._values(now)))

@@ -21,8 +21,8 @@ had no processor. An axis that moves at 0.01 rad/s is elsewhere by 10 microrad a
 A delay-locked loop follows the even times (F. Adriaensen, Using a DLL to filter time, 2005): its
 phase and period follow the stamps with a bandwidth far below the rate of the samples, so a drift
 of the sender's clock is followed and a single late stamp is not. A stamp that is late by more
-than half a period is one of a missing sample's successor, or of a sample in a queue that is sent
-all at once. The stamps that follow tell which.
+than half a period belongs to the sample after a missing one, or to a sample in a queue that is
+sent all at once. The stamps that follow tell which.
 """
 
 from __future__ import annotations
@@ -125,8 +125,8 @@ class RegularStamps:
 
         Returns
         -------
-        times of the oldest samples that were not settled yet, increasing; those of an irregular
-        sender as they came [ns]
+        times of the oldest samples that were not settled yet, increasing but where another rhythm
+        was learned; those of an irregular sender as they came [ns]
 
         """
         waiting = self.waiting
