@@ -36,7 +36,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import replace
 import os
 from pathlib import Path
 import shlex
@@ -120,7 +119,7 @@ def run(arguments: argparse.Namespace) -> int:
             progress.update(len(done) - 1 + share)
 
         story = Investigation(
-            arguments.out, drive, limits, replace(base, waveform=None, start='rest'), run_test,
+            arguments.out, drive, limits, base, run_test,
             InvestigationPlan(arguments.max_tests, arguments.until, arguments.duration,
                               arguments.seed), first,
             # the nodes give true values, another drive what its sensors read

@@ -36,7 +36,6 @@ The exit code is 1 if no test within the limits helps. docs/next-test.md has mor
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 import json
 from pathlib import Path
 import time
@@ -141,12 +140,11 @@ def _planning(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def _rivals(arguments: argparse.Namespace, planning: dict[str, Any],
             ) -> tuple[list[Rival], float]:
-    from antenna_drive.diagnosis import Rival
+    from antenna_drive.diagnosis import planned_rivals
     if arguments.objective == 'detect':
         return [], 1.0
     try:
-        return ([Rival.of_data(item) for item in planning['rivals']],
-                float(planning['inflation']))
+        return planned_rivals(planning)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise UserError(f'{arguments.verdict}: planning: {error!r}: damaged; diagnose the '
                         'recordings again') from error
@@ -170,9 +168,7 @@ def _tests_of_drive(arguments: argparse.Namespace, planning: dict[str, Any]) -> 
                         'give what the next test has in common with them as --sheet')
     else:
         base = BUILT_IN['square']
-    # the waveform is what is looked for; a proposal is a test from rest
-    return AntennaTests(replace(base, waveform=None, start='rest'), drive, limits,
-                        arguments.duration)
+    return AntennaTests(base, drive, limits, arguments.duration)
 
 
 def _tests_of_own(arguments: argparse.Namespace, planning: dict[str, Any]) -> TestSpace:

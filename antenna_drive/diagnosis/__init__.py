@@ -35,7 +35,7 @@ from antenna_drive.diagnosis.machine import (
 from antenna_drive.diagnosis.motion import Motion
 from antenna_drive.diagnosis.proposal import as_data
 from antenna_drive.diagnosis.ranking import rank_hypotheses, Ranking
-from antenna_drive.diagnosis.rivals import Rival
+from antenna_drive.diagnosis.rivals import planned_rivals, Rival
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
 from antenna_drive.diagnosis.unknown_input import courses
 
@@ -44,7 +44,7 @@ __all__ = [
     'courses', 'DEFAULT', 'DesignEffort', 'diagnose', 'Diagnosis', 'Diagram', 'DiagramBlock',
     'DisturbanceInput', 'Effect', 'Evidence', 'Experiment', 'FloatArray', 'Form', 'Hypothesis',
     'idle_effects', 'Judged', 'LeastSquares', 'Machine', 'MachineError', 'Motion',
-    'objective_for', 'Parameter', 'Point', 'Progress', 'Proposal', 'rank_hypotheses', 'Ranking',
-    'Regimes', 'Rival', 'Settings', 'TestDesign', 'TestSpace', 'TimeScales',
-    'with_initial_conditions', 'without_labels',
+    'objective_for', 'Parameter', 'planned_rivals', 'Point', 'Progress', 'Proposal',
+    'rank_hypotheses', 'Ranking', 'Regimes', 'Rival', 'Settings', 'TestDesign', 'TestSpace',
+    'TimeScales', 'with_initial_conditions', 'without_labels',
 ]

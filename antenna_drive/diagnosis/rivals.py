@@ -112,6 +112,18 @@ class Rival:
                    lower + np.tril(lower, -1).T)
 
 
+def planned_rivals(planning: Mapping[str, Any]) -> tuple[list[Rival], float]:
+    """
+    Take from a verdict, its entry `planning`, the rivals and the inflation of the variance.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError, AttributeError : it holds none
+
+    """
+    return ([Rival.of_data(item) for item in planning['rivals']], float(planning['inflation']))
+
+
 def rivals_of(problem: LeastSquares, answers: Sequence[Answer], inflated: float,
               settings: PlanningSettings) -> list[Rival]:
     """

@@ -20,7 +20,6 @@ wakes for each. Services and everything else are served in a second thread.
 
 from __future__ import annotations
 
-import asyncio
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 import json
@@ -31,9 +30,11 @@ from typing import Any
 
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.errors import UserError
+from antenna_drive.live.asking import ask
 from antenna_drive.live.board import Board
 from antenna_drive.live.history import History
 from antenna_drive.live.parameter_table import Description, table
+from antenna_drive.live.twins import Twins
 from antenna_drive.lockstep.changes import CHANGES, read_record, SETTINGS
 from antenna_drive.lockstep.entry import choose_transport
 from antenna_drive.lockstep.frame import FrameLayout
@@ -54,8 +55,6 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 PERIOD_S = 0.05
-# An answer of a node takes a few milliseconds; a change waits up to five seconds for a step.
-PATIENCE_S = 8.0
 # How many changes the page is told of.
 _REMEMBERED = 60
 
@@ -72,6 +71,7 @@ class DriveLink:
     ----------
     history : the signals of the last minute
     settings : the parameters of each unit as they are in force
+    twins : those that report in the same ROS 2 domain
 
     """
 
@@ -94,6 +94,7 @@ class DriveLink:
         self._count = 0
         self._reports: dict[str, dict[str, Any]] = {}
         self._listen()
+        self.twins = Twins(self._node, board)
         self._clients: dict[tuple[str, str], Any] = {
             (unit, name): self._node.create_client(kind, f'{unit}/{name}')
             for unit in _UNITS for name, kind in (
@@ -173,7 +174,9 @@ class DriveLink:
 
     def _poll(self) -> None:
         told = None
-        while not self._stop.wait(PERIOD_S):
+        due = time.monotonic()
+        while not self._stop.wait(max(0.0, due - time.monotonic())):
+            due = max(due + PERIOD_S, time.monotonic())  # what is missed is not made up for
             for unit in _UNITS:
                 frames = self._frames.take_all(unit)
                 if frames is not None:
@@ -184,21 +187,6 @@ class DriveLink:
                 self._board.post('state', state._asdict())
 
     # ---- what is asked
-
-    async def _ask(self, client: Any, request: Any, who: str) -> Any:
-        if not client.service_is_ready():
-            raise UserError(f'{who} does not answer: is the drive running?')
-        loop = asyncio.get_running_loop()
-        answered: asyncio.Future[Any] = loop.create_future()
-
-        def done(future: Any) -> None:
-            loop.call_soon_threadsafe(_settle, answered, future)
-
-        client.call_async(request).add_done_callback(done)
-        try:
-            return await asyncio.wait_for(answered, PATIENCE_S)
-        except asyncio.TimeoutError:
-            raise UserError(f'{who} has not answered for {PATIENCE_S:g} s') from None
 
     def ready(self) -> bool:
         """Return whether the parameters of every unit can be asked for."""
@@ -213,15 +201,15 @@ class DriveLink:
         UserError : it does not answer
 
         """
-        listed = await self._ask(self._clients[unit, 'list_parameters'],
-                                 ListParameters.Request(), unit)
+        listed = await ask(self._clients[unit, 'list_parameters'],
+                           ListParameters.Request(), unit)
         names = sorted(name for name in listed.result.names
                        if not name.startswith(('qos_overrides.', 'use_sim_time',
                                                'start_type_description')))
-        described = await self._ask(self._clients[unit, 'describe_parameters'],
-                                    DescribeParameters.Request(names=names), unit)
-        got = await self._ask(self._clients[unit, 'get_parameters'],
-                              GetParameters.Request(names=names), unit)
+        described = await ask(self._clients[unit, 'describe_parameters'],
+                              DescribeParameters.Request(names=names), unit)
+        got = await ask(self._clients[unit, 'get_parameters'],
+                        GetParameters.Request(names=names), unit)
         values = {name: _plain(value) for name, value in zip(names, got.values)}
         self.settings[unit].update(values)
         self._board.post(f'parameters {unit}', {
@@ -239,7 +227,7 @@ class DriveLink:
         """
         if unit not in OUTPUTS:
             raise UserError(f'{unit}: no such node')
-        result = await self._ask(
+        result = await ask(
             self._clients[unit, 'set_parameters_atomically'], SetParametersAtomically.Request(
                 parameters=[_message(name, value) for name, value in values.items()]), unit)
         reason: str = result.result.reason
@@ -254,16 +242,8 @@ class DriveLink:
         UserError : it does not answer
 
         """
-        answer = await self._ask(self._triggers[service], Trigger.Request(), TEST_SIGNAL)
+        answer = await ask(self._triggers[service], Trigger.Request(), TEST_SIGNAL)
         return bool(answer.success), str(answer.message)
-
-
-def _settle(answered: asyncio.Future[Any], future: Any) -> None:
-    if not answered.done():
-        if future.exception() is not None:
-            answered.set_exception(UserError(str(future.exception())))
-        else:
-            answered.set_result(future.result())
 
 
 def _plain(value: ParameterValue) -> Any:

@@ -31,7 +31,8 @@ from antenna_drive.live.own_processes import off_the_loop, OwnDrive, RecorderPro
 from antenna_drive.parameters.schema import ParameterError
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.panels import PANELS
-from antenna_drive.recording.sheet_signal import settings_of
+from antenna_drive.recording.sheet import parse_sheet
+from antenna_drive.recording.sheet_signal import settings_for, settings_of
 
 # How often nodes are looked after [s].
 _LOOK_S = 0.5
@@ -68,7 +69,7 @@ class Session:
         self._acts: dict[str, Callable[[Mapping[str, Any]], Awaitable[Any]]] = {
             'set': self._set, 'run': self._run, 'experiment': self._experiment,
             'preview': self._preview, 'record': self._record, 'load': self._load,
-            'recordings': self._recordings, 'play': self._play}
+            'recordings': self._recordings, 'play': self._play, 'twin': self._twin}
         board.post('hello', {
             'signals': [{'name': f'{unit}/{signal.name}', 'unit': signal.unit,
                          'text': signal.description}
@@ -186,11 +187,24 @@ class Session:
         return preview(_mapping(message, 'values'), float(span))
 
     async def _play(self, message: Mapping[str, Any]) -> str:
-        path = Path(_text(message, 'path')).expanduser()
-        settings = await off_the_loop(settings_of, path)
+        if 'twin' in message:
+            sheet = parse_sheet(self.link.twins.next_test(_text(message, 'twin')))
+            settings = settings_for(sheet.waveform) if sheet.waveform else {}
+        else:
+            path = Path(_text(message, 'path')).expanduser()
+            settings = await off_the_loop(settings_of, path)
         await self._set({'unit': TEST_SIGNAL, 'values': settings})
         self._tell_experiment(None)
         return await self._run({'service': 'reset'})
+
+    async def _twin(self, message: Mapping[str, Any]) -> str:
+        name, act = _text(message, 'name'), _text(message, 'act')
+        if act == 'begin_test':
+            self.link.twins.begin_test(name)
+            return 'another test begins; the drive has to stand still now'
+        if act == 'propose':
+            return await self.link.twins.propose(name)
+        raise UserError(f'{act[:40]}: no such act')
 
     async def _record(self, message: Mapping[str, Any]) -> str:
         if message.get('on'):

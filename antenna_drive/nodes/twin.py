@@ -15,7 +15,7 @@
 Watches a real drive beside its twin, and says when the two part.
 
 The twin is the emulator, driven with the measured rate command in step with it. At first the drive
-has to be healthy: the twin settles (15 s), learns its quiet record (two minutes), tunes itself to
+has to be healthy: the twin settles (15 s), learns its quiet record (five minutes), tunes itself to
 it, and watches from then on.
 
   ros2 run antenna_drive twin                      a drive with our own topics
@@ -31,13 +31,14 @@ map             YAML: topics, units, signs and time of another drive. docs/twin.
 config          configuration files or sets, as of the other nodes
 sheet           a test sheet: circuit, bias, tolerances
 alarms_per_day  false alarms that are allowed a day, 1 if not given
-quiet           length of the quiet record, 120 s if not given
+quiet           length of the quiet record, 300 s if not given
 quiet_file      where the quiet record's figures are kept. If the file is there, it is used and
                 nothing is learned; else it is written
 tune            false: keep the configuration as it is
 verdict         true: repeat the diagnosis on what there is, on twin/verdict (String, JSON), until
                 it says 'decided'. A message on twin/begin_test (Empty) begins another test, while
-                the drive stands still
+                the drive stands still. The service twin/propose (Trigger) asks for the next test;
+                some minutes later it is on twin/next_test (String, JSON)
 
 Drives on other machines: ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET.
 """

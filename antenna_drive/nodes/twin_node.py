@@ -16,11 +16,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor
+from concurrent.futures import BrokenExecutor
 from contextlib import ExitStack
 import json
+import os
 from pathlib import Path
 from queue import Empty as NothingThere, SimpleQueue
+from threading import Event
 import time
 from typing import Any
 
@@ -41,20 +43,26 @@ from antenna_drive.twin import watch
 from antenna_drive.twin.baseline import Baseline
 from antenna_drive.twin.growing import GrowingVerdict
 from antenna_drive.twin.intake import COMMAND
+from antenna_drive.twin.next_test import NextTest
 from antenna_drive.twin.regular_stamps import RegularSamples
 from antenna_drive.twin.topics import load_topics, own_topics, Topic, TopicMap
 from antenna_drive.twin.watch import Twin, TwinSettings
 from antenna_drive.workers import worker_processes
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Empty, Float64, Float64MultiArray, String
+from std_srvs.srv import Trigger
 
 NAME = 'twin'
 OK = 0
 # Best effort matches every publisher. There is room for some seconds of messages.
 _FROM_REAL = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
 _OUT = QoSProfile(depth=100)
+# Whoever comes later hears the last one.
+_KEPT = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+# The diagnosis yields to the drive and the twin.
+_NICE = 10
 _PERIOD_S = 0.05
 _REPORT_S = 1.0
 _LEVELS = {watch.OK: DiagnosticStatus.OK, watch.WAITING: DiagnosticStatus.STALE,
@@ -132,7 +140,13 @@ class _TwinNode:
         self._arrived: SimpleQueue[tuple[Topic, tuple[float, ...], int, int]] = SimpleQueue()
         self._tests: SimpleQueue[None] = SimpleQueue()
         self._state = ''
-        self._growing = _growing(stack, drive) if switches['verdict'] else None
+        self._growing: GrowingVerdict | None = None
+        self._next: NextTest | None = None
+        self._asked = Event()
+        if switches['verdict']:
+            executor = stack.enter_context(worker_processes(1))
+            executor.submit(os.nice, _NICE)
+            self._growing, self._next = GrowingVerdict(executor, drive), NextTest(executor, drive)
         self._since: int | None = None
         self._even = RegularSamples() if self._map.has_stamps_of_messages else None
         self._connect(self._map)
@@ -150,7 +164,9 @@ class _TwinNode:
                      for middle in ('', 'residual/')]
             for signal in CHANNELS if signal in names}
         self._diagnostics = self._node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self._verdict = self._node.create_publisher(String, f'{name}/verdict', 1)
+        self._verdict = self._node.create_publisher(String, f'{name}/verdict', _KEPT)
+        self._next_test = self._node.create_publisher(String, f'{name}/next_test', _KEPT)
+        self._node.create_service(Trigger, f'{name}/propose', self._propose)
         self._node.create_subscription(Empty, f'{name}/begin_test',
                                        lambda message: self._tests.put(None), 1)
 
@@ -159,6 +175,22 @@ class _TwinNode:
             numbers = tuple(message.data) if topic.vector else (message.data,)
             self._arrived.put((topic, numbers, info['source_timestamp'], time.time_ns()))
         return listen
+
+    def _propose(self, request: Any, response: Any) -> Any:
+        """Answer who asks for the next test."""
+        growing, following = self._growing, self._next
+        if growing is None or following is None:
+            response.message = 'no verdict is asked for: start the twin with verdict:=true'
+        elif not growing.looks:
+            response.message = 'there is no verdict yet'
+        elif following.under_way or self._asked.is_set():
+            response.message = 'the next test is being designed already'
+        else:
+            self._asked.set()
+            response.success = True
+            response.message = ('the next test is being designed: some minutes, then it is on '
+                                f'{self._next_test.topic_name}')
+        return response
 
     def spin(self) -> int:
         """Watch until told to stop; return the exit code."""
@@ -169,7 +201,11 @@ class _TwinNode:
                 self._take()
                 self._publish()
                 self._keep_quiet_record()
-                self._look()
+                try:
+                    self._look()
+                except BrokenExecutor:
+                    self._growing = self._next = None
+                    self._log.error('the process of the diagnosis was ended; no more verdicts')
                 now = time.monotonic()
                 if self._twin.state != self._state or now >= report_at:
                     report_at = now + _REPORT_S
@@ -208,8 +244,8 @@ class _TwinNode:
             self._log.error(f'{self._quiet_file}: {one_line(error)}')
 
     def _look(self) -> None:
-        growing = self._growing
-        if growing is None:
+        growing, following = self._growing, self._next
+        if growing is None or following is None:
             return
         intake, sheet = self._twin.intake, self._twin.sheet
         if not self._tests.empty():
@@ -222,6 +258,16 @@ class _TwinNode:
             self._log.info(said['fault'] or said['say'])
         if growing.due(intake.span_s(self._since)):
             growing.begin(intake.recording(sheet, self._since))
+        if self._asked.is_set():
+            following.begin(growing.planning, growing.looks[-1].seconds)
+            self._asked.clear()
+            self._tell_next(following)
+        if following.take():
+            self._tell_next(following)
+            self._log.info(following.fault or ' '.join(following.message()['say'][:1]))
+
+    def _tell_next(self, following: NextTest) -> None:
+        self._next_test.publish(String(data=json.dumps(following.message())))
 
     def _report(self) -> None:
         twin, state = self._twin, self._twin.state
@@ -253,11 +299,6 @@ def _read_quiet(path: Path | None) -> tuple[Baseline | None, str]:
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise UserError(f'{path}: no quiet record of a twin, {one_line(error)}; remove it, and '
                         'the twin learns another') from None
-
-
-def _growing(stack: ExitStack, drive: Any) -> GrowingVerdict:
-    executor: Executor = stack.enter_context(worker_processes(1))
-    return GrowingVerdict(executor, drive)
 
 
 def _told(twin: Twin) -> tuple[str, list[tuple[str, str]]]:

@@ -78,6 +78,7 @@ class GrowingVerdict:
     Attributes
     ----------
     looks : what they said, in the order of time
+    planning : what the design of a further test takes from the last one, {} before it
     fault : why the last look has failed; '' if it has not
 
     """
@@ -91,6 +92,7 @@ class GrowingVerdict:
         self._tests: dict[str, Recording] = {}
         self._running: tuple[Future[dict[str, Any]], list[float]] | None = None
         self.looks: list[Look] = []
+        self.planning: Mapping[str, Any] = {}
         self.fault = ''
 
     @property
@@ -123,7 +125,9 @@ class GrowingVerdict:
         future, lengths_s = self._running
         self._running = None
         try:
-            self.looks.append(look_of(future.result(), lengths_s))
+            result = future.result()
+            self.looks.append(look_of(result, lengths_s))
+            self.planning = result['planning']
             self.fault = ''
         except UserError as error:
             self.fault = str(error)

@@ -200,7 +200,7 @@ class _Asked(History):
 
 
 def test_a_page_that_does_not_read_costs_no_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server, 'PERIOD_S', 0.0)
+    monkeypatch.setattr(server, 'LOOK_S', 0.0)
     asyncio.run(_feed_a_page_that_does_not_read())
 
 

@@ -27,6 +27,7 @@ pytest.importorskip('rclpy', reason='rclpy is not installed: no drive to look at
 pytest.importorskip('tornado', reason='tornado is not installed: no page')
 
 from live_command import LiveCommand  # noqa: E402, I100
+from stand_in_twin import NEXT_TEST, StandInTwin, VERDICT  # noqa: E402
 
 pytestmark = pytest.mark.skipif(EXECUTABLE is None, reason='there is no Chromium '
                                                            '(apt-get install chromium)')
@@ -180,11 +181,46 @@ def test_a_recording_is_made_and_drawn_beside_the_live_curves(page: Page) -> Non
     assert page.tell('antennaDrive.charts.tape.duration') == pytest.approx(recorded.duration_s)
 
 
+@pytest.fixture
+def twin(module_domain: int) -> Iterator[StandInTwin]:
+    found = StandInTwin(module_domain)
+    yield found
+    found.close()
+
+
+def test_a_twin_is_shown_with_its_verdict_and_its_next_test_is_played(
+        page: Page, twin: StandInTwin) -> None:
+    twin.say(VERDICT)  # before the page's node has met the twin: it hears the last one
+    page.click('#tab-twin')
+    text = '(document.querySelector("#twin .twin")?.textContent ?? "")'
+    page.until(f'{text}.includes("gap since 3 s") && {text}.includes("70 % after 45 s")')
+    assert page.tell('document.querySelector("#twin .twin h2").textContent') == '/beside/watcher'
+    assert page.tell('document.querySelector("#twin td").textContent') == (
+        '0.5 A instead of 0.01 A, mean +9.0 sigma')
+    # a line for each answer, and its points: as high as it is probable
+    assert page.tell('document.querySelectorAll("#twin polyline").length') == 4
+    first, second = page.tell('[...document.querySelector("#twin polyline").points]'
+                              '.map(point => [point.x, point.y])')
+    least, most = page.tell('[0, 2].map(n => Number(document.querySelectorAll("#twin .grid")[n]'
+                            '.getAttribute("y1")))')
+    assert [(least - y) / (least - most) for _, y in (first, second)] == pytest.approx(
+        [0.3, 0.7], abs=0.01)
+    button = 'document.querySelectorAll("#twin button")'
+    page.tell(f'{button}[0].click()')
+    page.until('document.getElementById("said").textContent.includes("another test")')
+    page.tell(f'{button}[1].click()')
+    page.until(f'{text}.includes({NEXT_TEST["say"][0]!r}) && !{button}[2].hidden')
+    page.tell(f'{button}[2].click()')
+    page.until('[...document.querySelectorAll("#nodes td")].some(cell => '
+               'cell.textContent.includes("period = 3"))')
+    assert twin.begun == 1
+
+
 @pytest.mark.parametrize('dark', [False, True], ids=['light', 'dark'])
 @pytest.mark.parametrize('width', [1400, 768, 390])
 def test_nothing_is_cut_off(page: Page, width: int, dark: bool) -> None:
     page.look(width, 900, dark)
-    for tab in ('tune', 'signal', 'article', 'tapes', 'nodes'):
+    for tab in ('tune', 'signal', 'article', 'tapes', 'nodes', 'twin'):
         page.tell(f'document.getElementById("tab-{tab}").click()')
         page.until(f'!document.getElementById("{tab}").hidden')
         assert page.until('document.documentElement.scrollWidth') <= width
@@ -194,5 +230,7 @@ def test_nothing_is_cut_off(page: Page, width: int, dark: bool) -> None:
                             return b.left < -1 || b.right > innerWidth + 1; }})
             .map(e => e.outerHTML.slice(0, 80))""")
         assert cut == []
+        assert page.tell('document.querySelector(".tabs").getBoundingClientRect().bottom <= '
+                         f'document.getElementById("{tab}").getBoundingClientRect().top')
     paper = page.tell('getComputedStyle(document.body).backgroundColor')
     assert (paper == 'rgb(20, 23, 26)') == dark

@@ -40,6 +40,7 @@ import numpy as np  # noqa: E402
 import rclpy  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from std_msgs.msg import Float64, Float64MultiArray  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
 import yaml  # noqa: E402
 
 pytestmark = pytest.mark.slow
@@ -198,6 +199,12 @@ def test_twin_names_rubbish_and_goes_on(tmp_path: Path, truth: dict[str, Any],
                                        for message, _ in listener.said[heard:]), twin)
             return next(said for said in listener.said[heard:] if said[0].startswith(state))
 
+        asking: Any = listener.node.create_client(Trigger, 'twin/propose')
+        listener.until(asking.service_is_ready, twin)
+        answer: Any = asking.call_async(Trigger.Request())
+        listener.until(answer.done, twin)
+        assert not answer.result().success
+        assert 'verdict:=true' in answer.result().message
         says('learning', 0.0, 18.0)
         message, _ = says('bad input', 18.0, 22.0, last=float('inf'))
         assert 'torque_share/bias_voltage' in message and 'infinite' in message

@@ -15,8 +15,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from concurrent.futures import Executor, Future
+from collections.abc import Mapping
 from typing import Any
 
 from antenna_drive.errors import UserError
@@ -25,27 +24,9 @@ from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.recording import make_channel, Recording
 from antenna_drive.twin.growing import FIRST_S, GrowingVerdict, look_of
 from antenna_drive.twin.intake import COMMAND
+from later import Later
 import numpy as np
 import pytest
-
-
-class Later(Executor):
-    """Does a task when it is told to."""
-
-    def __init__(self) -> None:
-        self.tasks: list[Callable[[], None]] = []
-
-    def submit(self, function: Any, /, *arguments: Any, **named: Any) -> Future[Any]:
-        future: Future[Any] = Future()
-
-        def do() -> None:
-            try:
-                future.set_result(function(*arguments, **named))
-            except UserError as error:
-                future.set_exception(error)
-
-        self.tasks.append(do)
-        return future
 
 
 def test_of(seconds: float) -> Recording:
@@ -71,7 +52,8 @@ class Diagnoses:
         return {'which': [{'effects': ['motor_1.gap'], 'probability': p},
                           {'effects': ['none'], 'probability': 0.01},
                           {'effects': ['unknown'], 'probability': 0.99 - p}],
-                'confusable': [['motor_1.gap', 'motor_2.gap']]}
+                'confusable': [['motor_1.gap', 'motor_2.gap']],
+                'planning': {'inflation': p}}
 
 
 def grown(*first: float) -> tuple[GrowingVerdict, Later, Diagnoses]:
@@ -125,6 +107,7 @@ def test_look_that_fails_is_told_and_the_next_one_made() -> None:
     assert growing.message()['fault'] == 'too short'
     look(growing, later, 16.0)
     assert growing.message()['fault'] == ''
+    assert growing.planning == {'inflation': 0.5}
 
 
 def test_probabilities_of_a_look_are_those_of_the_diagnosis() -> None:

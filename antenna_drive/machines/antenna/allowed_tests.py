@@ -16,6 +16,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +49,7 @@ class AntennaTests(TestSpace):
     Parameters
     ----------
     base
-        what a further test shares with those that were made
+        what a further test shares with those that were made; its waveform and start do not count
     drive
         the configuration
     limits
@@ -65,7 +66,9 @@ class AntennaTests(TestSpace):
     def __init__(self, base: TestSheet, drive: Drive, limits: DriveLimits,
                  duration: float = 30.0, rate: float = 70.0) -> None:
         """Take what all the tests have in common."""
-        self._base, self._drive, self._limits = base, drive, limits
+        # the waveform is what is looked for; a proposal is a test from rest
+        self._base = replace(base, waveform=None, start='rest')
+        self._drive, self._limits = drive, limits
         self._duration, self._rate = duration, rate
         self.limits = limits.as_data()
 

@@ -29,7 +29,8 @@ import shutil
 from typing import Any
 
 from antenna_drive.diagnosis import (
-    as_data, DEFAULT, DesignEffort, Diagnosis, objective_for, Rival, Settings, TestDesign,
+    as_data, DEFAULT, DesignEffort, Diagnosis, objective_for, planned_rivals, Rival, Settings,
+    TestDesign,
 )
 from antenna_drive.drafts import drafted
 from antenna_drive.errors import UserError
@@ -177,9 +178,8 @@ class Investigation:
         rivals: list[Rival] = []
         inflated = 1.0
         if number > 1:
-            planning = (_read(self._path('verdict', number - 1, '.json')) or {})['planning']
-            rivals = [Rival.of_data(item) for item in planning['rivals']]
-            inflated = planning['inflation']
+            verdict = _read(self._path('verdict', number - 1, '.json')) or {}
+            rivals, inflated = planned_rivals(verdict['planning'])
         found = TestDesign(
             self._space, rivals, inflated, objective_for(rivals),
             threads=self._threads, settings=self._settings, effort=self._effort,

@@ -9,6 +9,7 @@ import {Signal} from './signal.js';
 import {Article} from './article.js';
 import {Tapes} from './tapes.js';
 import {Nodes} from './nodes.js';
+import {Twin} from './twin.js';
 import {makeTabs} from './tabs.js';
 
 const link = new Link();
@@ -16,7 +17,7 @@ const samples = new Samples();
 const charts = new Charts(samples);
 const run = new Run(link, samples);
 const parts = [run, new Tune(link), new Signal(link), new Article(link, charts),
-               new Tapes(link, charts, samples), new Nodes()];
+               new Tapes(link, charts, samples), new Nodes(), new Twin(link)];
 let diagram = null;
 
 makeTabs(document.querySelector('.tabs'));

@@ -1,0 +1,56 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""A question to a node, by a service."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from antenna_drive.errors import UserError
+
+# An answer of a node takes a few milliseconds; a change waits up to five seconds for a step.
+PATIENCE_S = 8.0
+
+
+async def ask(client: Any, request: Any, who: str) -> Any:
+    """
+    Return the answer of a node whose callbacks are served in another thread.
+
+    Raises
+    ------
+    UserError : it does not answer
+
+    """
+    if not client.service_is_ready():
+        raise UserError(f'{who} does not answer: is it running?')
+    loop = asyncio.get_running_loop()
+    answered: asyncio.Future[Any] = loop.create_future()
+
+    def done(future: Any) -> None:
+        loop.call_soon_threadsafe(_settle, answered, future)
+
+    client.call_async(request).add_done_callback(done)
+    try:
+        return await asyncio.wait_for(answered, PATIENCE_S)
+    except asyncio.TimeoutError:
+        raise UserError(f'{who} has not answered for {PATIENCE_S:g} s') from None
+
+
+def _settle(answered: asyncio.Future[Any], future: Any) -> None:
+    if not answered.done():
+        if future.exception() is not None:
+            answered.set_exception(UserError(str(future.exception())))
+        else:
+            answered.set_result(future.result())

@@ -1,0 +1,175 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+What twins say: their state, their verdict as it grows, and the next test.
+
+A twin is known by its report in /diagnostics, whatever its name and namespace. What it sends is
+checked: anything may be on a topic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import json
+import math
+from typing import Any
+
+from antenna_drive.errors import UserError
+from antenna_drive.live.asking import ask
+from antenna_drive.live.board import Board
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Empty, String
+from std_srvs.srv import Trigger
+
+# A report that has these values is that of a twin.
+_REPORTED = {'state', 'tuning', 'watched', 'false alarms per day'}
+_MOST, _LONGEST, _LOOKS, _ANSWERS, _LINES = 8, 200_000, 200, 12, 40
+_KEPT = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Twins:
+    """Listens to every twin, and asks what a page wants of one."""
+
+    def __init__(self, node: Node, board: Board) -> None:
+        """Listen; news goes to the board."""
+        self._node, self._board = node, board
+        self._told: dict[str, dict[str, Any]] = {}
+        self._begins: dict[str, Any] = {}
+        self._proposes: dict[str, Any] = {}
+        node.create_subscription(DiagnosticArray, '/diagnostics', self._diagnosed, 50)
+
+    def _diagnosed(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            values = {item.key[:80]: item.value[:300] for item in status.values[:80]}
+            if not _REPORTED <= values.keys():
+                continue
+            if status.name not in self._told:
+                if len(self._told) >= _MOST:
+                    continue
+                self._meet(status.name)
+            told = self._told[status.name]
+            told.update(level=ord(status.level), message=status.message[:600], values=values,
+                        reports=told['reports'] + 1)
+            self._post(status.name)
+
+    def _meet(self, name: str) -> None:
+        """Listen to a twin that reports for the first time."""
+        self._told[name] = {'name': name, 'reports': 0, 'verdict': None, 'next_test': None}
+        for topic, read in (('verdict', verdict_of), ('next_test', next_test_of)):
+            self._node.create_subscription(String, f'{name}/{topic}',
+                                           self._listener(name, topic, read), _KEPT)
+        self._begins[name] = self._node.create_publisher(Empty, f'{name}/begin_test', 1)
+        self._proposes[name] = self._node.create_client(Trigger, f'{name}/propose')
+
+    def _listener(self, name: str, topic: str, read: Any) -> Any:
+        def listen(message: String) -> None:
+            found = read(message.data)
+            if found is not None:
+                self._told[name][topic] = found
+                self._post(name)
+        return listen
+
+    def _post(self, name: str) -> None:
+        self._board.post(f'twin {name}', self._told[name])
+
+    def begin_test(self, name: str) -> None:
+        """
+        Tell a twin that another test begins.
+
+        Raises
+        ------
+        UserError : there is no such twin
+
+        """
+        if name not in self._begins:
+            raise UserError(f'{name[:80]}: no such twin')
+        self._begins[name].publish(Empty())
+
+    async def propose(self, name: str) -> str:
+        """
+        Ask a twin for the next test; return what it answers.
+
+        Raises
+        ------
+        UserError : there is no such twin, it does not answer, or it refuses
+
+        """
+        if name not in self._proposes:
+            raise UserError(f'{name[:80]}: no such twin')
+        answer = await ask(self._proposes[name], Trigger.Request(), name)
+        if not answer.success:
+            raise UserError(answer.message)
+        return str(answer.message)
+
+    def next_test(self, name: str) -> Mapping[str, Any]:
+        """
+        Return the test sheet that a twin proposes, as plain data.
+
+        Raises
+        ------
+        UserError : there is none
+
+        """
+        proposed = (self._told.get(name) or {}).get('next_test') or {}
+        if not proposed.get('test'):
+            raise UserError(f'{name[:80]}: proposes no test')
+        return dict(proposed['test'])
+
+
+def verdict_of(text: str) -> dict[str, Any] | None:
+    """Return what a page is told of a growing verdict, None if the text holds none."""
+    try:
+        told = _object(text)
+        looks = [{'seconds': _number(look['seconds']),
+                  'probabilities': {str(answer)[:200]: _number(p) for answer, p in list(
+                      look['probabilities'].items())[:_ANSWERS]}}
+                 for look in told['looks'][-_LOOKS:]]
+        return {'say': str(told['say'])[:600], 'decided': told['decided'] is True,
+                'fault': str(told['fault'])[:600], 'looks': looks}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def next_test_of(text: str) -> dict[str, Any] | None:
+    """Return what a page is told of a next test, None if the text holds none."""
+    try:
+        told = _object(text)
+        test = told['test'] or None
+        if test is not None and not isinstance(test, dict):
+            return None
+        json.dumps(test, allow_nan=False)
+        return {'under_way': told['under_way'] is True, 'after_s': _number(told['after_s']),
+                'fault': str(told['fault'])[:600], 'test': test,
+                'say': [str(line)[:300] for line in told['say'][:_LINES]],
+                'sheet': str(told['sheet'])[:_LONGEST]}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def _object(text: str) -> dict[str, Any]:
+    if len(text) > _LONGEST:
+        raise ValueError('too long')
+    told = json.loads(text)
+    if not isinstance(told, dict):
+        raise ValueError('no object')
+    return told
+
+
+def _number(value: Any) -> float:
+    found = float(value)
+    if not math.isfinite(found):
+        raise ValueError('not finite')
+    return found
