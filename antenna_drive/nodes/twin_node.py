@@ -43,7 +43,7 @@ from antenna_drive.twin import watch
 from antenna_drive.twin.baseline import Baseline
 from antenna_drive.twin.growing import GrowingVerdict
 from antenna_drive.twin.intake import COMMAND
-from antenna_drive.twin.next_test import NextTest
+from antenna_drive.twin.proposing import NextTest
 from antenna_drive.twin.regular_stamps import RegularSamples
 from antenna_drive.twin.topics import load_topics, own_topics, Topic, TopicMap
 from antenna_drive.twin.watch import Twin, TwinSettings

@@ -21,7 +21,7 @@ from typing import Any
 from antenna_drive.errors import UserError
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.sets import Drive
-from antenna_drive.twin.next_test import NextTest
+from antenna_drive.twin.proposing import NextTest
 from later import Later
 
 FOUND = {'say': ['next test: chirp'], 'test': {'circuit': 'new'}, 'sheet': 'circuit: new'}
