@@ -16,8 +16,8 @@ The verdict that grows: the diagnosis repeated, in a process of its own, on what
 
 A look takes longer than a second of testing. The next one begins when it has ended and a fair
 share of new data is there, so looks come at even distances on a logarithmic scale of time. The
-process lives on between looks, which saves its start. The fits of one look do not start from
-those of the one before: the engine has no way in for them.
+process lives on between looks, which saves its start. A look does not begin where the one before
+has ended: it says what `antenna-drive diagnose` says of the same tests.
 """
 
 from __future__ import annotations
