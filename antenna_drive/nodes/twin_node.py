@@ -65,6 +65,8 @@ _KEPT = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _NICE = 10
 _PERIOD_S = 0.05
 _REPORT_S = 1.0
+# A gap is told after some seconds; being so late is worth a word.
+_LATE_S = 2.0
 _LEVELS = {watch.OK: DiagnosticStatus.OK, watch.WAITING: DiagnosticStatus.STALE,
            watch.STALE: DiagnosticStatus.STALE, watch.GAP: DiagnosticStatus.ERROR,
            watch.BAD_INPUT: DiagnosticStatus.WARN, watch.SETTLING: DiagnosticStatus.OK,
@@ -150,6 +152,7 @@ class _TwinNode:
         self._since: int | None = None
         self._even = RegularSamples() if self._map.has_stamps_of_messages else None
         self._connect(self._map)
+        self._taken_at = time.monotonic()
         self._stop = stopped_by_signals()
 
     def _connect(self, topics: TopicMap) -> None:
@@ -215,6 +218,7 @@ class _TwinNode:
         return OK
 
     def _take(self) -> None:
+        self._taken_at = time.monotonic()
         while True:
             try:
                 topic, numbers, source, arrival = self._arrived.get_nowait()
@@ -272,6 +276,10 @@ class _TwinNode:
     def _report(self) -> None:
         twin, state = self._twin, self._twin.state
         message, values = _told(twin)
+        behind_s = time.monotonic() - self._taken_at
+        values.append(('behind', f'{behind_s:.1f} s'))
+        if behind_s > _LATE_S:
+            message += f'; {behind_s:.0f} s behind, the computer is too slow'
         self._diagnostics.publish(diagnostics(self._node, _LEVELS[state], message, values))
         if state != self._state:
             # rclpy keeps one severity for each line of a program

@@ -34,7 +34,7 @@ from typing import Any, Literal, NamedTuple
 from antenna_drive.emulator.wiring import OUTPUTS
 from antenna_drive.errors import one_line, UserError
 from antenna_drive.parameters.schema import nearest
-from antenna_drive.recording.plain import freeze, PlainDataError
+from antenna_drive.recording.plain import freeze, PlainDataError, thaw
 from antenna_drive.recording.sheet import TestSheet
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -147,6 +147,10 @@ class Channel:
         first, last = self.time_ns[0] / NANOSECONDS, self.time_ns[-1] / NANOSECONDS
         return (f'Channel{unit}: {len(self)} samples from {first:g} to {last:g} s, '
                 f'{self.values.min():g} to {self.values.max():g}')
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Give another process what is checked and kept read-only there, too."""
+        return Channel, (self.unit, self.time_ns, self.values)
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -283,6 +287,12 @@ class Recording:
                 for step, unit, values in self.changes))
         except PlainDataError as error:
             raise RecordingError(str(error)) from None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Give another process plain data; read-only views cannot be sent."""
+        changes = tuple(Change(step, unit, thaw(values)) for step, unit, values in self.changes)
+        return Recording, (dict(self.channels), thaw(self.configuration), changes, self.sheet,
+                           thaw(self.notes))
 
     def __repr__(self) -> str:
         """Return two lines instead of the arrays: how much there is, and the signals."""

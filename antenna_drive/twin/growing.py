@@ -23,10 +23,10 @@ has ended: it says what `antenna-drive diagnose` says of the same tests.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from concurrent.futures import Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future
 from typing import Any
 
-from antenna_drive.errors import UserError
+from antenna_drive.errors import one_line
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.recording import Recording
 from antenna_drive.twin.intake import COMMAND
@@ -91,6 +91,7 @@ class GrowingVerdict:
         self.rule = rule or Rule()
         self._tests: dict[str, Recording] = {}
         self._running: tuple[Future[dict[str, Any]], list[float]] | None = None
+        self._looked_at_s = 0.0
         self.looks: list[Look] = []
         self.planning: Mapping[str, Any] = {}
         self.fault = ''
@@ -110,16 +111,24 @@ class GrowingVerdict:
         if self._running is not None or self.decided:
             return False
         total = seconds + sum(map(_length, self._tests.values()))
-        return total >= (GROWTH * self.looks[-1].seconds if self.looks else FIRST_S)
+        return total >= max(FIRST_S, GROWTH * self._looked_at_s)
 
     def begin(self, test: Recording) -> None:
         """Look at the present test and those before it."""
         tests = {**self._tests, f'test {len(self._tests) + 1}': test}
-        self._running = (self._executor.submit(self._diagnose, tests, self._drive),
-                         [_length(item) for item in tests.values()])
+        lengths_s = [_length(item) for item in tests.values()]
+        self._looked_at_s = sum(lengths_s)
+        self._running = self._executor.submit(self._diagnose, tests, self._drive), lengths_s
 
     def take(self) -> bool:
-        """Take the result of a look that has ended; return whether one has."""
+        """
+        Take the result of a look that has ended; return whether one has.
+
+        Raises
+        ------
+        BrokenExecutor : its process was ended
+
+        """
         if self._running is None or not self._running[0].done():
             return False
         future, lengths_s = self._running
@@ -129,8 +138,10 @@ class GrowingVerdict:
             self.looks.append(look_of(result, lengths_s))
             self.planning = result['planning']
             self.fault = ''
-        except UserError as error:
-            self.fault = str(error)
+        except BrokenExecutor:
+            raise
+        except Exception as error:  # noqa: B902 (the twin watches on, whatever a look fails of)
+            self.fault = one_line(error, 300)
         return True
 
     def message(self) -> dict[str, Any]:

@@ -21,10 +21,10 @@ for every look.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future
 from typing import Any
 
-from antenna_drive.errors import UserError
+from antenna_drive.errors import one_line, UserError
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.sheet import dump_sheet, parse_sheet
 
@@ -107,14 +107,23 @@ class NextTest:
         self._running = self._executor.submit(self._design, planning, self._drive)
 
     def take(self) -> bool:
-        """Take what was found; return whether a design has ended."""
+        """
+        Take what was found; return whether a design has ended.
+
+        Raises
+        ------
+        BrokenExecutor : its process was ended
+
+        """
         if self._running is None or not self._running.done():
             return False
         future, self._running = self._running, None
         try:
             self._found = future.result()
-        except UserError as error:
-            self.fault = str(error)
+        except BrokenExecutor:
+            raise
+        except Exception as error:  # noqa: B902 (the twin watches on, whatever a design fails of)
+            self.fault = one_line(error, 300)
         return True
 
     def message(self) -> dict[str, Any]:

@@ -171,6 +171,7 @@ def test_twin_learns_tells_the_gap_and_then_that_the_drive_has_stopped(
         assert ' A instead of ' in gap[0]
         assert 'sigma' in gap[0]
         assert gap[1]['tuning'] == 'tuned to the quiet record'
+        assert gap[1]['behind'].endswith(' s')
         assert len(listener.residuals) > 5000
         assert json.loads(quiet.read_text())['baseline']['signals']
     assert twin.process.returncode == 0

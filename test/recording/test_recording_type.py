@@ -15,10 +15,12 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import doctest
 import math
-from typing import get_args
+import pickle
+from typing import Any, get_args
 
 from antenna_drive.emulator.wiring import OUTPUTS, signal_names
 from antenna_drive.recording import recording as module
@@ -26,6 +28,7 @@ from antenna_drive.recording.plain import PlainDataError
 from antenna_drive.recording.recording import (
     Change, Channel, Method, METHODS, nanoseconds, Recording, RecordingError, unit_of,
 )
+from antenna_drive.recording.sheet import parse_sheet
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
@@ -40,6 +43,21 @@ def ramp(rate_hz: float, seconds: float, slope: float = 2.0) -> Recording:
 
 def test_examples_in_the_documentation() -> None:
     assert doctest.testmod(module).failed == 0
+
+
+@pytest.mark.parametrize('sent', [lambda item: pickle.loads(pickle.dumps(item)), copy.deepcopy],
+                         ids=['to another process', 'copied'])
+def test_what_arrives_is_the_same_and_cannot_be_changed_either(sent: Any) -> None:
+    recording = Recording.from_arrays(
+        [0.0, 1.0], {CURRENT: [1.0, -0.0]}, configuration={'axis': {'modes': [1.0, 2.0]}},
+        changes=(Change(3, 'torque_share', {'bias_pot': 0.5}),),
+        sheet=parse_sheet({'circuit': 'new', 'labels': {'oil': 'cold'}}), notes={'why': ['x']})
+    found = sent(recording)
+    assert found == recording and found is not recording
+    with pytest.raises(ValueError, match='read-only'):
+        found[CURRENT].values[0] = 3.0
+    with pytest.raises(TypeError):
+        found.configuration['axis']['modes'] = ()
 
 
 def test_every_signal_of_the_drive_gets_its_unit_from_the_wiring() -> None:

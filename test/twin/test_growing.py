@@ -16,17 +16,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+import time
 from typing import Any
 
 from antenna_drive.errors import UserError
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.recording import make_channel, Recording
+from antenna_drive.recording.sheet import TestSheet
 from antenna_drive.twin.growing import FIRST_S, GrowingVerdict, look_of
-from antenna_drive.twin.intake import COMMAND
+from antenna_drive.twin.intake import COMMAND, Intake
+from antenna_drive.workers import worker_processes
 from later import Later
 import numpy as np
 import pytest
+from worker_tasks import lengths_found
 
 
 def test_of(seconds: float) -> Recording:
@@ -105,7 +109,8 @@ def test_look_that_fails_is_told_and_the_next_one_made() -> None:
     growing, later, _ = grown(-1.0, 0.5)
     look(growing, later, 16.0)
     assert growing.message()['fault'] == 'too short'
-    look(growing, later, 16.0)
+    assert not growing.due(16.0), 'the same would fail again'
+    look(growing, later, 21.0)
     assert growing.message()['fault'] == ''
     assert growing.planning == {'inflation': 0.5}
 
@@ -117,3 +122,17 @@ def test_probabilities_of_a_look_are_those_of_the_diagnosis() -> None:
     assert found.first == ('motor_1.gap',)
     assert sum(found.probabilities.values()) == pytest.approx(1.0)
     assert found.evidence == pytest.approx(99.0)
+
+
+def test_a_look_in_another_process_gets_what_the_drive_has_sent() -> None:
+    intake = Intake(60.0)
+    for k in range(2001):
+        intake.put(COMMAND, k * 10_000_000, 1e-3)
+    with worker_processes(1) as executor:
+        growing = GrowingVerdict(executor, load(), diagnose=lengths_found)
+        assert growing.due(intake.span_s())
+        growing.begin(intake.recording(TestSheet(circuit='new'), None))
+        while not growing.take():
+            time.sleep(0.01)
+    assert growing.looks[-1].first == ('test 1, 2001 samples',)
+    assert growing.planning == {'circuit': load().torque_share.circuit.saturation_high}
