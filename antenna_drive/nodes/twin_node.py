@@ -146,7 +146,7 @@ class _TwinNode:
         self._next: NextTest | None = None
         self._asked = Event()
         if switches['verdict']:
-            executor = stack.enter_context(worker_processes(1))
+            executor = stack.enter_context(worker_processes(1, finish=False))
             executor.submit(os.nice, _NICE)
             self._growing, self._next = GrowingVerdict(executor, drive), NextTest(executor, drive)
         self._since: int | None = None

@@ -26,23 +26,37 @@ from antenna_drive.programs import end_with_parent
 
 
 @contextmanager
-def worker_processes(count: int) -> Iterator[ProcessPoolExecutor]:
+def worker_processes(count: int, finish: bool = True) -> Iterator[ProcessPoolExecutor]:
     """
     Yield a pool of processes; end them at once after an error.
 
     Ctrl-C in a terminal goes to all of them, but only the parent answers it. If the parent is
     killed, the kernel ends them (on Linux).
+
+    Parameters
+    ----------
+    count
+        how many
+    finish
+        whether what they have begun is finished when the context ends without an error
+
     """
     pool = ProcessPoolExecutor(count, initializer=_become_worker, initargs=(os.getpid(),))
     try:
         yield pool
     except BaseException:
-        # public from Python 3.14 on, as terminate_workers
-        for process in list((pool._processes or {}).values()):
-            process.terminate()
-        pool.shutdown(cancel_futures=True)
+        _end(pool)
         raise
+    if not finish:
+        _end(pool)
     pool.shutdown()
+
+
+def _end(pool: ProcessPoolExecutor) -> None:
+    # public from Python 3.14 on, as terminate_workers
+    for process in list((pool._processes or {}).values()):
+        process.terminate()
+    pool.shutdown(cancel_futures=True)
 
 
 def expect_overflow() -> None:

@@ -19,7 +19,7 @@ import json
 from pathlib import Path
 import re
 
-from antenna_drive.cli.twin_trial import of_verdicts
+from antenna_drive.cli.twin_trial import of_onsets, of_verdicts
 from antenna_drive.trial.scorecard import score
 from antenna_drive.trial.scored_cases import read_scored
 import pytest
@@ -93,3 +93,17 @@ def test_figures_of_growing_verdicts_are_those_of_their_cases() -> None:
         ':', ' as after 90 s:'))
     seconds = rows['seconds of testing, median'][0].partition(' (')[0]
     assert same.endswith(f'median {seconds} s of testing')
+
+
+def test_figures_of_the_twin_on_topics_are_those_of_its_cases() -> None:
+    file = DOCS / 'trials' / 'twin_topics_2.jsonl'
+    *_, told, _ = of_onsets(
+        [json.loads(line) for line in file.read_text(encoding='utf-8').splitlines()])
+    text = (DOCS / 'twin.md').read_text(encoding='utf-8')
+    rows = {cells[0]: cells[1] for line in text.splitlines() if len(cells := [
+        cell.strip() for cell in line.strip('|').split('|')]) == 4}
+    soon, later, never, middle, alarms = (rows[name].partition(',')[0] for name in (
+        'gap told in 10 s', 'told later', 'never told', 'median to the alarm',
+        'false alarms before the onset'))
+    assert told == (f'told within 10 s: {soon} of 20; later: {later}; never: {never}; median '
+                    f'{middle}; alarms before the onset: {0 if alarms == "none" else alarms}')

@@ -17,11 +17,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
+from pathlib import Path
+import time
 from typing import Any
 
-from antenna_drive.workers import TaskLost, Workers, workers
+from antenna_drive.workers import TaskLost, worker_processes, Workers, workers
 import pytest
 import worker_tasks
+from worker_tasks import square, told
 
 
 @pytest.mark.parametrize('threads', [False, True])
@@ -91,3 +94,13 @@ def test_a_process_that_dies_is_told() -> None:
         with workers(1) as pool:
             for _, result in pool.each(worker_tasks.end_worker, [(1,)]):
                 result()
+
+
+def test_what_nobody_waits_for_is_not_finished(tmp_path: Path) -> None:
+    with worker_processes(1, finish=False) as pool:
+        pool.submit(square, 3).result()
+        [worker] = (pool._processes or {}).values()
+        pool.submit(told, str(tmp_path), 0, 1)  # waits for ever
+        while not list(tmp_path.glob('waiting-0')):
+            time.sleep(0.01)
+    assert not worker.is_alive()
