@@ -150,6 +150,7 @@ class _TwinNode:
             executor.submit(os.nice, _NICE)
             self._growing, self._next = GrowingVerdict(executor, drive), NextTest(executor, drive)
         self._since: int | None = None
+        self._stretch = 0
         self._even = RegularSamples() if self._map.has_stamps_of_messages else None
         self._connect(self._map)
         self._taken_at = time.monotonic()
@@ -252,6 +253,9 @@ class _TwinNode:
         if growing is None or following is None:
             return
         intake, sheet = self._twin.intake, self._twin.sheet
+        if intake.stretch != self._stretch:
+            # nothing older than a pause or a jump of the time is kept
+            self._stretch, self._since = intake.stretch, None
         if not self._tests.empty():
             self._tests.get()
             growing.complete(intake.recording(sheet, self._since))
