@@ -82,9 +82,9 @@ class Card {
       make('th', row, key.slice(4), {scope: 'row'});
       make('td', row, value.replace(/^[^:]*: /, '').replace(/, since stamp.*$/, ''));
     }
-    this.about.textContent = `watched: ${told.values.watched}. ${told.values.tuning}. `
-      + `${told.values['false alarms per day']} false alarms a day are allowed. `
-      + `${told.values['blocks judged']} s judged.`;
+    const {values} = told;
+    this.about.textContent = `watched: ${values.watched}; tuning: ${values.tuning}; judged: `
+      + `${values['blocks judged']} s; false alarms a day: ${values['false alarms per day']}`;
     this.showNext(told.next_test);
     if (JSON.stringify(told.verdict) === JSON.stringify(this.verdict)) return;
     this.verdict = told.verdict;
