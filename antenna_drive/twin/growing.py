@@ -23,13 +23,13 @@ has ended: it says what `antenna-drive diagnose` says of the same tests.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from concurrent.futures import BrokenExecutor, Executor, Future
+from concurrent.futures import Executor, Future
 from typing import Any
 
-from antenna_drive.errors import one_line
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.recording import Recording
 from antenna_drive.twin.intake import COMMAND
+from antenna_drive.twin.outcome import outcome
 from antenna_drive.twin.sequential import Answer, decided, Look, Rule
 
 # The first look [s of testing], and how much more there has to be for the next one. A test that
@@ -133,15 +133,10 @@ class GrowingVerdict:
             return False
         future, lengths_s = self._running
         self._running = None
-        try:
-            result = future.result()
+        result, self.fault = outcome(future)
+        if result is not None:
             self.looks.append(look_of(result, lengths_s))
             self.planning = result['planning']
-            self.fault = ''
-        except BrokenExecutor:
-            raise
-        except Exception as error:  # noqa: B902 (the twin watches on, whatever a look fails of)
-            self.fault = one_line(error, 300)
         return True
 
     def message(self) -> dict[str, Any]:

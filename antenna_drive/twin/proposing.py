@@ -21,12 +21,13 @@ for every look.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import BrokenExecutor, Executor, Future
+from concurrent.futures import Executor, Future
 from typing import Any
 
-from antenna_drive.errors import one_line, UserError
+from antenna_drive.errors import UserError
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.sheet import dump_sheet, parse_sheet
+from antenna_drive.twin.outcome import outcome
 
 DURATION_S = 30.0
 Design = Callable[[Mapping[str, Any], Drive], dict[str, Any]]
@@ -118,12 +119,8 @@ class NextTest:
         if self._running is None or not self._running.done():
             return False
         future, self._running = self._running, None
-        try:
-            self._found = future.result()
-        except BrokenExecutor:
-            raise
-        except Exception as error:  # noqa: B902 (the twin watches on, whatever a design fails of)
-            self.fault = one_line(error, 300)
+        found, self.fault = outcome(future)
+        self._found = found or {}
         return True
 
     def message(self) -> dict[str, Any]:

@@ -16,6 +16,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import BrokenExecutor
 import time
 from typing import Any
 
@@ -136,3 +137,34 @@ def test_a_look_in_another_process_gets_what_the_drive_has_sent() -> None:
             time.sleep(0.01)
     assert growing.looks[-1].first == ('test 1, 2001 samples',)
     assert growing.planning == {'circuit': load().torque_share.circuit.saturation_high}
+
+
+class Faulty:
+    """Stands for a diagnosis with a fault of its own, or one that takes very long."""
+
+    def __init__(self, long: bool) -> None:
+        self._long = long
+
+    def __call__(self, recordings: Mapping[str, Recording], drive: Drive) -> dict[str, Any]:
+        if self._long:
+            time.sleep(3600.0)
+        raise ZeroDivisionError('of nothing')
+
+
+@pytest.mark.parametrize('long', [False, True], ids=['a fault', 'killed'])
+def test_a_fault_of_a_look_is_told_and_the_end_of_its_process_raised(long: bool) -> None:
+    with worker_processes(1, finish=False) as executor:
+        growing = GrowingVerdict(executor, load(), diagnose=Faulty(long))
+        growing.begin(test_of(16.0))
+        if not long:
+            while not growing.take():
+                time.sleep(0.01)
+            assert growing.message()['fault'] == 'of nothing'
+            return
+        while not executor._processes:
+            time.sleep(0.01)
+        for process in list(executor._processes.values()):
+            process.kill()
+        with pytest.raises(BrokenExecutor):
+            while not growing.take():
+                time.sleep(0.01)
