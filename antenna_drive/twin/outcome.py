@@ -16,15 +16,14 @@
 from __future__ import annotations
 
 from concurrent.futures import BrokenExecutor, Future
-from typing import TypeVar
+from typing import Any
 
 from antenna_drive.errors import one_line
 
-Found = TypeVar('Found')
 _LONGEST = 300
 
 
-def outcome(future: Future[Found]) -> tuple[Found | None, str]:
+def outcome(future: Future[dict[str, Any]]) -> tuple[dict[str, Any] | None, str]:
     """
     Return what a task that has ended has found, None if it has failed, and why, '' if it has not.
 
