@@ -155,7 +155,9 @@ class DriveLink:
     def _diagnosed(self, message: DiagnosticArray) -> None:
         for status in message.status:
             unit = self._unit_of(status.name)
-            if unit is not None:
+            if unit is None:
+                self.twins.take(status)
+            else:
                 self._reports[unit] = {
                     'level': ord(status.level), 'message': status.message[:300],
                     'values': {item.key[:80]: item.value[:200] for item in status.values[:40]},

@@ -28,49 +28,47 @@ from typing import Any
 from antenna_drive.errors import UserError
 from antenna_drive.live.asking import ask
 from antenna_drive.live.board import Board
-from diagnostic_msgs.msg import DiagnosticArray
+from antenna_drive.lockstep.run_services import STATE_QOS
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Empty, String
 from std_srvs.srv import Trigger
 
 # A report that has these values is that of a twin.
 _REPORTED = {'state', 'tuning', 'watched', 'false alarms per day'}
 _MOST, _LONGEST, _LOOKS, _ANSWERS, _LINES = 8, 200_000, 200, 12, 40
-_KEPT = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Twins:
     """Listens to every twin, and asks what a page wants of one."""
 
     def __init__(self, node: Node, board: Board) -> None:
-        """Listen; news goes to the board."""
+        """Begin with none; news goes to the board."""
         self._node, self._board = node, board
         self._told: dict[str, dict[str, Any]] = {}
         self._begins: dict[str, Any] = {}
         self._proposes: dict[str, Any] = {}
-        node.create_subscription(DiagnosticArray, '/diagnostics', self._diagnosed, 50)
 
-    def _diagnosed(self, message: DiagnosticArray) -> None:
-        for status in message.status:
-            values = {item.key[:80]: item.value[:300] for item in status.values[:80]}
-            if not _REPORTED <= values.keys():
-                continue
-            if status.name not in self._told:
-                if len(self._told) >= _MOST:
-                    continue
-                self._meet(status.name)
-            told = self._told[status.name]
-            told.update(level=ord(status.level), message=status.message[:600], values=values,
-                        reports=told['reports'] + 1)
-            self._post(status.name)
+    def take(self, status: DiagnosticStatus) -> None:
+        """Take what somebody reports in /diagnostics; what is not of a twin is left out."""
+        values = {item.key[:80]: item.value[:300] for item in status.values[:80]}
+        if not _REPORTED <= values.keys():
+            return
+        if status.name not in self._told:
+            if len(self._told) >= _MOST:
+                return
+            self._meet(status.name)
+        told = self._told[status.name]
+        told.update(level=ord(status.level), message=status.message[:600], values=values,
+                    reports=told['reports'] + 1)
+        self._post(status.name)
 
     def _meet(self, name: str) -> None:
         """Listen to a twin that reports for the first time."""
         self._told[name] = {'name': name, 'reports': 0, 'verdict': None, 'next_test': None}
         for topic, read in (('verdict', verdict_of), ('next_test', next_test_of)):
             self._node.create_subscription(String, f'{name}/{topic}',
-                                           self._listener(name, topic, read), _KEPT)
+                                           self._listener(name, topic, read), STATE_QOS)
         self._begins[name] = self._node.create_publisher(Empty, f'{name}/begin_test', 1)
         self._proposes[name] = self._node.create_client(Trigger, f'{name}/propose')
 

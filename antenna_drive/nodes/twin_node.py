@@ -33,6 +33,7 @@ from antenna_drive.lockstep.diagnostics import diagnostics
 from antenna_drive.lockstep.entry import ros_node, stopped_by_signals
 from antenna_drive.lockstep.getting_ready import told_while_compiling
 from antenna_drive.lockstep.ros_parameters import Overrides
+from antenna_drive.lockstep.run_services import STATE_QOS
 from antenna_drive.lockstep.serving import Serving
 from antenna_drive.machines.antenna.tuned import loaded, tuned
 from antenna_drive.parameters.loading import load
@@ -50,7 +51,7 @@ from antenna_drive.twin.watch import Twin, TwinSettings
 from antenna_drive.workers import worker_processes
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Empty, Float64, Float64MultiArray, String
 from std_srvs.srv import Trigger
 
@@ -59,8 +60,6 @@ OK = 0
 # Best effort matches every publisher. There is room for some seconds of messages.
 _FROM_REAL = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
 _OUT = QoSProfile(depth=100)
-# Whoever comes later hears the last one.
-_KEPT = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 # The diagnosis yields to the drive and the twin.
 _NICE = 10
 _PERIOD_S = 0.05
@@ -168,8 +167,8 @@ class _TwinNode:
                      for middle in ('', 'residual/')]
             for signal in CHANNELS if signal in names}
         self._diagnostics = self._node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self._verdict = self._node.create_publisher(String, f'{name}/verdict', _KEPT)
-        self._next_test = self._node.create_publisher(String, f'{name}/next_test', _KEPT)
+        self._verdict = self._node.create_publisher(String, f'{name}/verdict', STATE_QOS)
+        self._next_test = self._node.create_publisher(String, f'{name}/next_test', STATE_QOS)
         self._node.create_service(Trigger, f'{name}/propose', self._propose)
         self._node.create_subscription(Empty, f'{name}/begin_test',
                                        lambda message: self._tests.put(None), 1)

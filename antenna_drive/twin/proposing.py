@@ -67,7 +67,7 @@ def designed(planning: Mapping[str, Any], drive: Drive) -> dict[str, Any]:
         raise UserError(f'{error.args[0]}: this configuration knows no such effect') from error
     data = as_data(found, space)
     return {'say': [line.strip() for line in lines(data)], 'test': data['test'],
-            'sheet': dump_sheet(parse_sheet(data['test'])) if data['test'] else ''}
+            'sheet': dump_sheet(found.tests[0].test) if found.tests else ''}
 
 
 class NextTest:

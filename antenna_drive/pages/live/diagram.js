@@ -1,6 +1,6 @@
 // The block diagram of the article's Figs. 4 to 6 with live numbers. Two layouts: wide, and tall for
 // a phone.
-import {digits} from './elements.js';
+import {digits, draw} from './elements.js';
 
 const HEIGHT = 52;
 // Block: label, and the signals that it shows with a short name, if it shows several.
@@ -53,7 +53,6 @@ const TALL = {
     ['motor_1/gear_torque', 'M91 316 V350'], ['motor_2/gear_torque', 'M281 316 V350'],
     ['motor_1/gear_torque', 'M120 402 V426'], ['motor_2/gear_torque', 'M252 402 V426'],
     ['plant/axis_rate', 'M130 478 V494'], ['plant/pointing_error_elevation', 'M242 478 V494']]};
-const SPACE = 'http://www.w3.org/2000/svg';
 // An arrow is as wide as its signal is, against the greatest of late.
 const FORGET = 0.999;
 
@@ -72,22 +71,12 @@ export class Diagram {
 
   build() {
     const {box, places, flows} = this.narrow.matches ? TALL : WIDE;
-    const svg = document.createElementNS(SPACE, 'svg');
-    const add = (name, attributes, text = '') => {
-      const element = document.createElementNS(SPACE, name);
-      for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
-      element.textContent = text;
-      svg.append(element);
-      return element;
-    };
-    svg.setAttribute('viewBox', box.join(' '));
-    svg.setAttribute('role', 'img');
-    svg.setAttribute('aria-label', 'block diagram of the drive with live values');
+    const svg = draw('svg', null, '', {viewBox: box.join(' '), role: 'img',
+      'aria-label': 'block diagram of the drive with live values'});
+    const add = (name, attributes, text = '') => draw(name, svg, text, attributes);
     const marker = add('marker', {id: 'tip', viewBox: '0 0 8 8', refX: 7, refY: 4, markerWidth: 8,
                                   markerHeight: 8, markerUnits: 'userSpaceOnUse', orient: 'auto'});
-    const tip = document.createElementNS(SPACE, 'path');
-    tip.setAttribute('d', 'M0 0 L8 4 L0 8 z');
-    marker.append(tip);
+    draw('path', marker, '', {d: 'M0 0 L8 4 L0 8 z'});
     this.flows = flows.map(([name, d]) => [name, add('path', {
       d, class: 'flow', 'marker-end': 'url(#tip)'})]);
     this.texts = Object.entries(places).map(([key, [x, y, width]]) => {

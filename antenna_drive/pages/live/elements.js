@@ -1,7 +1,15 @@
 // Small helpers: elements, numbers for people, and a line at the bottom of the page.
 
 export function make(name, parent, text = '', attributes = {}) {
-  const element = document.createElement(name);
+  return finished(document.createElement(name), parent, text, attributes);
+}
+
+export function draw(name, parent, text = '', attributes = {}) {
+  return finished(document.createElementNS('http://www.w3.org/2000/svg', name), parent, text,
+                  attributes);
+}
+
+function finished(element, parent, text, attributes) {
   element.textContent = text;
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
   parent?.append(element);
@@ -32,6 +40,10 @@ export function digits(value, most = 4) {
 export function plain(value) {
   return String(Number(value.toPrecision(7)));
 }
+
+// The class of a level of /diagnostics.
+const LEVELS = ['OK', 'WARN', 'ERROR', 'STALE'];
+export const levelClass = level => `level-${LEVELS[level] || 'ERROR'}`;
 
 let hiding = 0;
 export function say(text) {

@@ -1,7 +1,6 @@
 // What each node says of itself in /diagnostics, and the last changes of parameters.
-import {make, plain} from './elements.js';
+import {levelClass, make, plain} from './elements.js';
 
-const LEVELS = ['OK', 'WARN', 'ERROR', 'STALE'];
 const MOST = 12;
 
 export class Nodes {
@@ -42,7 +41,7 @@ export class Nodes {
       const row = make('tr', this.reports);
       make('th', row, unit, {scope: 'row'});
       const cell = make('td', row);
-      make('span', cell, said.message, {class: `level-${LEVELS[said.level] || 'ERROR'}`});
+      make('span', cell, said.message, {class: levelClass(said.level)});
       const more = ['late steps', 'exchange', 'refused frames'].filter(key => key in said.values)
         .map(key => `${key}: ${said.values[key]}`).join(', ');
       make('div', cell, `step ${said.values.step}, ${more}`, {class: 'small'});

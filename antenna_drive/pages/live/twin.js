@@ -1,8 +1,7 @@
 // The twins: whether drive and twin agree, the verdict as it grows, and the next test.
-import {colour, dark, make, say} from './elements.js';
+import {colour, dark, levelClass, make, say} from './elements.js';
 import {lines} from './verdict_chart.js';
 
-const LEVELS = ['OK', 'WARN', 'ERROR', 'STALE'];
 const SILENT_MS = 3500;
 const SHOWN = 6;
 
@@ -75,7 +74,7 @@ class Card {
     if (told.reports !== this.reports) this.heard = performance.now();
     this.reports = told.reports;
     this.state.textContent = told.message;
-    this.state.className = `level-${LEVELS[told.level] || 'ERROR'}`;
+    this.state.className = levelClass(told.level);
     this.gaps.replaceChildren();
     for (const [key, value] of Object.entries(told.values).filter(([k]) => k.startsWith('gap '))) {
       const row = make('tr', this.gaps);
