@@ -140,6 +140,37 @@ def test_what_two_recordings_agree_on_holds_for_both() -> None:
     assert [sheet.circuit for sheet in sheets] == ['old', 'old']
 
 
+@pytest.mark.parametrize('setting', [0.8, 0.78, 0.4])
+@pytest.mark.parametrize('scale', [0.98, 1.02, 1.2])
+def test_a_sheet_beside_others_without_tells_what_the_pot_does(
+        setting: float, scale: float) -> None:
+    """A pot does a little more or less than its setting says, in each recording."""
+    drive = drive_of('new', 'new', pot=0.8 * scale)
+    told = TestSheet(circuit='new', filter_1='new', bias=CircuitBias(setting, 'steady'))
+    sheets, notes = inferred(
+        field_run(drive, 25.0, **SLOW_SQUARE), field_run(drive, 25.0, **FAST_TRIANGLE),
+        field_run(drive_of('new', 'new', pot=setting * scale), 25.0, told, **FAST_TRIANGLE))
+    assert sheets[2] == told
+    for sheet in sheets[:2]:
+        assert isinstance(sheet.bias, CircuitBias)
+        assert sheet.bias.bias_pot == pytest.approx(0.8, rel=0.003)
+        assert sheet.circuit == 'new'
+    # the same setting is the same number
+    assert setting != 0.8 or sheets[0].bias == CircuitBias(0.8, 'steady')
+    assert not any('believed' in note for note in notes)
+
+
+def test_constant_voltages_stay_the_circuit_s_beside_a_test_with_another_pot() -> None:
+    drive = drive_of('new', 'new')
+    told = TestSheet(circuit='new', filter_1='new', bias=CircuitBias(0.4, 'steady'))
+    sheets, _ = inferred(
+        field_run(drive, 25.0, **SLOW_SQUARE), field_run(drive, 25.0, **SLOW_SQUARE),
+        field_run(drive_of('new', 'new', pot=0.4), 25.0, told, **FAST_TRIANGLE))
+    for sheet in sheets[:2]:
+        assert isinstance(sheet.bias, CircuitBias)
+        assert sheet.bias.bias_pot == pytest.approx(0.8, rel=0.003)
+
+
 def test_a_circuit_of_its_own_in_the_configuration_is_kept() -> None:
     """Constants of neither column of Table 1."""
     own = changed(drive_of('new', 'new', 'zero'), {

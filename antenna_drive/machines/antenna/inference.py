@@ -48,8 +48,8 @@ STARTS = ('steady', 'zero')
 _CONSTANT_V, _STEP_V = 0.06, 0.2
 # Share of samples of a source that may lie farther off than a step.
 _ASTRAY = 0.005
-# Pots are the same within this share.
-_SAME_POT = 0.03
+# Pots are the same within this share; a pot is at the setting of a sheet within this one.
+_SAME_POT, _SAME_SETTING = 0.03, 0.005
 # A pot of a sheet is doubted if it is off by this share.
 _OTHER_POT = 0.25
 # Settings of the fade-out that are tried, as factors to the configured one. Another one than
@@ -155,24 +155,36 @@ def _from_circuit(recordings: list[FieldRecording], constant: Sequence[int],
     Return recordings with the circuit as the source of constant voltages that it may have made.
 
     A small load leaves the circuit at its upper limit, where it gives a constant voltage as a
-    fixed source does. It is the circuit if other recordings have the same pot.
+    fixed source does. It is the circuit if other recordings have the same pot. A pot that a sheet
+    gives may have been set for that test alone.
     """
     pots = {k: pot for k in constant if (pot := _saturated(recordings[k], drive)) is not None}
     certain = [recording for recording in recordings
                if isinstance(recording.sheet.bias, CircuitBias) and _can_be_fed(recording)]
+    known: list[float] = []
     if certain:
-        known = min((_fit(certain, circuit, drive) for circuit in CIRCUITS),
-                    key=lambda fit: fit.misfit).pot
-    else:
+        known += min((_fit(certain, circuit, drive) for circuit in CIRCUITS),
+                     key=lambda fit: fit.misfit).pots
+    if pots and None not in _settings(certain):
         def agreeing(pot: float) -> tuple[int, float]:
-            near = sum(abs(other / pot - 1.0) < _SAME_POT for other in pots.values())
+            near = sum(_same(other, pot, _SAME_POT) for other in pots.values())
             return near, -abs(pot - drive.torque_share.circuit.bias_pot)
-        known = max(pots.values(), key=agreeing, default=0.0)
+        known.append(max(pots.values(), key=agreeing))
     found = list(recordings)
     for k, pot in pots.items():
-        if abs(pot - known) < _SAME_POT * known:
+        if any(_same(pot, other, _SAME_POT) for other in known):
             found[k] = _told(recordings[k], bias=CircuitBias())
     return found
+
+
+def _same(pot: float, other: float, share: float) -> bool:
+    return abs(pot - other) < share * other
+
+
+def _settings(recordings: Sequence[FieldRecording]) -> list[float | None]:
+    """Return the setting of the pot that each sheet gives."""
+    return [recording.sheet.bias.bias_pot if isinstance(recording.sheet.bias, CircuitBias)
+            else None for recording in recordings]
 
 
 def _saturated(recording: FieldRecording, drive: Drive) -> float | None:
@@ -218,11 +230,27 @@ def _source(time: FloatArray, voltage: FloatArray) -> CircuitBias | FixedBias | 
 
 @dataclass(frozen=True)
 class _Fit:
-    """How well one circuit fits all recordings: misfit, pot, and the start of each recording."""
+    """
+    How well one circuit fits all recordings.
+
+    Attributes
+    ----------
+    misfit : mean of what is off [V]
+    scale : what the pot does over what the sheets say of it; 1 if they do not
+    settings : of the pot, for each recording: that of its sheet, or one that fits
+    starts : of the circuit, for each recording
+
+    """
 
     misfit: float
-    pot: float
+    scale: float
+    settings: tuple[float, ...]
     starts: tuple[str, ...]
+
+    @property
+    def pots(self) -> tuple[float, ...]:
+        """Return for each recording what the pot does."""
+        return tuple(self.scale * setting for setting in self.settings)
 
 
 def _with_circuit(recordings: list[FieldRecording], drive: Drive,
@@ -255,17 +283,17 @@ def _with_circuit(recordings: list[FieldRecording], drive: Drive,
     if not given and own.misfit <= _CLEAR * fit.misfit and not _of_table('circuit', drive):
         told, fit = None, own
         note('circuit: the configured constants fit as well: as configured')
-    for k, start in zip(fed, fit.starts, strict=True):
+    for k, setting, pot, start in zip(fed, fit.settings, fit.pots, fit.starts, strict=True):
         bias = recordings[k].sheet.bias
         assert isinstance(bias, CircuitBias)
         added: dict[str, Any] = {}
         known = ''
         if bias.bias_pot is None:
-            added['bias_pot'] = fit.pot
+            added['bias_pot'] = setting
             known = f' (configured {drive.torque_share.circuit.bias_pot:g})'
-        elif abs(fit.pot / bias.bias_pot - 1.0) > _OTHER_POT:
+        elif abs(fit.scale - 1.0) > _OTHER_POT:
             note(f'{recordings[k].name}: the sheet gives bias_pot {bias.bias_pot:g}, the bias '
-                 f'voltage looks like {fit.pot:.2f}; the sheet is believed')
+                 f'voltage looks like {pot:.2f}; the sheet is believed')
         if bias.start is None:
             added['start'] = start
         if added:
@@ -279,7 +307,7 @@ def _with_circuit(recordings: list[FieldRecording], drive: Drive,
 def _fit(recordings: Sequence[FieldRecording], circuit: str | None, drive: Drive) -> _Fit:
     """Feed a circuit with the recorded currents, and compare its voltage with the recorded one."""
     fed = [_fed(recording) for recording in recordings]
-    whole = np.concatenate([voltage for voltage, _ in fed])
+    voltages, given = [voltage for voltage, _ in fed], _settings(recordings)
     fits = []
     # the fade-out may be set otherwise than configured: that is no reason to doubt the circuit
     for factor in _FADE_OUTS:
@@ -295,11 +323,36 @@ def _fit(recordings: Sequence[FieldRecording], circuit: str | None, drive: Drive
                        for start, shape in tried.items()}
             starts.append(min(misfits, key=lambda start: misfits[start]))
             shapes.append(tried[starts[-1]])
-        shape = np.concatenate(shapes)
-        pot = _pot(whole, shape)
-        misfit = _misfit(whole, shape, pot) * (1.0 if factor == 1.0 else _ODD)
-        fits.append(_Fit(misfit, round(min(pot, 1.0), 3), tuple(starts)))
+        scale, settings = _pots(voltages, shapes, given)
+        misfit = _misfit(np.concatenate(voltages), np.concatenate(
+            [setting * shape for setting, shape in zip(settings, shapes, strict=True)]), scale)
+        fits.append(_Fit(misfit * (1.0 if factor == 1.0 else _ODD), scale, settings,
+                         tuple(starts)))
     return min(fits, key=lambda fit: fit.misfit)
+
+
+def _pots(voltages: Sequence[FloatArray], shapes: Sequence[FloatArray],
+          given: Sequence[float | None]) -> tuple[float, tuple[float, ...]]:
+    """
+    Return the scale of the pot and its setting in each recording.
+
+    The pot of a real machine does a little more or less than its setting says, in every
+    recording. Where sheets give settings they tell how much. The others share one setting, which
+    is that of a sheet if it is nearly the same.
+    """
+    def fitted(of_a_sheet: bool) -> float:
+        chosen = [(voltage, shape if setting is None else setting * shape)
+                  for voltage, shape, setting in zip(voltages, shapes, given, strict=True)
+                  if (setting is not None) == of_a_sheet]
+        return _pot(np.concatenate([voltage for voltage, _ in chosen]),
+                    np.concatenate([shape for _, shape in chosen])) if chosen else 0.0
+
+    scale = fitted(True) or 1.0
+    own = fitted(False) / scale
+    said = [setting for setting in given
+            if setting is not None and _same(own, setting, _SAME_SETTING)]
+    own = min(said, key=lambda setting: abs(setting - own)) if said else round(min(own, 1.0), 3)
+    return scale, tuple(own if setting is None else setting for setting in given)
 
 
 def _share(circuit: str | None, drive: Drive) -> TorqueShare:
