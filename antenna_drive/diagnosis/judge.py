@@ -29,7 +29,7 @@ from statistics import fmean
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.intervals import covariance, inflation
 from antenna_drive.diagnosis.least_squares import (
-    FitState, LeastSquares, prior_precision, settled, weighted_product, with_initial_conditions,
+    FitState, LeastSquares, led, prior_precision, settled, weighted_product, with_initial_conditions,
 )
 from antenna_drive.diagnosis.machine import FloatArray, Form, Machine, Parameter
 from antenna_drive.diagnosis.settings import Settings
@@ -145,6 +145,8 @@ class Judge:
             if (at := with_initial_conditions(problem, begin)) != begin:
                 moved = problem.start(found.parameters, at, found.jacobian)
                 starts.append(problem.fit(moved, options.iterations))
+            if not self._best.has_course:
+                starts.append(led(problem, found, self._settings.search))
             found = min((problem.fit(problem.refreshed(state), options.iterations)
                          for state in starts), key=lambda state: state.cost)
             if before - found.cost < self._settings.fit.least_gain:

@@ -135,6 +135,18 @@ class LeastSquares:
         """Return the same problem at another noise scale."""
         return LeastSquares(self.machine, scale=scale, settings=self.settings)
 
+    def of_experiment(self, experiment: int) -> LeastSquares:
+        """Return the problem in which one experiment alone counts, at the sensors' own noise."""
+        return LeastSquares(self.machine, [
+            np.full(e.time.size, k == experiment) for k, e in enumerate(self.experiments)],
+            settings=self.settings)
+
+    def best_fitted(self, state: FitState) -> int:
+        """Return the experiment with the least loss per sample."""
+        return int(np.argmin([
+            self.loss(state.residual[self.rows(k)]) / max(self.valid[self.rows(k)].sum(), 1)
+            for k in range(len(self.experiments))]))
+
     def rows(self, experiment: int) -> slice:
         """Return where an experiment's residuals lie."""
         end = int(self.ends[experiment])
@@ -299,6 +311,11 @@ class LeastSquares:
                 for p, seen in zip(state.parameters, visible.tolist(), strict=True)
                 if not p.is_shape}
 
+    def cost_at(self, parameters: Sequence[Parameter], point: Point) -> float:
+        """Return the cost of a point."""
+        x = np.array([point[p.name] for p in parameters])
+        return self._cost(self.residuals(dict(point)), x, prior_precision(parameters))
+
     def extended(self, state: FitState, parameters: Sequence[Parameter],
                  values: Sequence[float], columns: Jacobian) -> FitState:
         """Return the state with more parameters, at these values, with these derivatives."""
@@ -453,6 +470,36 @@ def settled(problem: LeastSquares, state: FitState, options: SearchSettings, pas
         if before - state.cost < max(options.settled, options.final_gain * before):
             break
     return state
+
+
+def led(problem: LeastSquares, state: FitState, options: SearchSettings) -> FitState:
+    """
+    Return a fit that was led out of a local minimum, or the given one if that gains nothing.
+
+    Where motors stick and slip, the cost of a test has many minima, and a slow test holds the fit
+    to all of them in one. The cost of a test that moves smoothly leads to its optimum. So the
+    test that fits best is fitted alone, and all of them from there.
+
+    Parameters
+    ----------
+    problem, state
+        the fit to all experiments, after it has stopped
+    options
+        how long a fit goes on
+
+    """
+    if len(problem.experiments) < 2:
+        return state
+    alone = problem.of_experiment(problem.best_fitted(state))
+    ahead = alone.fit(alone.start(state.parameters, state.point()), options.settling_iterations)
+    ahead = settled(alone, ahead, options, options.final_passes, options.settling_iterations)
+    point = with_initial_conditions(problem, ahead.point())
+    # the right one fits the others better at once
+    if problem.cost_at(state.parameters, point) >= state.cost:
+        return state
+    found = problem.fit(problem.start(state.parameters, point), options.settling_iterations)
+    found = settled(problem, found, options, options.final_passes, options.settling_iterations)
+    return min(state, found, key=lambda fit: fit.cost)
 
 
 def least_cost(problem: LeastSquares, trials: Sequence[dict[str, float]], experiment: int,

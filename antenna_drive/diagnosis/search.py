@@ -36,7 +36,7 @@ from typing import Any, TypeVar
 
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.least_squares import (
-    FitState, Jacobian, LeastSquares, settled, with_initial_conditions,
+    FitState, Jacobian, LeastSquares, led, settled, with_initial_conditions,
 )
 from antenna_drive.diagnosis.machine import Effect, Form, Point
 from antenna_drive.diagnosis.refitting import dropped, refitted, shared_jacobian
@@ -261,9 +261,11 @@ class Search:
         options = self.settings
 
         def went_on(hypothesis: Hypothesis) -> Hypothesis:
-            return replace(hypothesis, state=settled(
-                self.problem, hypothesis.state, options, options.settling_passes,
-                options.settling_iterations))
+            state = settled(self.problem, hypothesis.state, options, options.settling_passes,
+                            options.settling_iterations)
+            if self.problem.leaves_much(state) and not hypothesis.has_course:
+                state = led(self.problem, state, options)
+            return replace(hypothesis, state=state)
 
         leading = self._pool.map(went_on, hypotheses[:count])
         return sorted([*leading, *hypotheses[count:]], key=self._priced)
