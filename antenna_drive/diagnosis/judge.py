@@ -102,6 +102,8 @@ class Judge:
             slopes.for_part(part, own) for slopes in (self._neutral, self._with)], self._settings)
         if not self._best.effects:
             return problem, found, found
+        if problem.leaves_much(found) and not self._best.has_course:
+            found = led(problem, found, self._settings.search)
         found = self._finished(problem, found)
         # The fit without effects begins where the one with them ended. It is run to its end only
         # where that could matter.
@@ -145,8 +147,6 @@ class Judge:
             if (at := with_initial_conditions(problem, begin)) != begin:
                 moved = problem.start(found.parameters, at, found.jacobian)
                 starts.append(problem.fit(moved, options.iterations))
-            if not self._best.has_course:
-                starts.append(led(problem, found, self._settings.search))
             found = min((problem.fit(problem.refreshed(state), options.iterations)
                          for state in starts), key=lambda state: state.cost)
             if before - found.cost < self._settings.fit.least_gain:

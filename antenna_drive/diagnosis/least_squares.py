@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+import math
 from types import MappingProxyType
 
 from antenna_drive.diagnosis.box_qp import box_constrained_step
@@ -311,11 +312,6 @@ class LeastSquares:
                 for p, seen in zip(state.parameters, visible.tolist(), strict=True)
                 if not p.is_shape}
 
-    def cost_at(self, parameters: Sequence[Parameter], point: Point) -> float:
-        """Return the cost of a point."""
-        x = np.array([point[p.name] for p in parameters])
-        return self._cost(self.residuals(dict(point)), x, prior_precision(parameters))
-
     def extended(self, state: FitState, parameters: Sequence[Parameter],
                  values: Sequence[float], columns: Jacobian) -> FitState:
         """Return the state with more parameters, at these values, with these derivatives."""
@@ -478,7 +474,8 @@ def led(problem: LeastSquares, state: FitState, options: SearchSettings) -> FitS
 
     Where motors stick and slip, the cost of a test has many minima, and a slow test holds the fit
     to all of them in one. The cost of a test that moves smoothly leads to its optimum. So the
-    test that fits best is fitted alone, and all of them from there.
+    test that fits best is fitted alone, and all of them from there. If another one then fits
+    best, it leads in its turn.
 
     Parameters
     ----------
@@ -488,18 +485,25 @@ def led(problem: LeastSquares, state: FitState, options: SearchSettings) -> FitS
         how long a fit goes on
 
     """
-    if len(problem.experiments) < 2:
-        return state
-    alone = problem.of_experiment(problem.best_fitted(state))
-    ahead = alone.fit(alone.start(state.parameters, state.point()), options.settling_iterations)
-    ahead = settled(alone, ahead, options, options.final_passes, options.settling_iterations)
-    point = with_initial_conditions(problem, ahead.point())
-    # the right one fits the others better at once
-    if problem.cost_at(state.parameters, point) >= state.cost:
-        return state
-    found = problem.fit(problem.start(state.parameters, point), options.settling_iterations)
-    found = settled(problem, found, options, options.final_passes, options.settling_iterations)
-    return min(state, found, key=lambda fit: fit.cost)
+    def fitted(part: LeastSquares, point: Point, target: float = math.inf) -> FitState:
+        begun = part.start(state.parameters, with_initial_conditions(part, dict(point)))
+        found = part.fit(begun, options.settling_iterations)
+        if found.cost >= target:
+            return found
+        return settled(part, found, options, options.final_passes, options.settling_iterations)
+
+    led_by: set[int] = set()
+    while len(led_by) < len(problem.experiments) > 1:
+        leader = problem.best_fitted(state)
+        if leader in led_by:
+            break
+        led_by.add(leader)
+        ahead = fitted(problem.of_experiment(leader), state.point())
+        found = fitted(problem, ahead.point(), state.cost)
+        if found.cost > (1.0 - options.first_gain) * state.cost:
+            break
+        state = found
+    return state
 
 
 def least_cost(problem: LeastSquares, trials: Sequence[dict[str, float]], experiment: int,
