@@ -29,7 +29,8 @@ from statistics import fmean
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.intervals import covariance, inflation
 from antenna_drive.diagnosis.least_squares import (
-    FitState, LeastSquares, led, prior_precision, settled, weighted_product, with_initial_conditions,
+    FitState, LeastSquares, led, prior_precision, settled, weighted_product,
+    with_initial_conditions,
 )
 from antenna_drive.diagnosis.machine import FloatArray, Form, Machine, Parameter
 from antenna_drive.diagnosis.settings import Settings

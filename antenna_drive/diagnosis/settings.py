@@ -117,9 +117,11 @@ class SearchSettings:
     scale_passes: int = _setting(3, '1', 'times that the noise scale is lowered')
     first_passes: int = _setting(5, '1', 'passes of the first fit of the nuisances')
     first_gain: float = _setting(
-        0.003, '1', 'gain, as a share of the cost, below which the first fit has ended')
+        0.003, '1', 'gain, as a share of the cost, below which the first fit has ended, and '
+        'below which a test that leads a fit led nowhere')
     wanting: float = _setting(
-        1.03, 'noise sigma', 'residual level above which sensitivities are taken anew for pairs')
+        1.03, 'noise sigma', 'residual level above which sensitivities are taken anew for pairs, '
+        'and fits are led by one test')
     settled: float = _setting(
         4.0, 'half chi-square', 'gain of a pass below which the fits have ended')
     settled_share: float = _setting(1e-3, '1', 'the same as a share of the cost')
