@@ -24,11 +24,15 @@ independent antenna.
   --kind investigate  each case is investigated from nothing by `antenna-drive investigate`, with
                       up to four tests of 30 s, beside a standard programme of three
 
+Most wild cases leave nothing open. Small effects do more often: --largest 0.3 draws none that
+is larger than this share of its range.
+
 A case takes about ten diagnoses. The same command resumes an interrupted trial. What was found is
 in DIR/results.jsonl. To continue on another machine, put that file into a new DIR.
 
 For example:
   antenna-drive trial-next --cases 40 --pool 400 --seed 71 --out next71 --jobs 8
+  antenna-drive trial-next --cases 40 --pool 400 --seed 71 --largest 0.3 --out small71 --jobs 8
   antenna-drive trial-next --kind investigate --cases 30 --seed 72 --out loops72 --jobs 8
 """
 
@@ -60,6 +64,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='number of sealed cases that open ones are looked for among '
                              '(default: ten times --cases)')
     parser.add_argument('--seed', type=int, required=True, metavar='S', help='of the cases')
+    parser.add_argument('--largest', type=float, default=1.0, metavar='SHARE',
+                        help='largest size of an effect, as a share of its range '
+                             '(default: %(default)s)')
     parser.add_argument('--out', type=Path, required=True, metavar='DIR',
                         help='folder of the trial')
     parser.add_argument('--rules', nargs='+', choices=RULES, default=list(RULES), metavar='RULE',
@@ -70,14 +77,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Make the trial, or go on with it, and print what it has shown so far."""
     check_options(arguments, cases=Entry('', 1, whole=True), pool=Entry('', 1, whole=True),
-                  seed=Entry('', 0, whole=True), jobs=Entry('', 1, whole=True))
+                  seed=Entry('', 0, whole=True), jobs=Entry('', 1, whole=True),
+                  largest=Entry('', 0.01, 1.0))
     third = arguments.kind == 'third'
     if not third and arguments.pool is not None:
         raise UserError('--pool: does not go with --kind investigate, which takes every case; '
                         'leave it out')
     drawn = (arguments.pool or 10 * arguments.cases) if third else arguments.cases
     manifest = batch.prepare(arguments.out, drawn, arguments.seed, _TOLERANCE, 200.0,
-                             batch.DURATION_S, wild=True)
+                             batch.DURATION_S, wild=True, largest=arguments.largest)
     print(f'{arguments.out}: {drawn} truths sealed, manifest '
           f'{sealing.manifest_seal(manifest)}', flush=True)
     options = shlex.split(arguments.diagnose_options)

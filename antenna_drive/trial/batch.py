@@ -57,7 +57,7 @@ Done = Callable[[int, int], None]
 
 
 def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: float,
-            duration: float, *, wild: bool = False, family: str = 'a',
+            duration: float, *, wild: bool = False, family: str = 'a', largest: float = 1.0,
             machines: Sequence[str] = ()) -> dict[str, Any]:
     """
     Draw and seal the truths of a trial, unless they are sealed already.
@@ -66,7 +66,7 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
     ----------
     folder
         of the trial
-    count, seed, tolerance, sample_rate, duration, wild, family
+    count, seed, tolerance, sample_rate, duration, wild, family, largest
         as in `cases.draw_truths`
     machines
         other machines than the antenna, as in `others.cases.draw_truths`; of the entries above,
@@ -89,6 +89,8 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
     else:
         settings |= {'tolerance': tolerance, 'sample_rate_hz': sample_rate,
                      'duration_s': duration}
+    if largest != 1.0:
+        settings['largest'] = largest
     if (folder / sealing.MANIFEST).exists():
         manifest = sealing.read_manifest(folder)
         if manifest['settings'] != settings:
@@ -103,7 +105,7 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
         truths = others.draw_truths(count, seed, machines)
     else:
         truths = draw_truths(count, seed, tolerance, sample_rate=sample_rate, duration=duration,
-                             wild=wild, family=family)
+                             wild=wild, family=family, largest=largest)
     return sealing.seal(folder, settings, truths)
 
 

@@ -51,7 +51,8 @@ def case_name(number: int) -> str:
 
 
 def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float = 200.0,
-                duration: float = 30.0, wild: bool = False, family: str = 'a') -> list[Truth]:
+                duration: float = 30.0, wild: bool = False, family: str = 'a',
+                largest: float = 1.0) -> list[Truth]:
     """
     Draw all cases of a trial.
 
@@ -74,6 +75,8 @@ def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float =
         draw imperfections and programmes too, instead of `sample_rate` and `duration`
     family
         of forms, one of FAMILIES; 'b' is for wild cases alone
+    largest
+        size of an effect, as a share of the range
 
     """
     forms = FAMILIES[family]
@@ -84,20 +87,20 @@ def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float =
     firsts, seconds = round_robin(catalogue, random), round_robin(catalogue, random)
     outsiders = round_robin(list(forms.outside.values()), random)
     sizes = {kind: iter(even_sizes(int(np.sum(kinds == kind)), random)) for kind in MIX}
+    low = min(SMALLEST_IN_PAIR, largest)
     truths = []
     for number, kind in enumerate(kinds, start=1):
         own = np.random.default_rng([seed, number])
         effects: list[tuple[Defect, float]] = []
         if kind == 'single':
-            effects = [(next(singles), next(sizes['single']))]
+            effects = [(next(singles), largest * next(sizes['single']))]
         elif kind == 'outside':
-            effects = [(next(outsiders), next(sizes['outside']))]
+            effects = [(next(outsiders), largest * next(sizes['outside']))]
         elif kind == 'pair':
             first = next(firsts)
             second = next(effect for effect in seconds if _compatible(first, effect))
-            low = SMALLEST_IN_PAIR
-            effects = [(first, low + (1.0 - low) * next(sizes['pair'])),
-                       (second, float(own.uniform(low, 1.0)))]
+            effects = [(first, low + (largest - low) * next(sizes['pair'])),
+                       (second, float(own.uniform(low, largest)))]
         truths.append({
             'case': case_name(number), 'kind': str(kind),
             'effects': [{'id': effect.key, 'size': size, 'parameters': effect.draw(size, own)}

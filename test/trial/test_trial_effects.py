@@ -257,3 +257,18 @@ def test_cases_keep_the_mix_and_take_turns() -> None:
         assert (truth['kind'] == 'outside') == any(name in OUTSIDE for name in ids)
     assert truths == draw_truths(200, 4, 0.02)
     assert truths != draw_truths(200, 5, 0.02)
+
+
+@pytest.mark.parametrize('largest', [0.1, 0.4])
+def test_a_trial_of_small_effects_has_the_same_cases_with_smaller_sizes(largest: float) -> None:
+    usual = draw_truths(40, 4, 0.02)
+    small = draw_truths(40, 4, 0.02, largest=largest)
+    for large, little in zip(usual, small, strict=True):
+        assert little['kind'] == large['kind']
+        assert [e['id'] for e in little['effects']] == [e['id'] for e in large['effects']]
+        for before, after in zip(large['effects'], little['effects'], strict=True):
+            assert after['size'] <= largest
+            if little['kind'] != 'pair':
+                assert after['size'] == pytest.approx(largest * before['size'])
+            else:
+                assert after['size'] >= min(0.25, largest)
