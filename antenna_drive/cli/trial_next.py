@@ -24,8 +24,8 @@ independent antenna.
   --kind investigate  each case is investigated from nothing by `antenna-drive investigate`, with
                       up to four tests of 30 s, beside a standard programme of three
 
-Most wild cases leave nothing open. Small effects do more often: --largest 0.3 draws none that
-is larger than this share of its range.
+Most wild cases leave nothing open after two recordings. Small effects leave more open:
+--largest 0.3 draws sizes up to this share of their range.
 
 A case takes about ten diagnoses. The same command resumes an interrupted trial. What was found is
 in DIR/results.jsonl. To continue on another machine, put that file into a new DIR.

@@ -542,6 +542,8 @@ def with_initial_conditions(problem: LeastSquares, point: dict[str, float]) -> d
     """Return a point with the initial conditions that fit the first moments best."""
     until = problem.machine.time_scales.start_s
     for k in range(len(problem.experiments)):
+        if not problem.valid[problem.rows(k)].any():
+            continue
         for trials in problem.machine.initial_conditions(k):
             _, point = least_cost(
                 problem, [point, *({**point, **trial} for trial in trials)], k, until)

@@ -89,6 +89,7 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
     else:
         settings |= {'tolerance': tolerance, 'sample_rate_hz': sample_rate,
                      'duration_s': duration}
+    # a trial of all sizes that was begun without this entry goes on
     if largest != 1.0:
         settings['largest'] = largest
     if (folder / sealing.MANIFEST).exists():

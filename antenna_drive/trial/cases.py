@@ -76,7 +76,7 @@ def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float =
     family
         of forms, one of FAMILIES; 'b' is for wild cases alone
     largest
-        size of an effect, as a share of the range
+        the largest size of an effect, as a share of its range
 
     """
     forms = FAMILIES[family]

@@ -93,7 +93,7 @@ def test_fresh_derivatives_are_local_where_the_usual_step_is_long() -> None:
 
 
 class Vibrating(Machine):
-    """Two tests of one frequency [Hz]: a sine over 30 s, and a reading that is proportional."""
+    """Tests of one frequency [Hz]: each reads a sine over 30 s, or the frequency itself."""
 
     def __init__(self, frequencies: tuple[float, ...], kinds: tuple[str, ...]) -> None:
         """Measure each test with its own true frequency, with known noise."""

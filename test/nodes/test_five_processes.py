@@ -244,8 +244,7 @@ def test_each_node_killed_is_missed_and_started_again_begins_a_new_run(
                         f'{neighbour} to report that it waits for {victim}')
             runs = len(recorder.runs)
             processes.start(victim)
-            watch.until(lambda: _deaf_started_again(watch, processes) and (
-                len(recorder.runs) > runs and _at_step(recorder, processes, 300)),
+            watch.until(lambda: _in_a_new_run(watch, recorder, processes, runs),
                         f'a new run with {victim}')
             assert 'going on at step' in processes.log(neighbour)[said:]
         samples = recorder.array()
@@ -257,14 +256,20 @@ def test_each_node_killed_is_missed_and_started_again_begins_a_new_run(
     assert codes == dict.fromkeys(UNITS, 0)
 
 
-def _deaf_started_again(watch: Watch, processes: DriveProcesses) -> bool:
-    """Start a node again that says that it cannot hear: a busy machine held it for a second."""
+def _in_a_new_run(watch: Watch, recorder: Recorder, processes: DriveProcesses,
+                  runs: int) -> bool:
+    """
+    Return whether there are more than so many runs, and step 300 of the last one.
+
+    A node that a busy machine has held for a second may not hear the others any more. It says so,
+    and is started again as it asks.
+    """
     for name, words in watch.told().items():
         if name in UNITS and 'Start this node again' in words:
             del watch.reports[name]
             processes.kill(name)
             processes.start(name)
-    return True
+    return len(recorder.runs) > runs and _at_step(recorder, processes, 300)
 
 
 # No step of 1 ms is due at this pace for eleven days.
