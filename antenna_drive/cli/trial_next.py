@@ -24,15 +24,16 @@ independent antenna.
   --kind investigate  each case is investigated from nothing by `antenna-drive investigate`, with
                       up to four tests of 30 s, beside a standard programme of three
 
-Most wild cases leave nothing open after two recordings. Small effects leave more open:
---largest 0.3 draws sizes up to this share of their range.
+Most wild cases leave nothing open after two recordings. Small effects leave more open: with
+--largest 0.3, sizes are at most this share of their range. So do short recordings, which also
+take less time: with --longest 30, the first two take 10 to 30 s.
 
 A case takes about ten diagnoses. The same command resumes an interrupted trial. What was found is
 in DIR/results.jsonl. To continue on another machine, put that file into a new DIR.
 
 For example:
   antenna-drive trial-next --cases 40 --pool 400 --seed 71 --out next71 --jobs 8
-  antenna-drive trial-next --cases 40 --pool 400 --seed 71 --largest 0.3 --out small71 --jobs 8
+  antenna-drive trial-next --cases 40 --pool 400 --seed 71 --longest 30 --out short71 --jobs 8
   antenna-drive trial-next --kind investigate --cases 30 --seed 72 --out loops72 --jobs 8
 """
 
@@ -49,7 +50,9 @@ from antenna_drive.cli.sharing import add_batch_options
 from antenna_drive.errors import UserError
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.trial import batch, investigations, sealing, third_tests
+from antenna_drive.trial.further_tests import DURATION_S
 from antenna_drive.trial.third_tests import RULES
+from antenna_drive.trial.wild_programme import LONGEST_S, SHORTEST_S
 
 _TOLERANCE = 0.02
 
@@ -67,6 +70,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--largest', type=float, default=1.0, metavar='SHARE',
                         help='largest size of an effect, as a share of its range '
                              '(default: %(default)s)')
+    parser.add_argument('--longest', type=float, default=LONGEST_S, metavar='S',
+                        help='longest of the first two recordings in seconds '
+                             '(default: %(default)g)')
     parser.add_argument('--out', type=Path, required=True, metavar='DIR',
                         help='folder of the trial')
     parser.add_argument('--rules', nargs='+', choices=RULES, default=list(RULES), metavar='RULE',
@@ -78,14 +84,18 @@ def run(arguments: argparse.Namespace) -> int:
     """Make the trial, or go on with it, and print what it has shown so far."""
     check_options(arguments, cases=Entry('', 1, whole=True), pool=Entry('', 1, whole=True),
                   seed=Entry('', 0, whole=True), jobs=Entry('', 1, whole=True),
-                  largest=Entry('', 0.01, 1.0))
+                  largest=Entry('', 0.01, 1.0), longest=Entry('s', SHORTEST_S, LONGEST_S))
     third = arguments.kind == 'third'
     if not third and arguments.pool is not None:
         raise UserError('--pool: does not go with --kind investigate, which takes every case; '
                         'leave it out')
+    if not third and arguments.longest != LONGEST_S:
+        raise UserError('--longest: does not go with --kind investigate, whose tests all take '
+                        f'{DURATION_S:g} s; leave it out')
     drawn = (arguments.pool or 10 * arguments.cases) if third else arguments.cases
     manifest = batch.prepare(arguments.out, drawn, arguments.seed, _TOLERANCE, 200.0,
-                             batch.DURATION_S, wild=True, largest=arguments.largest)
+                             batch.DURATION_S, wild=True, largest=arguments.largest,
+                             longest=arguments.longest)
     print(f'{arguments.out}: {drawn} truths sealed, manifest '
           f'{sealing.manifest_seal(manifest)}', flush=True)
     options = shlex.split(arguments.diagnose_options)

@@ -38,7 +38,7 @@ from antenna_drive.trial.others.machines import kind_of
 from antenna_drive.trial.programme import RECORDINGS
 from antenna_drive.trial.real_antenna import FloatArray
 from antenna_drive.trial.sensors import COLUMNS
-from antenna_drive.trial.wild_programme import KEPT_BACK
+from antenna_drive.trial.wild_programme import KEPT_BACK, LONGEST_S
 from antenna_drive.workers import workers
 import yaml
 
@@ -58,7 +58,7 @@ Done = Callable[[int, int], None]
 
 def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: float,
             duration: float, *, wild: bool = False, family: str = 'a', largest: float = 1.0,
-            machines: Sequence[str] = ()) -> dict[str, Any]:
+            longest: float = LONGEST_S, machines: Sequence[str] = ()) -> dict[str, Any]:
     """
     Draw and seal the truths of a trial, unless they are sealed already.
 
@@ -66,7 +66,7 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
     ----------
     folder
         of the trial
-    count, seed, tolerance, sample_rate, duration, wild, family, largest
+    count, seed, tolerance, sample_rate, duration, wild, family, largest, longest
         as in `cases.draw_truths`
     machines
         other machines than the antenna, as in `others.cases.draw_truths`; of the entries above,
@@ -89,9 +89,11 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
     else:
         settings |= {'tolerance': tolerance, 'sample_rate_hz': sample_rate,
                      'duration_s': duration}
-    # a trial of all sizes that was begun without this entry goes on
+    # a trial that was begun without these entries goes on
     if largest != 1.0:
         settings['largest'] = largest
+    if longest != LONGEST_S:
+        settings['longest_s'] = longest
     if (folder / sealing.MANIFEST).exists():
         manifest = sealing.read_manifest(folder)
         if manifest['settings'] != settings:
@@ -106,7 +108,8 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
         truths = others.draw_truths(count, seed, machines)
     else:
         truths = draw_truths(count, seed, tolerance, sample_rate=sample_rate, duration=duration,
-                             wild=wild, family=family, largest=largest)
+                             wild=wild, family=family, largest=largest,
+                             longest=longest)
     return sealing.seal(folder, settings, truths)
 
 

@@ -36,7 +36,7 @@ from antenna_drive.trial.programme import draw_sheets
 from antenna_drive.trial.real_antenna import FloatArray, simulate
 from antenna_drive.trial.sensors import record, sample_instants
 from antenna_drive.trial.sheet import CaseSheet, SensorGrade
-from antenna_drive.trial.wild_programme import draw_programme
+from antenna_drive.trial.wild_programme import draw_programme, LONGEST_S
 import numpy as np
 
 MIX = {'single': 0.55, 'pair': 0.15, 'none': 0.15, 'outside': 0.15}
@@ -52,7 +52,7 @@ def case_name(number: int) -> str:
 
 def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float = 200.0,
                 duration: float = 30.0, wild: bool = False, family: str = 'a',
-                largest: float = 1.0) -> list[Truth]:
+                largest: float = 1.0, longest: float = LONGEST_S) -> list[Truth]:
     """
     Draw all cases of a trial.
 
@@ -77,6 +77,8 @@ def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float =
         of forms, one of FAMILIES; 'b' is for wild cases alone
     largest
         the largest size of an effect, as a share of its range
+    longest
+        the longest recording of a wild case [s]
 
     """
     forms = FAMILIES[family]
@@ -106,7 +108,7 @@ def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float =
             'effects': [{'id': effect.key, 'size': size, 'parameters': effect.draw(size, own)}
                         for effect, size in effects],
             'tolerance': tolerance, 'seed': [seed, number],
-            **(_wild_tests(family, tolerance, own) if wild
+            **(_wild_tests(family, tolerance, longest, own) if wild
                else _tests(sample_rate, duration, tolerance, own))})
     return truths
 
@@ -117,8 +119,9 @@ def _tests(sample_rate: float, duration: float, tolerance: float,
             'sheets': [sheet.plain() for sheet in draw_sheets(tolerance, duration, random)]}
 
 
-def _wild_tests(family: str, tolerance: float, random: np.random.Generator) -> dict[str, Any]:
-    tests = draw_programme(FAMILIES[family].shapes, tolerance, random)
+def _wild_tests(family: str, tolerance: float, longest: float,
+                random: np.random.Generator) -> dict[str, Any]:
+    tests = draw_programme(FAMILIES[family].shapes, tolerance, longest, random)
     return {'family': family, 'sample_rate_hz': tests.sample_rate_hz,
             'durations_s': tests.durations_s, 'sheets': [s.plain() for s in tests.sheets],
             'given_sheets': tests.given, 'imperfections': draw_imperfections(random)}

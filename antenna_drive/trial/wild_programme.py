@@ -32,7 +32,7 @@ import numpy as np
 
 KEPT_BACK = 'rec_d'
 RECORDINGS = (*programme.RECORDINGS, KEPT_BACK)
-DURATION_S = (10.0, 300.0)
+SHORTEST_S, LONGEST_S = 10.0, 300.0
 RATE_HZ = (50.0, 1000.0)
 MOST_SAMPLES = 100_000          # of a recording: a faster recorder takes shorter ones
 RESTING = 0.6                   # share of the recordings that begin with a rest
@@ -54,7 +54,8 @@ class Programme(NamedTuple):
     given: list[dict[str, Any] | None]
 
 
-def draw_programme(shapes: Shapes, tolerance: float, random: np.random.Generator) -> Programme:
+def draw_programme(shapes: Shapes, tolerance: float, longest: float,
+                   random: np.random.Generator) -> Programme:
     """
     Draw the tests of one case, one for each name in RECORDINGS.
 
@@ -64,13 +65,15 @@ def draw_programme(shapes: Shapes, tolerance: float, random: np.random.Generator
         by group ('slow', 'fast', 'broad') and kind
     tolerance
         largest relative deviation of the machine from the reference, unit 1
+    longest
+        the longest recording [s]
     random
         source of randomness
 
     """
     rate = programme.log_uniform(*RATE_HZ, 0, random)
-    longest = min(DURATION_S[1], MOST_SAMPLES / rate)
-    durations = [programme.log_uniform(DURATION_S[0], longest, 1, random) for _ in RECORDINGS]
+    longest = min(longest, MOST_SAMPLES / rate)
+    durations = [programme.log_uniform(SHORTEST_S, longest, 1, random) for _ in RECORDINGS]
     drawn = [str(random.choice(sorted(group))) for group in shapes.values()]
     makers = {kind: make for group in shapes.values() for kind, make in group.items()}
     drawn.append(str(random.choice(sorted(makers.keys() - set(drawn)))))

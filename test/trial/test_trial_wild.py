@@ -32,7 +32,7 @@ from antenna_drive.trial.real_antenna import simulate
 from antenna_drive.trial.sensors import record
 from antenna_drive.trial.sheet import CaseSheet
 from antenna_drive.trial.wild_programme import (
-    draw_programme, DURATION_S, MOST_SAMPLES, RATE_HZ, RECORDINGS,
+    draw_programme, LONGEST_S, MOST_SAMPLES, RATE_HZ, RECORDINGS, SHORTEST_S,
 )
 from hypothesis import given, settings, strategies as st
 import numpy as np
@@ -101,13 +101,14 @@ def test_case_follows_from_its_truth(made: Path, tmp_path: Path) -> None:
 
 
 @settings(max_examples=30, deadline=None)
-@given(SEEDS, st.sampled_from(sorted(FAMILIES)))
-def test_programme_is_of_four_kinds_within_its_limits(seed: int, family: str) -> None:
-    drawn = draw_programme(FAMILIES[family].shapes, 0.02, np.random.default_rng(seed))
+@given(SEEDS, st.sampled_from(sorted(FAMILIES)), st.sampled_from([SHORTEST_S, 30.0, LONGEST_S]))
+def test_programme_is_of_four_kinds_within_its_limits(
+        seed: int, family: str, longest: float) -> None:
+    drawn = draw_programme(FAMILIES[family].shapes, 0.02, longest, np.random.default_rng(seed))
     assert RATE_HZ[0] <= drawn.sample_rate_hz <= RATE_HZ[1]
     assert len(drawn.sheets) == len(drawn.durations_s) == len(RECORDINGS)
     for duration, sheet, said in zip(drawn.durations_s, drawn.sheets, drawn.given):
-        assert DURATION_S[0] <= duration <= DURATION_S[1]
+        assert SHORTEST_S <= duration <= longest
         assert duration * drawn.sample_rate_hz <= 1.01 * MOST_SAMPLES
         test = sheet.record()
         end = duration + 1.0 / drawn.sample_rate_hz
