@@ -18,9 +18,10 @@ Wild cases are drawn and sealed as by `antenna-drive trial --wild`. All tests ru
 independent antenna.
 
   --kind third        cases whose first two recordings leave the answer open (best answer below
-                      0.7, or a set of two or more) get a third test of 30 s by each rule: as
-                      `antenna-drive propose` designs it, D-optimal, at random, and the four kinds
-                      of the standard programme, of which the best counts in hindsight
+                      0.7, or a second one of 0.06 or more beside 'unknown') get a third test of
+                      30 s by each rule: as `antenna-drive propose` designs it, D-optimal, at
+                      random, and the four kinds of the standard programme, of which the best
+                      counts in hindsight
   --kind investigate  each case is investigated from nothing by `antenna-drive investigate`, with
                       up to four tests of 30 s, beside a standard programme of three
 
@@ -116,11 +117,13 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _of_rules(found: Mapping[str, Any]) -> list[str]:
     lines = [f'{found["diagnosed"]} cases diagnosed, {found["open"]} of them open',
-             'rule            cases  exact top-1         set before, after  limits exceeded']
+             'rule            cases  exact top-1         set before, after  rivals  '
+             'limits exceeded']
     for rule, item in found['rules'].items():
         if item['cases']:
             lines.append(f'{rule:15s} {item["cases"]:5d}  {_share(item["top1"], item["ci95"])}    '
                          f'{item["median_set_before"]:g}, {item["median_set"]:g}               '
+                         f'{item["median_rivals_before"]:g}, {item["median_rivals"]:g}    '
                          f'{item["violations"]}')
     promise = found['promise']
     if promise['cases']:

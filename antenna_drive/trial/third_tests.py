@@ -38,7 +38,9 @@ from antenna_drive.trial.further_tests import (
 )
 from antenna_drive.trial.results import TrialResults
 from antenna_drive.trial.scorecard import Case, rate
-from antenna_drive.trial.verdict import read_verdict, UNKNOWN, Verdict, VerdictError
+from antenna_drive.trial.verdict import (
+    read_verdict, UNKNOWN, Verdict, VerdictError, VerdictLine,
+)
 from antenna_drive.workers import workers
 import numpy as np
 import yaml
@@ -109,15 +111,22 @@ def run_trial(folder: Path, manifest: dict[str, Any], wanted: int, jobs: int, li
 
 
 def is_open(verdict: Verdict) -> bool:
-    """Return whether a verdict leaves the answer open: it is not sure, or names a set."""
-    first = verdict.which[0]
-    return first.probability < OPEN or any(
-        len(verdict.confusable_with(effect)) > 1 for effect in first.effects)
+    """Return whether a verdict leaves the answer open: it is not sure, or leaves rivals."""
+    return verdict.which[0].probability < OPEN or rivals_of(verdict) > 1
 
 
 def set_of(verdict: Verdict) -> int:
-    """Return how many answers a verdict leaves."""
-    return max(sum(entry.probability >= IN_SET for entry in verdict.which),
+    """Return how many answers a verdict leaves, 'unknown' among them."""
+    return _left(verdict, verdict.which)
+
+
+def rivals_of(verdict: Verdict) -> int:
+    """Return how many answers a verdict leaves that a test can tell apart: not 'unknown'."""
+    return _left(verdict, [entry for entry in verdict.which if entry.effects != {UNKNOWN}])
+
+
+def _left(verdict: Verdict, entries: Sequence[VerdictLine]) -> int:
+    return max(sum(entry.probability >= IN_SET for entry in entries),
                *(len(verdict.confusable_with(effect)) for effect in verdict.which[0].effects))
 
 
@@ -140,7 +149,8 @@ def _is_open(folder: Path, truth: Truth, results: TrialResults, limit: float,
     if 'open' not in results[name]:
         verdict = _of_two(folder, truth, limit, options)
         results.put(name, open=verdict is not None and is_open(verdict),
-                    set_before=None if verdict is None else set_of(verdict))
+                    set_before=None if verdict is None else set_of(verdict),
+                    rivals_before=None if verdict is None else rivals_of(verdict))
     return bool(results[name]['open'])
 
 
@@ -195,6 +205,7 @@ def answer_of(path: Path, truth: Truth) -> dict[str, Any]:
         return {}
     case = Case(truth, verdict)
     return {'right': case.named_among(1, exactly=True), 'set': set_of(verdict),
+            'rivals': rivals_of(verdict),
             'first': sorted(verdict.which[0].effects),
             'probability': verdict.which[0].probability,
             'true_probability': case.probability_of_truth,
@@ -205,14 +216,15 @@ def summary(results: TrialResults) -> dict[str, Any]:
     """
     Return what the third tests of a trial told, as far as it has got.
 
-    For each rule: `cases`, exact `top1` with `ci95`, the `median_set` before and after, and
-    `violations`, tests that exceeded a limit on the independent antenna. `best_built_in` takes in
-    each case the best of the standard kinds, in hindsight. `promise` compares what a proposal
-    expected for the true answer with the share that it got of what 'unknown' left.
+    For each rule: `cases`, exact `top1` with `ci95`, the `median_set` before and after, with
+    'unknown' as an answer, the same without it as `median_rivals` (NaN for trials that did not
+    count them), and `violations`, tests that exceeded a limit on the independent antenna.
+    `best_built_in` takes in each case the best of the standard kinds, in hindsight. `promise`
+    compares what a proposal expected for the true answer with the share that it got of what
+    'unknown' left.
     """
     tests: dict[str, dict[str, Any]] = {
         name: results[name]['tests'] for name in results if 'tests' in results[name]}
-    before = {name: results[name]['set_before'] for name in tests}
     rows: dict[str, list[tuple[str, dict[str, Any]]]] = {
         rule: [(name, told[rule]) for name, told in tests.items() if rule in told]
         for rule in RULES}
@@ -230,8 +242,11 @@ def summary(results: TrialResults) -> dict[str, Any]:
         found['rules'][rule] = {
             'cases': share.cases, 'failures': len(items) - len(judged),
             'top1': share.value, 'ci95': [share.low, share.high],
-            'median_set_before': _median([before[name] for name, _ in judged]),
-            'median_set': _median([item['set'] for _, item in judged]),
+            **{f'median_{left}_before': _median([
+                results[name].get(f'{left}_before') for name, _ in judged])
+               for left in ('set', 'rivals')},
+            **{f'median_{left}': _median([item.get(left) for _, item in judged])
+               for left in ('set', 'rivals')},
             'violations': sum(any(item['reached'][key] > limit for key, limit in item.get(
                 'limits', {}).items() if key in item['reached'])
                 for _, item in judged if 'reached' in item)}
@@ -249,5 +264,7 @@ def _mean(values: Sequence[float]) -> float:
     return float(np.mean(values)) if values else math.nan
 
 
-def _median(values: Sequence[float]) -> float:
-    return float(np.median(values)) if values else math.nan
+def _median(values: Sequence[float | None]) -> float:
+    """Return the median of what is known."""
+    known_values = [value for value in values if value is not None]
+    return float(np.median(known_values)) if known_values else math.nan

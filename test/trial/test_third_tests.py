@@ -22,7 +22,7 @@ from typing import Any
 
 from antenna_drive.trial import batch, further_tests, third_tests
 from antenna_drive.trial.results import FILE, TrialResults
-from antenna_drive.trial.third_tests import is_open, run_trial, set_of, summary
+from antenna_drive.trial.third_tests import is_open, rivals_of, run_trial, set_of, summary
 from antenna_drive.trial.verdict import parse_verdict, Verdict
 import pytest
 import yaml
@@ -42,13 +42,18 @@ def parsed(*rest: Any) -> Verdict:
     return parse_verdict(verdict_of(*rest))
 
 
-def test_a_case_is_open_if_unsure_or_if_a_set_is_named() -> None:
+def test_a_case_is_open_if_unsure_or_if_rivals_are_left() -> None:
     assert is_open(parsed({'motor_1.coulomb_friction': 0.6, 'unknown': 0.4}))
     assert not is_open(parsed({'motor_1.coulomb_friction': 0.9, 'unknown': 0.1}))
     pair = ['motor_1.coulomb_friction', 'motors.coulomb_friction']
     sure_of_a_set = parsed({pair[0]: 0.9, 'unknown': 0.1}, [pair])
     assert is_open(sure_of_a_set) and set_of(sure_of_a_set) == 2
     assert set_of(parsed({pair[0]: 0.5, pair[1]: 0.3, 'none': 0.16, 'unknown': 0.04})) == 3
+    # no test rules out the unknown, but a rival
+    rivals = parsed({pair[0]: 0.75, pair[1]: 0.1, 'unknown': 0.15})
+    assert is_open(rivals) and set_of(rivals) == 3 and rivals_of(rivals) == 2
+    alone = parsed({pair[0]: 0.75, pair[1]: 0.05, 'unknown': 0.2})
+    assert not is_open(alone) and set_of(alone) == 2 and rivals_of(alone) == 1
 
 
 class Commands:
@@ -104,6 +109,8 @@ def test_open_cases_get_third_tests_on_the_independent_antenna_and_a_trial_goes_
     assert found['rules']['proposed']['violations'] == 0
     assert found['rules']['proposed']['median_set_before'] == 3
     assert found['rules']['proposed']['median_set'] == 2
+    assert found['rules']['proposed']['median_rivals_before'] == 2
+    assert found['rules']['proposed']['median_rivals'] == 1
     assert found['rules']['best_built_in']['cases'] == 1
     assert (tmp_path / 'case_0002/rec_proposed.csv').exists()
     asked = len(commands.words)
