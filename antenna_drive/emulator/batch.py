@@ -151,12 +151,12 @@ def run(record: np.ndarray[Any, np.dtype[Any]], schedule: Schedule, wiring: Wiri
     wiring
         which units there are and what feeds them
     channels
-        the outputs to be read
+        the outputs to be read, and states of units
 
     Returns
     -------
     array of shape (rows, len(channels), 2): value and time derivative of each reading, SI units,
-    article amperes
+    article amperes; of a state the value alone
 
     Raises
     ------

@@ -95,11 +95,15 @@ class Coupling:
             f'changed |= {self._call("switch", name, "commit")}'])
 
     def sample(self, channels: tuple[str, ...]) -> str:
-        """Return the text that reads outputs into the rows of out."""
+        """Return the text that reads outputs, and values of states, into the rows of out."""
         wanted: dict[str, list[tuple[int, str]]] = {}
+        states: list[str] = []
         for row, channel in enumerate(channels):
             name, _, output = channel.partition('/')
-            wanted.setdefault(name, []).append((row, output))
+            if any(signal.name == output for signal in self._blocks[name].outputs):
+                wanted.setdefault(name, []).append((row, output))
+            else:
+                states.append(f'out[{row}, 0] = x[{self._place(name, output)}]')
 
         def read(name: str) -> list[str]:
             rows = [signal.name for signal in self._blocks[name].outputs]
@@ -107,7 +111,7 @@ class Coupling:
                     f'p.{name}, y)', *(f'out[{row}, {n}] = y[{rows.index(output)}, {n}]'
                                        for row, output in wanted[name] for n in range(2))]
 
-        return self._text(wanted, read, slopes=False)
+        return _lines([self._text(wanted, read, slopes=False), *states])
 
     def _call(self, function: str, name: str, *more: str) -> str:
         own = (self._x[name], self._mode[name], f'u_{self._u[name]}', f'p.{name}')

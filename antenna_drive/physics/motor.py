@@ -18,7 +18,7 @@ from __future__ import annotations
 from antenna_drive.parameters.sets import Ammeter, Motor, Tachometer
 from antenna_drive.physics.compiling import inner
 from antenna_drive.physics.friction import drag, slip_level
-from antenna_drive.physics.harmonics import wave
+from antenna_drive.physics.harmonics import wave, wave_slope
 
 
 @inner
@@ -85,6 +85,30 @@ def tachometer(rate: float, angle: float, p: Tachometer) -> float:
         reading += rate * wave(angle, p.ripple, p.ripple_second, p.ripple_third, p.ripple_cycles,
                                p.ripple_phase, p.ripple_second_phase, p.ripple_third_phase)
     return reading
+
+
+@inner
+def tachometer_slope(rate: float, angle: float, acceleration: float, p: Tachometer) -> float:
+    """
+    Return the time derivative of what the tachometer says [rad/s^2].
+
+    Parameters
+    ----------
+    rate, angle, acceleration
+        of the rotor [rad/s], [rad], [rad/s^2]
+    p
+        Tachometer
+
+    """
+    slope = p.gain * acceleration
+    if p.ripple != 0.0 or p.ripple_second != 0.0 or p.ripple_third != 0.0:
+        slope += acceleration * wave(
+            angle, p.ripple, p.ripple_second, p.ripple_third, p.ripple_cycles,
+            p.ripple_phase, p.ripple_second_phase, p.ripple_third_phase)
+        slope += rate * rate * wave_slope(
+            angle, p.ripple, p.ripple_second, p.ripple_third, p.ripple_cycles,
+            p.ripple_phase, p.ripple_second_phase, p.ripple_third_phase)
+    return slope
 
 
 @inner

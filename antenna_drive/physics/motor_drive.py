@@ -36,7 +36,9 @@ from antenna_drive.physics.block import Block, Equation, held, output_rows, put,
 from antenna_drive.physics.compiling import inner, shared
 from antenna_drive.physics.friction import next_slip
 from antenna_drive.physics.gearbox import gear_torque, presliding_rate, twist, twist_rate
-from antenna_drive.physics.motor import ammeter, driving_torque, friction_level, tachometer
+from antenna_drive.physics.motor import (
+    ammeter, driving_torque, friction_level, tachometer, tachometer_slope,
+)
 from antenna_drive.physics.rate_command import command_voltage_rate
 
 STATE = rows('voltage', 'integral', 'demand', 'current', 'angle', 'rate', 'presliding', 'impulse')
@@ -93,7 +95,8 @@ def _error_slope(
 ) -> float:
     """Return the time derivative of the rate error [article A/s]."""
     return error_slope(
-        error, _voltage_rate(t, x, u, p), p.tachometer.gain * acceleration,
+        error, _voltage_rate(t, x, u, p),
+        tachometer_slope(x[STATE.rate], x[STATE.angle], acceleration, p.tachometer),
         p.sign * p.amplifier.bias_command_gain * u[INPUT.counter_torque, 1], p.amplifier)
 
 
@@ -194,7 +197,7 @@ def read(
     put(y, OUTPUT.current, x[STATE.current], current_slope)
     put(y, OUTPUT.gear_torque, torque, torque_slope)
     put(y, OUTPUT.tach_rate, tachometer(x[STATE.rate], x[STATE.angle], p.tachometer),
-        p.tachometer.gain * acceleration)
+        tachometer_slope(x[STATE.rate], x[STATE.angle], acceleration, p.tachometer))
     put(y, OUTPUT.ammeter, ammeter(x[STATE.current], p.ammeter), p.ammeter.gain * current_slope)
 
 

@@ -19,11 +19,14 @@ from dataclasses import replace
 
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.machines.antenna.excitation import RecordedCommand
-from antenna_drive.machines.antenna.field_test import ENCODER
+from antenna_drive.machines.antenna.field_test import ENCODER, TACH_1, TACH_2
 from antenna_drive.machines.antenna.late_readings import dense, parts_of, read_at
 from antenna_drive.machines.antenna.machine import AntennaMachine, LOW_FIDELITY_STEP
+from antenna_drive.machines.antenna.prediction import predict, RecorderErrors
 from antenna_drive.parameters import load
+from antenna_drive.parameters.sets import changed
 from antenna_drive.recording.recording import Channel, Recording
+from field_runs import FAST_TRIANGLE, field_run
 import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
@@ -101,3 +104,21 @@ def test_a_jump_between_two_samples_moves_the_whole_response() -> None:
         off, gap = np.abs(found - exact)[:, c].max(), np.abs(plain - exact)[:, c].max()
         assert off <= 0.12 * gap + 1e-9 or c == ENCODER, f'{c}: {off} of {gap}'
     assert np.abs(found - exact)[:, ENCODER].max() < 1e-7
+
+
+@pytest.mark.parametrize('late_s', [0.0, 0.0037, 0.0095])
+def test_a_ripple_faster_than_the_samples_is_read_late_without_loss(late_s: float) -> None:
+    """A prediction of the whole recording is simulated at the late times themselves."""
+    drive = changed(load(), {f'motor_1.tachometer.{name}': value for name, value in {
+        'gain': 1.1, 'offset': 0.3, 'ripple': 0.1, 'ripple_cycles': 12.0, 'ripple_phase': 0.4,
+        'ripple_second': 0.03, 'ripple_third': 0.01, 'ripple_third_phase': 2.0}.items()})
+    recording = field_run(drive, 6.0, every=10, **FAST_TRIANGLE)
+    errors = [{'name': 'delay:tach_1', 'value': late_s}]
+    exact = predict('rec', recording, drive, RecorderErrors.of(errors)).predicted
+    found = AntennaMachine({'rec': recording}, drive).predict({'delay:tach_1': late_s}, 0)
+    rate = exact[:, TACH_2]
+    assert np.abs(np.diff(exact[:, TACH_1])).max() > 0.1 * np.abs(rate).max()
+    assert 12.0 * np.abs(rate).max() / (2.0 * np.pi) > RATE_HZ
+    off = np.abs(found - exact)[5:, TACH_1]
+    assert np.median(off) < 1e-3 * np.abs(rate).max()
+    assert np.quantile(off, 0.95) < 0.01 * np.abs(rate).max()

@@ -52,13 +52,15 @@ def test_planted_wave_is_found_beneath_a_slow_misfit_that_is_louder(order: int,
     assert float(order) in likely_orders(form, [test], [residual], 3)
 
 
-@given(st.lists(st.floats(-1e-3, 1e-3), min_size=7, max_size=7), st.floats(-0.5, 0.5))
-def test_wave_of_readings_is_that_of_the_physics(parts: list[float], angle: float) -> None:
+@given(st.lists(st.floats(-1e-3, 1e-3), min_size=7, max_size=7), st.floats(-0.5, 0.5),
+       st.floats(-3.0, 3.0))
+def test_wave_of_readings_is_that_of_the_physics(
+        parts: list[float], angle: float, turned: float) -> None:
     """Sine and cosine parts on readings say what the fields of the record say to the physics."""
     form = catalogue()['encoder.cyclic_error'].forms[0]
     assert isinstance(form, Wave)
     form = form.at(700.0)
-    value = form.shape.fields(parts)
-    assert form.shape.along(np.array([angle]), parts)[0] == pytest.approx(wave(
+    value = form.shape.fields(parts, turned)
+    assert form.shape.along(np.array([turned + angle]), parts)[0] == pytest.approx(wave(
         angle, value[''], value['_second'], value['_third'], value['_cycles'], value['_phase'],
         value['_second_phase'], value['_third_phase']), abs=1e-12)

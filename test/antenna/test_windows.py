@@ -106,6 +106,11 @@ def test_a_window_in_the_middle_of_a_motion_agrees_once_it_has_settled() -> None
     angle = recording['plant/encoder'].values[75 * 200]
     elevation = test.record['plant']['axis']['start_elevation'][0]
     assert elevation - drive.plant.axis.start_elevation == pytest.approx(angle, abs=2e-5)
+    # and the waves from the angle at which the simulation follows the recording
+    recorded = np.interp(test.time + 75.0, recording['plant/encoder'].time_s,
+                         recording['plant/encoder'].values)
+    off = recorded - test.simulated(2.5e-3)[:, ENCODER]
+    assert test.start_angle == pytest.approx(np.median(off), abs=1e-6)
 
 
 def stepped(at: float, duration: float) -> Recording:

@@ -23,6 +23,8 @@ from typing import Any
 
 from antenna_drive.article.experiments import experiments
 from antenna_drive.emulator.run import simulate
+from antenna_drive.parameters.sets import changed
+from antenna_drive.trial.equations import LAW_B
 from antenna_drive.trial.machine import reference_machine
 from antenna_drive.trial.real_antenna import simulate as simulate_apart
 from antenna_drive.trial.sheet import CaseSheet
@@ -64,3 +66,26 @@ def test_both_programs_give_the_same_motion(name: str) -> None:
         size = np.sqrt(np.mean(apart ** 2))
         error = np.sqrt(np.mean((ours - apart) ** 2))
         assert error <= 1e-3 * size, f'{signal}: {error / size:.2e}'
+
+
+def test_both_programs_agree_where_a_ripple_drives_a_motor_to_its_limit() -> None:
+    """In each ripple the demand meets its limit, where the integral waits for the error."""
+    share, cycles, phase = 0.12, 3.0, 0.7
+    drive = changed(experiments()['T3b'].drive(), {
+        **{f'motor_1.tachometer.ripple{name}': value for name, value in {
+            '': share, '_cycles': cycles, '_phase': phase,
+            '_second': 0.5 * share, '_second_phase': 2.0 * phase + 0.8}.items()},
+        'test_signal.rate.period': 2.0})
+    run = simulate(drive, 4.0, 2.5e-4, every=8)
+    circuit, bias, waveform, pot = SHEETS['T3b']
+    machine = reference_machine(circuit, circuit, pot)
+    machine.motors['law'] = LAW_B
+    machine.motors['tach_ripple'][0], machine.motors['tach_cycles'][0] = share, cycles
+    machine.motors['tach_phase'][0] = phase
+    history = simulate_apart(machine, CaseSheet(circuit, circuit, {**bias, 'bias_pot': pot},
+                                                {**waveform, 'period_s': 2.0}),
+                             run.time + 1e-9)
+    limit = drive.motor_1.motor.current_limit
+    assert np.abs(run['motor_1/current']).max() > 0.98 * limit
+    error = np.abs(run['plant/axis_angle'] - history.axis_angle)
+    assert error.max() < 1e-3 * np.abs(history.axis_angle).max()

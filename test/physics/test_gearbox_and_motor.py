@@ -21,7 +21,7 @@ from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed, MotorDrive
 from antenna_drive.physics import motor_drive
 from antenna_drive.physics.gearbox import gear_torque, presliding_rate, twist, twist_rate
-from antenna_drive.physics.motor import ammeter, driving_torque, tachometer
+from antenna_drive.physics.motor import ammeter, driving_torque, tachometer, tachometer_slope
 import numpy as np
 import pytest
 from stepping import Stepped
@@ -147,6 +147,21 @@ def test_ripple_transmission_error_and_sensors_are_sines_of_the_angle() -> None:
         3.3 + 0.2 + 0.15 * math.sin(0.8))
     assert ammeter(2.0, record_of(replace(load().motor_1.ammeter, gain=0.9, offset=0.1))[0]
                    ) == pytest.approx(1.9)
+
+
+def test_a_tachometers_slope_is_the_derivative_of_its_reading() -> None:
+    tach = record_of(replace(
+        load().motor_1.tachometer, gain=1.1, offset=0.2, ripple=0.05, ripple_cycles=7.0,
+        ripple_second=0.02, ripple_second_phase=0.4, ripple_third=0.01))[0]
+    rate, angle, acceleration, dt = 30.0, 0.4, 50.0, 1e-6
+
+    def reading(t: float) -> float:
+        return float(tachometer(rate + acceleration * t,
+                                angle + rate * t + 0.5 * acceleration * t * t, tach))
+
+    slope = (reading(dt) - reading(-dt)) / (2.0 * dt)
+    assert abs(slope - 1.1 * acceleration) > 50.0  # most of it is the ripple's
+    assert tachometer_slope(rate, angle, acceleration, tach) == pytest.approx(slope, rel=1e-6)
 
 
 def test_hysteresis_dissipates_over_a_cycle_what_its_loop_encloses() -> None:

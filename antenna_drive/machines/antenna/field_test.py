@@ -79,6 +79,8 @@ class FieldTest:
     sheet : what the tester knows, and what was inferred
     known_start : False if the simulation begins in the middle of a motion, whose state is not
         known; the zero of the encoder then follows from the readings alone
+    start_angle : of the axis at the beginning of the window, since that of the recording [rad];
+        waves go on where they were
     labels : what was different in this test, by its sheet
 
     """
@@ -95,6 +97,7 @@ class FieldTest:
     period: float
     sheet: sheets.TestSheet
     known_start: bool = True
+    start_angle: float = 0.0
     labels: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -190,18 +193,22 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
         measured[:, ENCODER] -= angle
         drive = changed(drive, {
             'plant.axis.start_elevation': drive.plant.axis.start_elevation + angle})
+    else:
+        angle = 0.0
     if not math.isinf(window.end):
         name = f'{name} {window.compared:.0f}-{time[-1]:.0f} s'
     test = FieldTest(
         name, record_of(drive), command,
         bias.later(window.begin), time - window.begin, measured, slope,
         sensors, jitter_of(recording.command, recording.rates.time_s, recording.rates.values),
-        recording.period, recording.sheet, window.known_start,
+        recording.period, recording.sheet, window.known_start, angle,
         dict(recording.sheet.labels or ()))
     if not window.known_start:
         off = measured[:, ENCODER] - test.simulated(_STEP_S)[:, ENCODER]
         if np.isfinite(off).any():
-            measured[:, ENCODER] -= np.nanmedian(off)
+            more = float(np.nanmedian(off))
+            measured[:, ENCODER] -= more
+            return replace(test, start_angle=angle + more)
     return test
 
 

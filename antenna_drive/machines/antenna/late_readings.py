@@ -21,6 +21,7 @@ slopes. To first order alone, a delay of 7 ms at 5 Hz is off by 2 percent of the
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 import math
 
 from antenna_drive.diagnosis import FloatArray
@@ -30,6 +31,8 @@ import numpy as np
 # Greatest time between two outputs [s]: two of the longest steps of a whole run, and less than one
 # of a search.
 _SPACING_S = 5.3e-3
+# What the names of the harmonics of a ripple end with.
+_HARMONICS = ('', '_second', '_third')
 
 
 def parts_of(period: float) -> int:
@@ -69,6 +72,55 @@ def read_at(time: FloatArray, out: FloatArray, wanted: FloatArray, late: FloatAr
     found = np.empty((wanted.size, late.size))
     _read_at(time, out, wanted, late, found)
     return found
+
+
+@dataclass(frozen=True)
+class RipplingTachometer:
+    """
+    A tachometer whose ripple may be faster than the outputs of a run.
+
+    What is interpolated is the motion of its rotor, from which the reading follows.
+
+    Attributes
+    ----------
+    angle : of its rotor at each output, shape (n,) [rad]
+    numbers : its record, see `parameters.sets.Tachometer`
+
+    """
+
+    angle: FloatArray
+    numbers: np.void
+
+    def read_at(self, time: FloatArray, out: FloatArray, wanted: FloatArray,
+                late: float) -> FloatArray:
+        """
+        Return readings at other times, shape (m,) [rad/s].
+
+        Parameters are those of `late_readings.read_at`, for one channel: `out` has shape (n, 2).
+        """
+        offset = float(self.numbers['offset'])
+        gain, change = self._gain(self.angle)
+        rate = (out[:, 0] - offset) / gain
+        acceleration = (out[:, 1] - rate ** 2 * change) / gain
+        motion = np.stack([np.column_stack([self.angle, rate]),
+                           np.column_stack([rate, acceleration])], axis=-1)
+        angle, rate = read_at(time, motion, wanted, np.full(2, late)).T
+        return np.asarray(offset + self._gain(angle)[0] * rate)
+
+    def _gain(self, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return reading per rate at angles of shape (n,), and its derivative by the angle."""
+        gain, change = np.full_like(angle, self.numbers['gain']), np.zeros_like(angle)
+        for k, end in enumerate(_HARMONICS, start=1):
+            cycles = k * self.numbers['ripple_cycles']
+            turned = cycles * angle + self.numbers[f'ripple{end}_phase']
+            gain += self.numbers[f'ripple{end}'] * np.sin(turned)
+            change += self.numbers[f'ripple{end}'] * cycles * np.cos(turned)
+        return gain, change
+
+
+def ripples(tachometer: np.void) -> bool:
+    """Return whether a tachometer's record has a ripple."""
+    return any(tachometer[f'ripple{end}'] for end in _HARMONICS)
 
 
 @compiled

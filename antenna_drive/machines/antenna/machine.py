@@ -41,7 +41,7 @@ from antenna_drive.machines.antenna.excitation import (
 from antenna_drive.machines.antenna.field_test import (
     CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, prepared, TACH_1, TACH_2, UNITS,
 )
-from antenna_drive.machines.antenna.late_readings import read_at
+from antenna_drive.machines.antenna.late_readings import read_at, ripples, RipplingTachometer
 from antenna_drive.machines.antenna.modifiers import (
     ADD, AntennaParameter, change, Modifier, ReadingModifier, RunModifier, RunSetup,
     SensorReadings,
@@ -92,6 +92,22 @@ class _Job:
     until: float
 
 
+@dataclass(frozen=True)
+class _Outputs:
+    """
+    What a run gives at the output times.
+
+    Attributes
+    ----------
+    values : and slopes of n channels, shape (times, n, 2)
+    rippling : tachometers with a ripple, by their channel
+
+    """
+
+    values: FloatArray
+    rippling: Mapping[int, RipplingTachometer]
+
+
 class AntennaMachine(Machine):
     """
     The antenna drive of a configuration, in the tests that were recorded.
@@ -122,7 +138,7 @@ class AntennaMachine(Machine):
                  tolerance: float = 0.02) -> None:
         """Prepare the tests and take the sensors' noise from a first run."""
         self._executor = ThreadPoolExecutor(threads)
-        self._runs: OrderedDict[_Job, FloatArray] = OrderedDict()
+        self._runs: OrderedDict[_Job, _Outputs] = OrderedDict()
         self._plans: OrderedDict[_PlanKey, batch.Schedule] = OrderedDict()
         self._lock = Lock()
         self._longest_step = LONGEST_STEP
@@ -176,7 +192,7 @@ class AntennaMachine(Machine):
         """Return the tests, with the noise of readings that move as at a point."""
         found = []
         for k, test in enumerate(self._tests):
-            out = self._run(self._job(k, point, math.inf))[::test.parts]
+            out = self._run(self._job(k, point, math.inf)).values[::test.parts]
             # the machine may move faster than the model without effects: the readings tell
             slope = np.fmax(np.abs(out[:, :, 1]), np.abs(test.slope))
             noise = test.sensors.noise(out[:, :, 0], slope, test.jitter)
@@ -347,7 +363,7 @@ class AntennaMachine(Machine):
             for k in range(len(self._tests)) if one is None else (one,):
                 uses.setdefault(self._job(k, point, until), []).append(i)
 
-        def read(job: _Job) -> FloatArray | None:
+        def read(job: _Job) -> _Outputs | None:
             """Read what needs a run, and return the run if it is a new one."""
             known = self._runs.get(job)
             out = self._run(job) if known is None else known
@@ -399,13 +415,14 @@ class AntennaMachine(Machine):
 
         """
         job = self._job(experiment, point, math.inf)
-        return self._tests[experiment].output_times, self._run(job, channels=channels)
+        return self._tests[experiment].output_times, self._run(job, channels=channels).values
 
     def _run(self, job: _Job, disturbance: tuple[DriveDisturbance, Course] | None = None,
-             channels: tuple[str, ...] = batch.CHANNELS) -> FloatArray:
+             channels: tuple[str, ...] = batch.CHANNELS) -> _Outputs:
         test = self._tests[job.experiment]
         kind = test.record.dtype
-        run = RunSetup(test.record.view(np.float64).copy(), kind, float(test.time[-1]), test.bias)
+        run = RunSetup(test.record.view(np.float64).copy(), kind, float(test.time[-1]), test.bias,
+                       start_angle=test.start_angle)
         for name, value in job.items:
             self._run_modifiers[name][0].apply(run, value)
         record = run.numbers.view(kind)
@@ -423,15 +440,22 @@ class AntennaMachine(Machine):
         plan = self._plan(job.experiment, run, Longest(longest, SHORTEST_STEP, WAVE_STEP, cycles))
         if disturbance is not None:
             plan = _disturbed(plan, run, *disturbance)
+        rippling = {channels.index(f'{motor}/tach_rate'): motor for motor in (
+            'motor_1', 'motor_2') if f'{motor}/tach_rate' in channels
+            and ripples(record[motor]['tachometer'][0])}
+        wanted = (*channels, *(f'{motor}/angle' for motor in rippling.values()))
         time = test.output_times
         samples = int(np.count_nonzero(time - time[0] < job.until))
         if samples == time.size:
-            return batch.run(record, plan, channels=channels)
-        steps = int(np.argmax(plan.keep == samples - 1))
-        out = np.full((time.size, len(channels), 2), np.nan)
-        out[:samples] = batch.run(record, batch.Schedule(
-            plan.steps[:steps], plan.keep[:steps + 1]), channels=channels)
-        return out
+            out = batch.run(record, plan, channels=wanted)
+        else:
+            steps = int(np.argmax(plan.keep == samples - 1))
+            out = np.full((time.size, len(wanted), 2), np.nan)
+            out[:samples] = batch.run(record, batch.Schedule(
+                plan.steps[:steps], plan.keep[:steps + 1]), channels=wanted)
+        return _Outputs(out[:, :len(channels)], {
+            channel: RipplingTachometer(out[:, row, 0], record[motor]['tachometer'][0])
+            for row, (channel, motor) in enumerate(rippling.items(), len(channels))})
 
     def _plan(self, k: int, run: RunSetup, longest: Longest) -> batch.Schedule:
         """Return the steps of a run."""
@@ -462,7 +486,7 @@ class AntennaMachine(Machine):
                 self._plans.popitem(last=False)
         return plan
 
-    def _read(self, k: int, out: FloatArray, point: Point) -> FloatArray:
+    def _read(self, k: int, out: _Outputs, point: Point) -> FloatArray:
         """Return the readings of a run, with the errors of sensors that nothing feeds back."""
         time = self._tests[k].time
         readings = SensorReadings()
@@ -472,9 +496,15 @@ class AntennaMachine(Machine):
                 modifier.apply_to_readings(readings, value)
         digit = readings.digit
         wanted = time + readings.clock_rate * (time - time[0])
-        values = read_at(self._tests[k].output_times, out, wanted, readings.late) * readings.gain
+        times = self._tests[k].output_times
+        values = read_at(times, out.values, wanted, readings.late)
+        for channel, tachometer in out.rippling.items():
+            values[:, channel] = tachometer.read_at(
+                times, out.values[:, channel], wanted, float(readings.late[channel]))
+        values *= readings.gain
+        turned = self._tests[k].start_angle
         for shape, parts in readings.waves.items():
-            values[:, ENCODER] += shape.along(values[:, ENCODER], parts)
+            values[:, ENCODER] += shape.along(values[:, ENCODER] + turned, parts)
         values += readings.zero
         if digit > 0.0 and self._digit:
             # whatever lies within the digit that was read would have been read

@@ -49,6 +49,7 @@ class RunSetup:
     late_jumps : by how much jumps of the command come later, by number [s]
     hole_means : by how much the mean of the command is higher in its holes, by number [rad/s]
     waves : parts of each wave
+    start_angle : of the axis at the beginning [rad]; waves go on from there
 
     """
 
@@ -60,6 +61,7 @@ class RunSetup:
     late_jumps: dict[int, float] = field(default_factory=dict)
     hole_means: dict[int, float] = field(default_factory=dict)
     waves: dict[WaveShape, list[float]] = field(default_factory=dict)
+    start_angle: float = 0.0
 
     def change(self, path: str, how: str, value: float) -> None:
         """Scale a number of the record by 1 + value, add the value to it, or set it."""
@@ -73,8 +75,11 @@ class RunSetup:
     def write_waves(self) -> None:
         """Write the waves into the record."""
         for shape, parts in self.waves.items():
+            turned = self.start_angle
+            if shape.angle != 'axis':
+                turned *= float(self.numbers[place_of(self.kind, f'{shape.angle}.gear_ratio')])
             for path in shape.paths:
-                for end, value in shape.fields(parts).items():
+                for end, value in shape.fields(parts, turned).items():
                     self.change(f'{path}.{shape.stem}{end}', SET, value)
 
 

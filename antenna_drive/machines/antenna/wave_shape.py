@@ -42,7 +42,7 @@ class WaveShape:
     angle: str
     order: float = 0.0
 
-    def fields(self, parts: Sequence[float]) -> dict[str, float]:
+    def fields(self, parts: Sequence[float], turned: float = 0.0) -> dict[str, float]:
         """
         Return the wave as the record has it: amplitudes and phases, by the ends of their names.
 
@@ -51,15 +51,20 @@ class WaveShape:
         parts
             sine and cosine, relative change of the order, sine and cosine of the second and of
             the third harmonic
+        turned
+            angle from which the angle of the record counts [rad]
 
         """
         sine, cosine, change, second_sine, second_cosine, third_sine, third_cosine = parts
-        return {'': math.hypot(sine, cosine), '_phase': math.atan2(cosine, sine),
-                '_cycles': self.order * (1.0 + change),
+        cycles = self.order * (1.0 + change)
+        phase = math.remainder(cycles * turned, math.tau)
+        return {'': math.hypot(sine, cosine),
+                '_phase': math.atan2(cosine, sine) + phase,
+                '_cycles': cycles,
                 '_second': math.hypot(second_sine, second_cosine),
-                '_second_phase': math.atan2(second_cosine, second_sine),
+                '_second_phase': math.atan2(second_cosine, second_sine) + 2.0 * phase,
                 '_third': math.hypot(third_sine, third_cosine),
-                '_third_phase': math.atan2(third_cosine, third_sine)}
+                '_third_phase': math.atan2(third_cosine, third_sine) + 3.0 * phase}
 
     def along(self, angle: FloatArray, parts: Sequence[float]) -> FloatArray:
         """Return the wave at angles of shape (n,); `parts` as in `fields`."""
