@@ -48,7 +48,8 @@ TITLE = '| trial | one effect, named first |'
     ('wild_12', 'trial 12'), ('wild_13', 'trial 13'), ('wild_14', 'trial 14'),
     ('wild_15', 'trial 15'), ('wild_16', 'trial 16'), ('wild_17', 'trial 17'),
     ('family_b_1', 'family B'),
-    ('family_b_2', 'rest of family B'), ('family_b_3', 'fresh family B')])
+    ('family_b_2', 'rest of family B'), ('family_b_3', 'fresh family B'),
+    ('family_b_4', 'second fresh family B')])
 @pytest.mark.parametrize('page', ['diagnosis.md', 'trials/README.md'])
 def test_figures_of_a_wild_trial_are_those_of_its_cases(page: str, file: str, name: str) -> None:
     cases = read_scored(DOCS / 'trials' / f'{file}.jsonl')

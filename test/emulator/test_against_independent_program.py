@@ -24,8 +24,7 @@ from typing import Any
 from antenna_drive.article.experiments import experiments
 from antenna_drive.emulator.run import simulate
 from antenna_drive.parameters.sets import changed
-from antenna_drive.trial.equations import LAW_B
-from antenna_drive.trial.machine import reference_machine
+from antenna_drive.trial.machine import LAW_B, reference_machine
 from antenna_drive.trial.real_antenna import simulate as simulate_apart
 from antenna_drive.trial.sheet import CaseSheet
 import numpy as np
