@@ -108,8 +108,7 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
         truths = others.draw_truths(count, seed, machines)
     else:
         truths = draw_truths(count, seed, tolerance, sample_rate=sample_rate, duration=duration,
-                             wild=wild, family=family, largest=largest,
-                             longest=longest)
+                             wild=wild, family=family, largest=largest, longest=longest)
     return sealing.seal(folder, settings, truths)
 
 

@@ -242,14 +242,14 @@ def summary(results: TrialResults) -> dict[str, Any]:
         found['rules'][rule] = {
             'cases': share.cases, 'failures': len(items) - len(judged),
             'top1': share.value, 'ci95': [share.low, share.high],
-            **{f'median_{left}_before': _median([
-                results[name].get(f'{left}_before') for name, _ in judged])
-               for left in ('set', 'rivals')},
-            **{f'median_{left}': _median([item.get(left) for _, item in judged])
-               for left in ('set', 'rivals')},
             'violations': sum(any(item['reached'][key] > limit for key, limit in item.get(
                 'limits', {}).items() if key in item['reached'])
                 for _, item in judged if 'reached' in item)}
+        for left in ('set', 'rivals'):
+            found['rules'][rule] |= {
+                f'median_{left}_before': _median([
+                    results[name].get(f'{left}_before') for name, _ in judged]),
+                f'median_{left}': _median([item.get(left) for _, item in judged])}
     # no answer stands for a cause from outside the catalogue
     kept = [(item['expected'], 0.0 if item['kind'] == 'outside' else
              item['true_probability'] / (1.0 - item['unknown']))

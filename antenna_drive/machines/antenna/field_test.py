@@ -188,13 +188,11 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
             slips(measured[rest, tach], sensors.tach_noise), np.nan, measured[rest, tach])
     if window.begin > 0.0:
         drive = changed(drive, {'torque_share.circuit.start': 'steady'})
+    angle = 0.0 if window.known_start else _angle(recording, window.begin)
     if not window.known_start:
-        angle = _angle(recording, window.begin)
         measured[:, ENCODER] -= angle
         drive = changed(drive, {
             'plant.axis.start_elevation': drive.plant.axis.start_elevation + angle})
-    else:
-        angle = 0.0
     if not math.isinf(window.end):
         name = f'{name} {window.compared:.0f}-{time[-1]:.0f} s'
     test = FieldTest(

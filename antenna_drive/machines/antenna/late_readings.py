@@ -23,16 +23,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 import math
+from typing import Any
 
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.physics.compiling import compiled
+from antenna_drive.physics.motor import tachometer, tachometer_slope
 import numpy as np
 
 # Greatest time between two outputs [s]: two of the longest steps of a whole run, and less than one
 # of a search.
 _SPACING_S = 5.3e-3
-# What the names of the harmonics of a ripple end with.
-_HARMONICS = ('', '_second', '_third')
 
 
 def parts_of(period: float) -> int:
@@ -84,12 +84,12 @@ class RipplingTachometer:
     Attributes
     ----------
     angle : of its rotor at each output, shape (n,) [rad]
-    numbers : its record, see `parameters.sets.Tachometer`
+    numbers : its record, shape (1,), see `parameters.sets.Tachometer`
 
     """
 
     angle: FloatArray
-    numbers: np.void
+    numbers: np.ndarray[Any, np.dtype[Any]]
 
     def read_at(self, time: FloatArray, out: FloatArray, wanted: FloatArray,
                 late: float) -> FloatArray:
@@ -98,29 +98,30 @@ class RipplingTachometer:
 
         Parameters are those of `late_readings.read_at`, for one channel: `out` has shape (n, 2).
         """
-        offset = float(self.numbers['offset'])
-        gain, change = self._gain(self.angle)
-        rate = (out[:, 0] - offset) / gain
-        acceleration = (out[:, 1] - rate ** 2 * change) / gain
-        motion = np.stack([np.column_stack([self.angle, rate]),
-                           np.column_stack([rate, acceleration])], axis=-1)
-        angle, rate = read_at(time, motion, wanted, np.full(2, late)).T
-        return np.asarray(offset + self._gain(angle)[0] * rate)
-
-    def _gain(self, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return reading per rate at angles of shape (n,), and its derivative by the angle."""
-        gain, change = np.full_like(angle, self.numbers['gain']), np.zeros_like(angle)
-        for k, end in enumerate(_HARMONICS, start=1):
-            cycles = k * self.numbers['ripple_cycles']
-            turned = cycles * angle + self.numbers[f'ripple{end}_phase']
-            gain += self.numbers[f'ripple{end}'] * np.sin(turned)
-            change += self.numbers[f'ripple{end}'] * cycles * np.cos(turned)
-        return gain, change
+        motion = np.empty((self.angle.size, 2, 2))
+        _motion(self.angle, out, self.numbers, motion)
+        later = read_at(time, motion, wanted, np.full(2, late))
+        found = np.empty(wanted.size)
+        _readings(later, self.numbers, found)
+        return found
 
 
-def ripples(tachometer: np.void) -> bool:
-    """Return whether a tachometer's record has a ripple."""
-    return any(tachometer[f'ripple{end}'] for end in _HARMONICS)
+@compiled
+def _motion(angle: FloatArray, out: FloatArray, p: Any, motion: FloatArray) -> None:
+    """Write angle and rate of a rotor and their slopes, as its tachometer and its angle say."""
+    for i in range(angle.size):
+        # the reading at rate 1 and the slope at rate 1 without acceleration
+        gain = tachometer(1.0, angle[i], p[0]) - p[0].offset
+        rate = (out[i, 0] - p[0].offset) / gain
+        slope = rate * rate * tachometer_slope(1.0, angle[i], 0.0, p[0])
+        motion[i, 0, 0], motion[i, 0, 1] = angle[i], rate
+        motion[i, 1, 0], motion[i, 1, 1] = rate, (out[i, 1] - slope) / gain
+
+
+@compiled
+def _readings(motion: FloatArray, p: Any, found: FloatArray) -> None:
+    for i in range(found.size):
+        found[i] = tachometer(motion[i, 1], motion[i, 0], p[0])
 
 
 @compiled

@@ -41,7 +41,7 @@ from antenna_drive.machines.antenna.excitation import (
 from antenna_drive.machines.antenna.field_test import (
     CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, prepared, TACH_1, TACH_2, UNITS,
 )
-from antenna_drive.machines.antenna.late_readings import read_at, ripples, RipplingTachometer
+from antenna_drive.machines.antenna.late_readings import read_at, RipplingTachometer
 from antenna_drive.machines.antenna.modifiers import (
     ADD, AntennaParameter, change, Modifier, ReadingModifier, RunModifier, RunSetup,
     SensorReadings,
@@ -49,7 +49,7 @@ from antenna_drive.machines.antenna.modifiers import (
 from antenna_drive.machines.antenna.sensors import digit_of
 from antenna_drive.machines.antenna.tolerances import nuisances, starting_places
 from antenna_drive.machines.antenna.wave_orders import likely_orders
-from antenna_drive.machines.antenna.waves import fastest_wave, Wave
+from antenna_drive.machines.antenna.waves import fastest_wave, is_there, Wave
 from antenna_drive.parameters.records import place_of
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.recording import Recording
@@ -440,9 +440,9 @@ class AntennaMachine(Machine):
         plan = self._plan(job.experiment, run, Longest(longest, SHORTEST_STEP, WAVE_STEP, cycles))
         if disturbance is not None:
             plan = _disturbed(plan, run, *disturbance)
-        rippling = {channels.index(f'{motor}/tach_rate'): motor for motor in (
-            'motor_1', 'motor_2') if f'{motor}/tach_rate' in channels
-            and ripples(record[motor]['tachometer'][0])}
+        rippling = {channels.index(f'{motor}/tach_rate'): motor
+                    for motor in ('motor_1', 'motor_2') if f'{motor}/tach_rate' in channels
+                    and is_there(record[motor]['tachometer'], 'ripple')}
         wanted = (*channels, *(f'{motor}/angle' for motor in rippling.values()))
         time = test.output_times
         samples = int(np.count_nonzero(time - time[0] < job.until))
@@ -454,7 +454,7 @@ class AntennaMachine(Machine):
             out[:samples] = batch.run(record, batch.Schedule(
                 plan.steps[:steps], plan.keep[:steps + 1]), channels=wanted)
         return _Outputs(out[:, :len(channels)], {
-            channel: RipplingTachometer(out[:, row, 0], record[motor]['tachometer'][0])
+            channel: RipplingTachometer(out[:, row, 0], record[motor]['tachometer'])
             for row, (channel, motor) in enumerate(rippling.items(), len(channels))})
 
     def _plan(self, k: int, run: RunSetup, longest: Longest) -> batch.Schedule:

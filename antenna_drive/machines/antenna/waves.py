@@ -35,12 +35,17 @@ _OF_MOTORS = tuple((motor, part, stem) for motor in ('motor_1', 'motor_2') for p
     ('motor', 'torque_ripple'), ('gearbox', 'transmission_error'), ('tachometer', 'ripple')))
 
 
+def is_there(numbers: np.ndarray[Any, np.dtype[Any]], stem: str) -> bool:
+    """Return whether the record of a part, shape (1,), has a wave whose names begin so."""
+    return any(numbers[stem + end][0] != 0.0 for end in ('', '_second', '_third'))
+
+
 def fastest_wave(record: np.ndarray[Any, np.dtype[Any]]) -> float:
     """Return the cycles per turn of the axis of the fastest wave in a drive's record; 0: none."""
     cycles = 0.0
     for motor, part, stem in _OF_MOTORS:
         numbers = record[motor][part]
-        if any(numbers[stem + end][0] != 0.0 for end in ('', '_second', '_third')):
+        if is_there(numbers, stem):
             cycles = max(cycles, float(numbers[f'{stem}_cycles'][0])
                          * float(record[motor]['gear_ratio'][0]))
     return cycles
