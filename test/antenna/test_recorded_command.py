@@ -176,6 +176,43 @@ def test_a_sine_is_smooth_between_its_samples(hertz: float) -> None:
     assert np.abs(command(places) - np.sin(omega * places)).max() < (omega * PERIOD) ** 3 / 20.0
 
 
+@given(start=st.floats(1.0, 2.0), phase=st.floats(0.25, 0.35) | st.floats(0.75, 0.85),
+       hertz=st.floats(3.0, 5.0), last=st.floats(0.15, 0.25) | st.floats(0.65, 0.75))
+def test_a_fast_motion_that_is_cut_off_jumps(start: float, phase: float, hertz: float,
+                                             last: float) -> None:
+    """A sine begins and ends far from zero, and would not have been at rest a sample away."""
+    end, turn = start + (40.0 + last - phase) / hertz, 2.0 * np.pi
+
+    def burst(time: FloatArray) -> FloatArray:
+        return np.where((time >= start) & (time < end),
+                        np.sin(turn * (hertz * (time - start) + phase)), 0.0)
+
+    command = sampled(burst, end + 1.0)
+    assert command.jumps.size == 2
+    late = np.array([start, end]) - command.jumps
+    assert np.abs(late).max() <= 0.5 * PERIOD + 1e-9
+    places = np.linspace(0.0, end + 0.9, 9973)
+    apart = (abs(places - start) > PERIOD) & (abs(places - end) > PERIOD)
+    tolerance = (turn * hertz * PERIOD) ** 3 / 10.0
+    np.testing.assert_allclose(command(places[apart]), burst(places[apart]), rtol=0.0,
+                               atol=tolerance)
+    # a motion goes on up to its jump
+    exact = command.with_jump(0, late[0]).with_jump(1, late[1])
+    inside = (places > start + 1e-6) & (places < end - 1e-6)
+    np.testing.assert_allclose(exact(places[inside]), burst(places[inside]), rtol=0.0,
+                               atol=(turn * hertz * PERIOD) ** 3)
+
+
+@pytest.mark.parametrize('ending', [
+    lambda t: np.interp(t, [1.0, 1.307, 1.613, 1.931], [0.0, 1.0, -1.0, 0.0]),
+    lambda t: np.where(abs(t - 2.003) < 0.5, 1.0 + np.cos(2.0 * np.pi * (t - 2.003)), 0.0),
+    lambda t: np.where(t < 3.007, 0.0, 1.0 - np.exp(-3.0 * (t - 3.007))),
+], ids=['lines', 'cosine', 'filtered step'])
+def test_a_motion_that_comes_to_rest_does_not_jump(
+        ending: Callable[[FloatArray], FloatArray]) -> None:
+    assert sampled(ending, 6.0).jumps.size == 0
+
+
 def test_straight_lines_and_corners_on_samples_are_exact() -> None:
     def triangle(time: FloatArray) -> FloatArray:
         return np.asarray(np.interp(time, np.arange(0.0, 31.0), np.tile([0.0, 1.0], 16)[:31]))

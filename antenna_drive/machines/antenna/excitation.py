@@ -15,8 +15,9 @@
 What a test did to the drive, from the test sheet or, failing that, from the recorded command.
 
 A sheet's waveform is exact: its jumps are known to the microsecond. A recorded command is a set
-of samples. Between two that differ by more than their neighbours do, a jump is assumed: where the
-regular times of many jumps put it, or else halfway. It may come anywhere between the two.
+of samples. Between two that differ by more than their neighbours do, a jump is assumed, and where
+a motion is cut off: where the regular times of many jumps put it, or else halfway. It may come
+anywhere between the two.
 """
 
 from __future__ import annotations
@@ -57,6 +58,9 @@ _APART_S = 1e-9
 _LACKS_ROWS = 1.5
 # ... and its command is not told by those around it if they part by this share of its range.
 _UNCERTAIN = 0.01
+# A command that keeps its value for so many samples stands still. A motion that ends there jumps
+# if it, taken on, comes no nearer than this share of the range.
+_STILL, _NEAR = 4, 0.05
 _PARABOLA = np.linalg.inv(np.vander(_PLACES, 3, increasing=True))
 
 
@@ -140,21 +144,36 @@ class RecordedCommand:
         # straight lines go on where rows are missing, and curves turn in it
         uncertain = uncertainty > _UNCERTAIN * np.ptp(value)
         large &= np.isnan(uncertainty) | (uncertain & _level(time, value))
+        # parabolas up to the jump that ends a motion, and from the one that begins it
+        ends, begins = _cut_off(time, value), _cut_off(-time[::-1], value[::-1])[::-1]
+        ends[~np.isnan(uncertainty)] = begins[~np.isnan(uncertainty)] = 0.0
+        (before, curve), (behind, curve_behind) = ends.T, begins.T * [[-1.0], [1.0]]
+        cut = ends.any(axis=1) | begins.any(axis=1)
+        large |= cut
         k = np.flatnonzero(large)
         jumps, _ = regular_times(time[k], time[k + 1])
         slack = np.column_stack([np.minimum(time[k] - jumps + _APART_S, 0.0),
                                  np.maximum(time[k + 1] - jumps - _APART_S, 0.0)])
         # two extra samples at each jump keep the lines on their own sides
         times = np.r_[time, jumps - _APART_S, jumps + _APART_S]
-        values = np.r_[value, value[k], value[k + 1]]
+        since, until = jumps - time[k], jumps - time[k + 1]
+        values = np.r_[value, value[k] + (before[k] + 0.5 * curve[k] * since) * since,
+                       value[k + 1] + (behind[k] + 0.5 * curve_behind[k] * until) * until]
         order = np.argsort(times, kind='stable')
         slopes = np.tile((np.diff(value) / np.diff(time))[:, np.newaxis], 2)
         smooth = _smooth(time, value)
-        slopes[smooth] = np.stack([np.gradient(value, time)[:-1], np.gradient(value, time)[1:]],
-                                  axis=1)[smooth]
+        # the curve beside such a jump is no corner
+        smooth[:-1] |= before[1:] != 0.0
+        smooth[1:] |= behind[:-1] != 0.0
+        gradient = np.gradient(value, time)
+        gradient[:-1][cut], gradient[1:][cut] = before[cut], behind[cut]
+        slopes[smooth] = np.stack([gradient[:-1], gradient[1:]], axis=1)[smooth]
         # the three pieces of an interval with a jump: the middle one is the jump
         pieces = np.insert(
             np.where(large[:, np.newaxis], 0.0, slopes), np.repeat(k, 2), 0.0, axis=0)
+        first = k + 2 * np.arange(k.size)
+        pieces[first] = np.column_stack([before[k], before[k] + curve[k] * since])
+        pieces[first + 2] = np.column_stack([behind[k] + curve_behind[k] * until, behind[k]])
         open_ = uncertain.copy()
         open_[k] = False
         open_[_corners(time, value)[0]] = False
@@ -202,12 +221,17 @@ class RecordedCommand:
 
     def with_jump(self, number: int, later: float) -> RecordedCommand:
         """Return the command with one of its jumps later [s], within its slack."""
-        time, jumps = self.time.copy(), self.jumps.copy()
-        # the two sides of the jump
+        time, value, slope = self.time.copy(), self.value.copy(), self.slope.copy()
+        jumps = self.jumps.copy()
         right = int(np.searchsorted(time, jumps[number]))
+        # the two sides of the jump: each parabola goes on to it
+        for side, piece, end in ((right - 1, right - 2, 1), (right, right, 0)):
+            curve = (slope[piece, 1] - slope[piece, 0]) / (time[piece + 1] - time[piece])
+            value[side] += (slope[piece, end] + 0.5 * curve * later) * later
+            slope[piece, end] += curve * later
         time[right - 1:right + 1] += later
         jumps[number] += later
-        return replace(self, time=time, jumps=jumps)
+        return replace(self, time=time, value=value, slope=slope, jumps=jumps)
 
     def with_mean(self, number: int, more: float) -> RecordedCommand:
         """Return the command with another mean in one of its holes, by so much [rad/s]."""
@@ -217,6 +241,30 @@ class RecordedCommand:
         # a cubic that begins and ends as before: its mean is a twelfth of the slopes' difference
         slope[piece] += 6.0 * more / (end - begin) * np.array([1.0, -1.0])
         return replace(self, slope=slope)
+
+
+def _cut_off(time: FloatArray, value: FloatArray) -> FloatArray:
+    """
+    Return how a motion goes on that jumps to where the command stands still, shape (n - 1, 2).
+
+    First and second derivative at the beginning of the interval in which it jumps [rad/s^2],
+    [rad/s^3]; 0 for all other intervals. A motion that comes to its end by itself
+    reaches that value between the last sample that moves and the first that does not.
+    """
+    found = np.zeros((time.size - 1, 2))
+    still = np.diff(value) == 0.0
+    ends = ~still
+    for n in range(1, _STILL):
+        ends[-n:] = False
+        ends[:-n] &= still[n:]
+    for k in np.flatnonzero(ends[2:] & ~still[1:-1] & ~still[:-2]) + 2:
+        first, scale = time[k], time[k + 1] - time[k]
+        taken_on = [Polynomial.fit((time[k - n:k + 1] - first) / scale, value[k - n:k + 1], n)
+                    for n in (1, 2)]
+        above = np.ravel([side(np.linspace(0.0, 1.0, 9)) for side in taken_on]) - value[k + 1]
+        if np.abs(above).min() > _NEAR * np.ptp(value) and abs(np.sign(above).sum()) == above.size:
+            found[k] = [taken_on[1].deriv(n)(0.0) / scale ** n for n in (1, 2)]
+    return found
 
 
 def _uncertainty(time: FloatArray, value: FloatArray) -> FloatArray:
