@@ -67,14 +67,15 @@ def test_figures_of_a_wild_trial_are_those_of_its_cases(
             assert float(stated.group()) == pytest.approx(figures[key], abs=0.005001), title
 
 
+@pytest.mark.parametrize('trial', ['5', '6'])
 @pytest.mark.parametrize('key', ROWS)
-def test_figures_of_a_tame_trial_are_those_of_its_cases(key: str) -> None:
-    figures = score(read_scored(DOCS / 'trials' / 'tame_5.jsonl'))
+def test_figures_of_a_tame_trial_are_those_of_its_cases(key: str, trial: str) -> None:
+    figures = score(read_scored(DOCS / 'trials' / f'tame_{trial}.jsonl'))
     text = (DOCS / 'trials' / 'README.md').read_text(encoding='utf-8')
     table = text[text.index('| figure (95 % interval) |'):].split('\n\n')[0].splitlines()
     titles, _, *rows = [[cell.strip() for cell in line.strip('|').split('|')] for line in table]
     [row] = [row for row in rows if row[0].startswith(ROWS[key])]
-    stated = re.match(r'[\d.]+', row[titles.index('5')])
+    stated = re.match(r'[\d.]+', row[titles.index(trial)])
     assert stated is not None
     assert float(stated.group()) == pytest.approx(
         figures[key], abs=0.5001 if key == 'seconds_median' else 0.005001)
