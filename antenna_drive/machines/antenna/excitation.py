@@ -147,6 +147,7 @@ class RecordedCommand:
         # parabolas up to the jump that ends a motion, and from the one that begins it
         ends, begins = _cut_off(time, value), _cut_off(-time[::-1], value[::-1])[::-1]
         ends[~np.isnan(uncertainty)] = begins[~np.isnan(uncertainty)] = 0.0
+        # a slope that was found backwards has the other sign, its change has not
         (before, curve), (behind, curve_behind) = ends.T, begins.T * [[-1.0], [1.0]]
         cut = ends.any(axis=1) | begins.any(axis=1)
         large |= cut
@@ -248,8 +249,8 @@ def _cut_off(time: FloatArray, value: FloatArray) -> FloatArray:
     Return how a motion goes on that jumps to where the command stands still, shape (n - 1, 2).
 
     First and second derivative at the beginning of the interval in which it jumps [rad/s^2],
-    [rad/s^3]; 0 for all other intervals. A motion that comes to its end by itself
-    reaches that value between the last sample that moves and the first that does not.
+    [rad/s^3]; 0 for all other intervals. A motion that comes to rest by itself reaches that value
+    between the last sample that moves and the first that does not.
     """
     found = np.zeros((time.size - 1, 2))
     still = np.diff(value) == 0.0
@@ -258,12 +259,11 @@ def _cut_off(time: FloatArray, value: FloatArray) -> FloatArray:
         ends[-n:] = False
         ends[:-n] &= still[n:]
     for k in np.flatnonzero(ends[2:] & ~still[1:-1] & ~still[:-2]) + 2:
-        first, scale = time[k], time[k + 1] - time[k]
-        taken_on = [Polynomial.fit((time[k - n:k + 1] - first) / scale, value[k - n:k + 1], n)
-                    for n in (1, 2)]
-        above = np.ravel([side(np.linspace(0.0, 1.0, 9)) for side in taken_on]) - value[k + 1]
-        if np.abs(above).min() > _NEAR * np.ptp(value) and abs(np.sign(above).sum()) == above.size:
-            found[k] = [taken_on[1].deriv(n)(0.0) / scale ** n for n in (1, 2)]
+        line, parabola = (_through(time[k - n:k + 1], value[k - n:k + 1]) for n in (1, 2))
+        places = np.linspace(time[k], time[k + 1], 9)
+        above = np.r_[line(places), parabola(places)] - value[k + 1]
+        if max(above.min(), -above.max()) > _NEAR * np.ptp(value):
+            found[k] = [parabola.deriv(n)(time[k]) for n in (1, 2)]
     return found
 
 
@@ -277,16 +277,16 @@ def _uncertainty(time: FloatArray, value: FloatArray) -> FloatArray:
     uncertainty = np.full(width.size, np.nan)
     for i in np.flatnonzero(width > _LACKS_ROWS * np.median(width)):
         middle = 0.5 * (time[i] + time[i + 1])
-        apart = (abs(_taken_on(time[i - n:i + 1], value[i - n:i + 1], middle)
-                     - _taken_on(time[i + 1:i + 2 + n], value[i + 1:i + 2 + n], middle))
+        apart = (abs(_through(time[i - n:i + 1], value[i - n:i + 1])(middle)
+                     - _through(time[i + 1:i + 2 + n], value[i + 1:i + 2 + n])(middle))
                  for n in (1, 2) if n <= i < width.size - n)
         uncertainty[i] = min(apart, default=0.0)
     return uncertainty
 
 
-def _taken_on(time: FloatArray, value: FloatArray, at: float) -> float:
-    """Return the value of the polynomial through a few samples at a time."""
-    return float(Polynomial.fit(time, value, time.size - 1)(at))
+def _through(time: FloatArray, value: FloatArray) -> Polynomial:
+    """Return the polynomial through a few samples."""
+    return Polynomial.fit(time, value, time.size - 1)
 
 
 def _level(time: FloatArray, value: FloatArray) -> NDArray[np.bool_]:
