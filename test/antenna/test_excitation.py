@@ -17,7 +17,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from antenna_drive.machines.antenna.excitation import RecordedCommand, SheetCommand
+from antenna_drive.machines.antenna.excitation import SheetCommand
+from antenna_drive.machines.antenna.recorded_command import RecordedCommand
 from antenna_drive.recording.sheet import parse_sheet
 from antenna_drive.trial.sheet import CaseSheet
 from antenna_drive.trial.waveform import command, corners

@@ -18,11 +18,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from antenna_drive.diagnosis import FloatArray
-from antenna_drive.machines.antenna.excitation import RecordedCommand
 from antenna_drive.machines.antenna.field_test import ENCODER, TACH_1, TACH_2
 from antenna_drive.machines.antenna.late_readings import dense, parts_of, read_at
 from antenna_drive.machines.antenna.machine import AntennaMachine, LOW_FIDELITY_STEP
 from antenna_drive.machines.antenna.prediction import predict, RecorderErrors
+from antenna_drive.machines.antenna.recorded_command import RecordedCommand
 from antenna_drive.parameters import load
 from antenna_drive.parameters.sets import changed
 from antenna_drive.recording.recording import Channel, Recording

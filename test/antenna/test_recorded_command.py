@@ -18,7 +18,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from antenna_drive.diagnosis import FloatArray
-from antenna_drive.machines.antenna.excitation import RecordedCommand, regular_times
+from antenna_drive.machines.antenna.command_samples import regular_times
+from antenna_drive.machines.antenna.recorded_command import RecordedCommand
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest

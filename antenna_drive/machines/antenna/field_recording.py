@@ -20,9 +20,8 @@ from dataclasses import dataclass, replace
 
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.errors import UserError
-from antenna_drive.machines.antenna.excitation import (
-    CommandedRate, RecordedCommand, SheetCommand,
-)
+from antenna_drive.machines.antenna.excitation import CommandedRate, SheetCommand
+from antenna_drive.machines.antenna.recorded_command import RecordedCommand
 from antenna_drive.machines.antenna.samples import spikes
 from antenna_drive.recording import sheet as sheets
 from antenna_drive.recording.recording import Channel, NANOSECONDS, Recording

@@ -24,13 +24,14 @@ from typing import Any
 from antenna_drive.diagnosis import FloatArray
 from antenna_drive.emulator import batch
 from antenna_drive.machines.antenna.excitation import (
-    Bias, CommandedRate, Longest, RecordedCommand, schedule, SheetCommand,
+    Bias, CommandedRate, Longest, schedule, SheetCommand,
 )
 from antenna_drive.machines.antenna.field_recording import (
     BIAS, CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldRecording, Note, TACH_1, TACH_2, UNITS,
 )
 from antenna_drive.machines.antenna.inference import completed
 from antenna_drive.machines.antenna.late_readings import dense, parts_of
+from antenna_drive.machines.antenna.recorded_command import RecordedCommand
 from antenna_drive.machines.antenna.samples import slips
 from antenna_drive.machines.antenna.sensors import jitter_of, SensorModel
 from antenna_drive.machines.antenna.sheet_settings import as_the_sheet_says

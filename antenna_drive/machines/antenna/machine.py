@@ -36,7 +36,7 @@ from antenna_drive.machines.antenna.catalogue import catalogue, DIGITS_SEEN, EXT
 from antenna_drive.machines.antenna.diagram import DIAGRAM
 from antenna_drive.machines.antenna.disturbances import DISTURBANCES, DriveDisturbance
 from antenna_drive.machines.antenna.excitation import (
-    Bias, Longest, RecordedCommand, schedule, with_bias, with_torque,
+    Bias, Longest, schedule, with_bias, with_torque,
 )
 from antenna_drive.machines.antenna.field_test import (
     CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, prepared, TACH_1, TACH_2, UNITS,
@@ -46,6 +46,7 @@ from antenna_drive.machines.antenna.modifiers import (
     ADD, AntennaParameter, change, Modifier, ReadingModifier, RunModifier, RunSetup,
     SensorReadings,
 )
+from antenna_drive.machines.antenna.recorded_command import RecordedCommand
 from antenna_drive.machines.antenna.sensors import digit_of
 from antenna_drive.machines.antenna.tolerances import nuisances, starting_places
 from antenna_drive.machines.antenna.wave_orders import likely_orders

@@ -19,7 +19,8 @@ from dataclasses import dataclass
 import math
 
 from antenna_drive.diagnosis import FloatArray
-from antenna_drive.machines.antenna.excitation import CommandedRate, RecordedCommand
+from antenna_drive.machines.antenna.excitation import CommandedRate
+from antenna_drive.machines.antenna.recorded_command import RecordedCommand
 from antenna_drive.recording import sheet as sheets
 import numpy as np
 

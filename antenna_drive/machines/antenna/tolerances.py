@@ -19,7 +19,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
 import math
 
-from antenna_drive.machines.antenna.excitation import RecordedCommand
 from antenna_drive.machines.antenna.field_test import (
     BIAS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, TACH_1, TACH_2,
 )
@@ -27,6 +26,7 @@ from antenna_drive.machines.antenna.modifiers import (
     add, AntennaParameter, ChannelDelay, ClockRate, ClockShift, Modifier, ReadingGain,
     ReadingZero, scale, SupplyGain, UnrecordedJump, UnrecordedMean,
 )
+from antenna_drive.machines.antenna.recorded_command import RecordedCommand
 from antenna_drive.recording.sheet import Tolerances
 
 # The numbers that the configuration knows only within the tolerance of the test sheet.
