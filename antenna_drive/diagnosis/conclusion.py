@@ -21,6 +21,7 @@ from statistics import fmean
 from typing import Any
 
 from antenna_drive.diagnosis import verdict
+from antenna_drive.diagnosis.doubts import Doubt, doubts
 from antenna_drive.diagnosis.elimination import (
     backward_elimination, forward_selection, settled_rivals,
 )
@@ -28,7 +29,7 @@ from antenna_drive.diagnosis.evidence import Evidence
 from antenna_drive.diagnosis.full_fits import FullFits
 from antenna_drive.diagnosis.held_out import held_out, refuted, shows_no_gap
 from antenna_drive.diagnosis.hypothesis import Hypothesis
-from antenna_drive.diagnosis.intervals import deviations, doubts, inflation, jackknife
+from antenna_drive.diagnosis.intervals import deviations, inflation, jackknife
 from antenna_drive.diagnosis.interventions import simplified
 from antenna_drive.diagnosis.lack_of_fit import lack_of_fit
 from antenna_drive.diagnosis.least_squares import LeastSquares
@@ -48,6 +49,7 @@ class Conclusion:
     none, best : the hypotheses without and with the likeliest effects
     reach : how far the gap shrinks, see `held_out`
     deviating : returns the standard deviations of the values of a hypothesis' effects
+    doubted : returns what tells whether its effects are larger than their tolerances
     evidence : every fit, with what each leaves
     decision : what follows from it
     notes : for people
@@ -59,6 +61,7 @@ class Conclusion:
     best: Hypothesis
     reach: dict[str, Any]
     deviating: Callable[[Hypothesis], dict[str, float]]
+    doubted: Callable[[Hypothesis], dict[str, Doubt]]
     evidence: Evidence
     decision: verdict.Decision
     notes: tuple[str, ...]
@@ -120,10 +123,14 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
             hypothesis, lambda name: inflated.get(name, usual), settings.interval,
             between_tests if hypothesis.effects == best.effects else {})
 
+    def doubted(hypothesis: Hypothesis, fitted: Sequence[Hypothesis]) -> dict[str, Doubt]:
+        return doubts(hypothesis, deviating(hypothesis), (none.cost - hypothesis.cost) / usual,
+                      settings.interval, beyond,
+                      _own_gains(hypothesis, _least_costs(fitted), usual))
+
     def judged(hypothesis: Hypothesis, fitted: Sequence[Hypothesis]) -> Hypothesis:
-        return replace(hypothesis, doubts=doubts(
-            hypothesis, deviating(hypothesis), (none.cost - hypothesis.cost) / usual,
-            settings.interval, beyond, _own_gains(hypothesis, _least_costs(fitted), usual)))
+        return replace(hypothesis, doubts={
+            effect: doubt.probability for effect, doubt in doubted(hypothesis, fitted).items()})
 
     hypotheses = _with_rests(fits, hypotheses, judged(best, hypotheses))
     hypotheses, best = [judged(h, hypotheses) for h in hypotheses], judged(best, hypotheses)
@@ -132,7 +139,8 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
                      'therefore not named')
     evidence = _evidence(
         problem, hypotheses, best, reach['explained_fraction']['ci95'][1], usual)
-    return Conclusion(problem, none, best, reach, deviating, evidence,
+    return Conclusion(problem, none, best, reach, deviating,
+                      lambda hypothesis: doubted(hypothesis, hypotheses), evidence,
                       evidence.decide(settings), tuple(notes))
 
 

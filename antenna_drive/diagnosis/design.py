@@ -359,7 +359,8 @@ class TestDesign:
     def _confirmed(self, test: Judged) -> Judged:
         """Fit each rival to the readings of the others."""
         return replace(test, confirmed=refitted(
-            self._space.machine(test.test), self._rivals, self._inflated, self._settings))
+            self._space.machine(test.test), self._rivals, self._inflated, self._settings,
+            test.told.shrunk if test.told else ()))
 
     def _sharpened(self, test: Judged) -> Judged:
         """Judge how well a test determines the numbers of the likeliest rival."""
@@ -412,13 +413,12 @@ class TestDesign:
     def _alike(self, judged: Sequence[Judged]) -> list[tuple[int, int, Mapping[str, float]]]:
         """Return the pairs of rivals that no judged test tells apart."""
         told = [test for test in judged if test.separation is not None]
-        limit = self._settings.planning.alike * self._temperature
         found = []
         for i, j in combinations(range(len(self._rivals)), 2):
-            lacks = [test.separation.least_lack()[i, j] for test in told
+            apart = [test.separation.least_evidence(self._temperature)[i, j] for test in told
                      if test.separation is not None]
-            if lacks and max(lacks) < limit:
-                best = told[int(np.argmax(lacks))]
+            if apart and max(apart) < self._settings.planning.alike:
+                best = told[int(np.argmax(apart))]
                 found.append((i, j, self._unread(best, i, j)))
         return found
 

@@ -212,7 +212,8 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         'planning': {
             'inflation': found.evidence.inflation, **machine.planning,
             'rivals': [rival.as_data() for rival in rivals_of(
-                problem, decision.answers, found.evidence.inflation, settings.planning)]},
+                problem, decision.answers, found.evidence.inflation, settings.planning,
+                found.doubted)]},
         'seconds': time.monotonic() - began,
         'notes': [*machine.notes, *found.notes],
     }

@@ -29,6 +29,13 @@ true rival gets, in the mean over the rivals, is the information that the test i
 
 To first order the best that a rival can do is a projection (`separation`). That is a promise. A
 fit of each rival to the readings of the others keeps or breaks it (`refitted`).
+
+Most open verdicts have two answers of which one names one effect more, and the verdict doubts that
+it is larger than its tolerance. The simpler answer misses the readings by hundreds of units
+already. What ends such a doubt is a smaller deviation of the effect's size, or a larger gain: see
+`doubts`. So two such rivals are told apart by no more than the doubt falls (`Separation.odds`).
+D_s-optimality asks for the same: A. C. Atkinson, A. N. Donev, R. D. Tobias, Optimum Experimental
+Designs (2007), section 10.3.
 """
 
 from __future__ import annotations
@@ -36,6 +43,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
+from itertools import permutations
+import math
 
 from antenna_drive.diagnosis.cholesky import factored, ROUNDING, solved
 from antenna_drive.diagnosis.least_squares import LeastSquares, proper_precision
@@ -63,6 +72,9 @@ class Separation:
     lack : half the chi-square by which rival j fits worse than i if i is true, shape (r, r)
     channels : share of that which each signal gives; empty where it was not asked for
     points : where the fit of rival j to the readings of i ended, by (i, j); empty without fits
+    odds : logarithm of the odds that rival j loses to i at most if i is true, because the verdict
+        doubts an effect that only one of them names, shape (r, r); infinite for all other pairs
+    shrunk : for each rival the share to which deviations of sizes shrink, by name
 
     """
 
@@ -70,10 +82,16 @@ class Separation:
     lack: FloatArray
     channels: Mapping[str, float] = field(default_factory=dict)
     points: Mapping[tuple[int, int], Point] = field(default_factory=dict)
+    odds: FloatArray = field(default_factory=lambda: np.array(np.inf))
+    shrunk: Sequence[Mapping[str, float]] = ()
+
+    def evidence(self, temperature: float) -> FloatArray:
+        """Return the logarithm of the odds that rival j loses to i if i is true, shape (r, r)."""
+        return np.asarray(np.minimum(self.lack / temperature, self.odds))
 
     def posterior(self, temperature: float) -> FloatArray:
         """Return the probability of rival j after the test if i is true, shape (r, r)."""
-        logits = np.log(np.maximum(self.prior, _LEAST)) - self.lack / temperature
+        logits = np.log(np.maximum(self.prior, _LEAST)) - self.evidence(temperature)
         weights = np.exp(logits - logits.max(axis=1, keepdims=True))
         return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
@@ -90,9 +108,10 @@ class Separation:
         """Return how probable it is that the true rival gets at least the probability `sure`."""
         return float(self.prior @ (np.diag(self.posterior(temperature)) >= sure))
 
-    def least_lack(self) -> FloatArray:
+    def least_evidence(self, temperature: float) -> FloatArray:
         """Return by how much two rivals are told apart at least, whichever is true, (r, r)."""
-        return np.asarray(np.minimum(self.lack, self.lack.T))
+        found = self.evidence(temperature)
+        return np.asarray(np.minimum(found, found.T))
 
 
 def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
@@ -125,24 +144,40 @@ def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
     prior, lack = _prior(rivals), np.zeros((len(rivals), len(rivals)))
     channels = problem.experiments[0].channels
     power = np.zeros(len(channels))
+    shrunk: list[dict[str, float]] = []
     for j, rival in enumerate(rivals):
         off = residuals[j] - residuals
         price = np.zeros(len(rivals))
         rest = off
         if follow:
-            price, rest = _followed(problem, rival, points[j], off, inflated)
+            price, rest, shares = _followed(problem, rival, points[j], off, inflated)
+            shrunk.append(shares)
         lack[:, j] = 0.5 * (np.sum(rest ** 2, axis=1) + price) / inflated
         power += prior @ np.sum(rest.reshape(len(rivals), -1, power.size) ** 2, axis=1)
-    shares = power / max(float(power.sum()), _LEAST)
-    return Separation(prior, lack, dict(zip(channels, shares.tolist(), strict=True)))
+    if not follow:
+        shrunk = [_shrunk_at_most(rivals, i, lack[i]) for i in range(len(rivals))]
+    parts = power / max(float(power.sum()), _LEAST)
+    return Separation(prior, lack, dict(zip(channels, parts.tolist(), strict=True)),
+                      odds=_odds(rivals, lack, shrunk), shrunk=shrunk)
 
 
 def refitted(machine: Machine, rivals: Sequence[Rival], inflated: float,
-             settings: Settings = DEFAULT) -> Separation:
+             settings: Settings = DEFAULT, shrunk: Sequence[Mapping[str, float]] = (),
+             ) -> Separation:
     """
     Return the same as `separation`, with each rival fitted to the readings of each other one.
 
-    Parameters, errors raised : as in `separation`
+    Parameters
+    ----------
+    machine, rivals, inflated, settings
+        as in `separation`
+    shrunk
+        what that has found of deviations; without it they stay as they are
+
+    Raises
+    ------
+    as `separation`
+
     """
     points = [known_to(machine, rival) for rival in rivals]
     problem = _problem(machine, rivals, points, settings)
@@ -167,7 +202,9 @@ def refitted(machine: Machine, rivals: Sequence[Rival], inflated: float,
                 state = fitted.fit(fitted.refreshed(state), settings.search.iterations)
             lack[i, j] = state.cost / inflated
             ends[i, j] = own.own(state.point())
-    return Separation(_prior(rivals), lack, points=ends)
+    shrunk = shrunk or [{} for _ in rivals]
+    return Separation(_prior(rivals), lack, points=ends, odds=_odds(rivals, lack, shrunk),
+                      shrunk=shrunk)
 
 
 def deviations(machine: Machine, rival: Rival, inflated: float,
@@ -261,6 +298,44 @@ def _prior(rivals: Sequence[Rival]) -> FloatArray:
     return np.asarray(prior / prior.sum())
 
 
+def _odds(rivals: Sequence[Rival], lack: FloatArray, shrunk: Sequence[Mapping[str, float]],
+          ) -> FloatArray:
+    """Return what doubts leave of the evidence, see `Separation.odds`."""
+    odds = np.full(lack.shape, np.inf)
+    for i, j in permutations(range(len(rivals)), 2):
+        one, other = rivals[i], rivals[j]
+        more = set(one.named) - set(other.named)
+        if more and set(other.named) < set(one.named) and more <= set(one.doubts):
+            odds[i, j] = odds[j, i] = 0.0
+            for doubt in (one.doubts[effect] for effect in more):
+                share = shrunk[i].get(doubt.size, 1.0)
+                known = one.deviation(doubt.size)
+                # what follows from a tolerance, or from how tests differ, does not shrink
+                after = replace(doubt, deviation=math.sqrt(max(
+                    doubt.deviation ** 2 - (1.0 - share ** 2) * known ** 2, _LEAST)))
+                # a gain that no fit has told will not be told by the next one either
+                confirmed = replace(after, gain=doubt.gain + float(lack[i, j]) if doubt.gain
+                                    else 0.0)
+                # if the effect is not there, its size goes to zero as it gets certain
+                denied = replace(after, excess=doubt.excess * share ** 2)
+                odds[i, j] += doubt.slope * math.log(confirmed.certainty / doubt.certainty)
+                odds[j, i] += doubt.slope * math.log(doubt.certainty / denied.certainty)
+    return odds
+
+
+def _shrunk_at_most(rivals: Sequence[Rival], i: int, lack: FloatArray) -> dict[str, float]:
+    """Return the share to which deviations of a rival shrink if no other number follows."""
+    found: dict[str, float] = {}
+    for doubt in rivals[i].doubts.values():
+        for j, other in enumerate(rivals):
+            apart = rivals[i].point[doubt.size] - other.point.get(doubt.size, 0.0)
+            if j != i and apart:
+                share = 1.0 / math.sqrt(
+                    1.0 + 2.0 * lack[j] * (rivals[i].deviation(doubt.size) / apart) ** 2)
+                found[doubt.size] = max(share, found.get(doubt.size, 0.0))
+    return found
+
+
 def _problem(machine: Machine, rivals: Sequence[Rival], points: Sequence[Point],
              settings: Settings) -> LeastSquares:
     """Return the planned tests as the likeliest rival makes them, with a model's usual error."""
@@ -273,7 +348,7 @@ def _problem(machine: Machine, rivals: Sequence[Rival], points: Sequence[Point],
 
 
 def _followed(problem: LeastSquares, rival: Rival, point: dict[str, float], off: FloatArray,
-              inflated: float) -> tuple[FloatArray, FloatArray]:
+              inflated: float) -> tuple[FloatArray, FloatArray, dict[str, float]]:
     """
     Return what remains of differences after a rival's numbers have followed them.
 
@@ -286,11 +361,14 @@ def _followed(problem: LeastSquares, rival: Rival, point: dict[str, float], off:
 
     Returns
     -------
-    what the steps away from what is known add to each chi-square, shape (r,), and the differences
-    that are left, in standard deviations, shape (r, n)
+    what the steps away from what is known add to each chi-square, shape (r,), the differences that
+    are left, in standard deviations, shape (r, n), and the share to which the deviation of each
+    size in doubt shrinks
 
     """
     numbers = _numbers(problem.machine, rival)
+    if not numbers:
+        return np.zeros(len(off)), off, {}
     jacobian = problem.jacobian(point, numbers, problem.residuals(point), central=False)
     precision = _precision(rival, numbers, inflated)
     known = (jacobian.T @ jacobian).astype(float) + precision
@@ -298,15 +376,22 @@ def _followed(problem: LeastSquares, rival: Rival, point: dict[str, float], off:
     slopes = (off.astype(np.float32) @ jacobian).astype(float) / scale
     factor = factored(known / np.outer(scale, scale), ROUNDING)
     steps = solved(factor, slopes.T).T / scale
+    shares = {}
+    for name in {doubt.size for doubt in rival.doubts.values()} & {p.name for p in numbers}:
+        place = [p.name for p in numbers].index(name)
+        variance = inflated * solved(factor, np.eye(scale.size)[place])[place] / scale[place] ** 2
+        shares[name] = min(math.sqrt(max(variance, 0.0)) / rival.deviation(name), 1.0)
     # summed directly: the difference of two large sums in single precision cannot resolve it
     return (np.asarray(np.sum((steps @ precision) * steps, axis=1)),
-            np.asarray(off - steps @ jacobian.T))
+            np.asarray(off - steps @ jacobian.T), shares)
 
 
 def _precision(rival: Rival, numbers: Sequence[Parameter], inflated: float) -> FloatArray:
     """Return what is known of a planned test's numbers, from tests so far or from priors."""
     precision = np.diag(proper_precision(numbers))
     places = [j for j, p in enumerate(numbers) if p.name in rival.names]
+    if not places:
+        return precision
     known = rival.covariance_of([numbers[j].name for j in places])
     scale = np.sqrt(np.maximum(np.diag(known), 1e-30))
     unit = np.outer(scale, scale)

@@ -196,48 +196,6 @@ def values_with_intervals(hypothesis: Hypothesis,
         min(value + TWO_SIDED_95 * deviating[p.name], p.high)]} for p, value in hypothesis.values}
 
 
-def doubts(hypothesis: Hypothesis, deviating: Mapping[str, float], gained: float,
-           settings: IntervalSettings, beyond: float,
-           own_gains: Mapping[str, float] = MappingProxyType({})) -> dict[str, float]:
-    """
-    Return the probability that effects are within their tolerances after all, by effect.
-
-    An effect is in doubt if it exceeds its tolerance by few of its own deviations. The strongest
-    one is not in doubt where the effects gain much. A weaker one has to exceed its tolerance by
-    more, or to gain more, because it may only mend the form of the strongest. A course over time
-    is judged as a whole, elsewhere.
-
-    Parameters
-    ----------
-    hypothesis, deviating
-        as in `values_with_intervals`
-    gained
-        gain of all its effects [half chi-square], over the inflation
-    settings
-        thresholds
-    beyond
-        excess of the strongest effect, in deviations, at which its doubt is a half
-    own_gains
-        what an effect gains beside the others [half chi-square], over the inflation, where known
-
-    """
-    point = hypothesis.state.point()
-    excess = {effect: max((abs(point[p.name]) - p.tolerance) / deviating[p.name]
-                          for p in form.sizes)
-              for effect, form in zip(hypothesis.effects, hypothesis.forms, strict=True)
-              if effect in hypothesis.beyond_tolerance and not form.is_course}
-    strongest = max(excess.values(), default=0.0)
-
-    def certainty(effect: str, value: float) -> float:
-        if value < strongest:
-            return max(value / max(beyond, settings.sure_of_partner),
-                       own_gains.get(effect, 0.0) / settings.partner_sure_by_gain)
-        return max(value / beyond, gained / settings.sure_by_gain)
-
-    return {effect: 1.0 / (1.0 + certainty(effect, value) ** settings.sure_slope)
-            for effect, value in excess.items()}
-
-
 def same_number(parameter: Parameter, value: float) -> float:
     """
     Return the standard deviation that the tolerance of the same number adds to a change.

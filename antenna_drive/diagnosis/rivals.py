@@ -16,23 +16,36 @@ What a verdict knows of its rivals: the next test is designed from it, see `disc
 
 Each rival is a hypothesis with its numbers as fitted and how well the tests so far determine them.
 Numbers of a single test, such as where it starts, are integrated out: the next test has its own.
+
+Two answers may come from the same fit, where it is not sure that one of its effects is larger than
+its tolerance. Each of them is then taken at its mean in its own region: what it names is beyond
+the tolerances, and the rest is within them. A verdict leaves answers apart by such doubts where
+no fit does, so a rival holds what tells of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+import math
 from typing import Any
 
+from antenna_drive.diagnosis.doubts import Doubt
+from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.intervals import covariance
 from antenna_drive.diagnosis.least_squares import LeastSquares
-from antenna_drive.diagnosis.machine import FloatArray, Form, Machine
+from antenna_drive.diagnosis.machine import FloatArray, Form, Machine, Parameter, Point
 from antenna_drive.diagnosis.settings import PlanningSettings
 from antenna_drive.diagnosis.verdict import Answer
 import numpy as np
+from scipy.stats import truncnorm
 
 # Digits of a covariance in a file: a number's deviation is known to a few percent at best.
 _DIGITS = 5
+# Variance that a number keeps at least within bounds, as a share of what it had.
+_LEAST_VARIANCE = 1e-6
+# No variance is less than this.
+_LEAST = 1e-30
 
 
 @dataclass(frozen=True)
@@ -47,6 +60,7 @@ class Rival:
     probability : of the answer, in the verdict
     names, values : numbers of the machine and of the effects, shape (m,)
     covariance : of the values, shape (m, m)
+    doubts : what tells whether effects that it names are larger than their tolerances, by effect
 
     """
 
@@ -57,6 +71,7 @@ class Rival:
     names: tuple[str, ...]
     values: FloatArray
     covariance: FloatArray
+    doubts: Mapping[str, Doubt] = field(default_factory=dict)
 
     @property
     def point(self) -> dict[str, float]:
@@ -75,6 +90,11 @@ class Rival:
         return [machine.form_named(machine.effects[effect], form)
                 for effect, form in zip(self.effects, self.forms, strict=True)]
 
+    def deviation(self, name: str) -> float:
+        """Return the standard deviation of one of the values."""
+        place = self.names.index(name)
+        return math.sqrt(max(float(self.covariance[place, place]), _LEAST))
+
     def covariance_of(self, names: Sequence[str]) -> FloatArray:
         """Return the covariance of some of the values."""
         places = [self.names.index(name) for name in names]
@@ -91,7 +111,8 @@ class Rival:
                 for i, row in enumerate(self.covariance)]
         return {'named': list(self.named), 'effects': list(self.effects),
                 'forms': list(self.forms), 'probability': self.probability,
-                'names': list(self.names), 'values': self.values.tolist(), 'covariance': rows}
+                'names': list(self.names), 'values': self.values.tolist(), 'covariance': rows,
+                'doubts': {effect: doubt.as_data() for effect, doubt in self.doubts.items()}}
 
     @classmethod
     def of_data(cls, data: Mapping[str, Any]) -> Rival:
@@ -109,7 +130,8 @@ class Rival:
             lower[i, :i + 1] = [float(x) for x in row.split()]
         return cls(tuple(data['named']), tuple(data['effects']), tuple(data['forms']),
                    float(data['probability']), names, np.array(data['values'], float),
-                   lower + np.tril(lower, -1).T)
+                   lower + np.tril(lower, -1).T,
+                   {effect: Doubt(**doubt) for effect, doubt in data['doubts'].items()})
 
 
 def planned_rivals(planning: Mapping[str, Any]) -> tuple[list[Rival], float]:
@@ -125,7 +147,9 @@ def planned_rivals(planning: Mapping[str, Any]) -> tuple[list[Rival], float]:
 
 
 def rivals_of(problem: LeastSquares, answers: Sequence[Answer], inflated: float,
-              settings: PlanningSettings) -> list[Rival]:
+              settings: PlanningSettings,
+              doubted: Callable[[Hypothesis], Mapping[str, Doubt]] = lambda hypothesis: {},
+              ) -> list[Rival]:
     """
     Return the likeliest answers of a verdict with what is known of their numbers.
 
@@ -139,6 +163,8 @@ def rivals_of(problem: LeastSquares, answers: Sequence[Answer], inflated: float,
         variance over that with independent noise, see `intervals.inflation`
     settings
         thresholds
+    doubted
+        returns what tells whether a hypothesis' effects are larger than their tolerances
 
     """
     found = []
@@ -150,8 +176,60 @@ def rivals_of(problem: LeastSquares, answers: Sequence[Answer], inflated: float,
             state = hypothesis.with_jacobian(problem).state
         shared = [j for j, p in enumerate(state.parameters) if p.experiment is None]
         posterior = covariance(state, inflated, problem.settings.interval)
+        names = tuple(state.parameters[j].name for j in shared)
+        values, known = state.x[shared], posterior[np.ix_(shared, shared)]
+        for effect, form in zip(hypothesis.effects, hypothesis.forms, strict=True):
+            for size, low, high in _regions(form, state.point(), effect in answer.effects):
+                if size.name in names:
+                    values, known = within(values, known, names.index(size.name), low, high)
         found.append(Rival(
             answer.effects, hypothesis.effects, tuple(form.name for form in hypothesis.forms),
-            answer.probability, tuple(state.parameters[j].name for j in shared),
-            state.x[shared], posterior[np.ix_(shared, shared)]))
+            answer.probability, names, values, known,
+            {effect: doubt for effect, doubt in doubted(hypothesis).items()
+             if effect in answer.effects and doubt.size in names}))
     return found
+
+
+def _regions(form: Form, point: Point, named: bool) -> list[tuple[Parameter, float, float]]:
+    """Return the sizes of an effect with the bounds that they have where it is named, or not."""
+    if form.is_course:
+        return []
+    if not named:
+        return [(p, -p.tolerance, p.tolerance) for p in form.sizes]
+    most = max(form.sizes, key=lambda p: abs(point[p.name]) - p.tolerance)
+    return [(most, most.tolerance, math.inf) if point[most.name] > 0.0 else
+            (most, -math.inf, -most.tolerance)]
+
+
+def within(values: FloatArray, known: FloatArray, place: int, low: float, high: float,
+           ) -> tuple[FloatArray, FloatArray]:
+    """
+    Return the mean and the covariance of normal numbers, given that one is within bounds.
+
+    The others follow it by regression (N. L. Johnson, S. Kotz, N. Balakrishnan, Continuous
+    Univariate Distributions, volume 1, chapter 13, section 10.1).
+
+    Parameters
+    ----------
+    values, known
+        mean, shape (m,), and covariance, shape (m, m)
+    place
+        of the one
+    low, high
+        its bounds; they may be equal or infinite
+
+    """
+    variance = known[place, place]
+    if variance <= 0.0:
+        return values, known
+    deviation = math.sqrt(variance)
+    a, b = (low - values[place]) / deviation, (high - values[place]) / deviation
+    mean, spread = a, 0.0
+    if a < b:
+        with np.errstate(invalid='ignore'):
+            mean, spread = (float(x) for x in truncnorm.stats(a, b))
+    # rounding may leave them; and none is known for sure: the covariance is inverted
+    mean, spread = min(max(mean, a), b), min(max(spread, _LEAST_VARIANCE), 1.0)
+    along = known[:, place] / deviation
+    return (np.asarray(values + along * mean),
+            np.asarray(known - (1.0 - spread) * np.outer(along, along)))

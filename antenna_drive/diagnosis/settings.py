@@ -351,7 +351,7 @@ class PlanningSettings:
         0.25, 'probability', 'probability that no answer of an open verdict is true: weight of '
         'how well a test shows other effects')
     alike: float = _setting(
-        1.0, 'temperature', 'lack of fit up to which a test does not tell two rivals apart')
+        1.0, 'logarithm of odds', 'evidence up to which a test does not tell two rivals apart')
     sure: float = _setting(0.9, 'probability', 'probability from which an answer is sure')
 
 

@@ -15,13 +15,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 from antenna_drive.diagnosis import Form, Hypothesis, Parameter
+from antenna_drive.diagnosis.doubts import Doubt, doubts
 from antenna_drive.diagnosis.intervals import (
-    covariance, deviations, doubts, inflation, jackknife, values_with_intervals,
+    covariance, deviations, inflation, jackknife, values_with_intervals,
 )
 from antenna_drive.diagnosis.least_squares import FitState
 from antenna_drive.diagnosis.settings import DEFAULT
@@ -165,9 +167,13 @@ def with_sizes(*sizes: float) -> tuple[Hypothesis, dict[str, float]]:
     return fit, {number.name: 0.1 for number in numbers}
 
 
+def shares(found: Mapping[str, Doubt]) -> dict[str, float]:
+    return {effect: doubt.probability for effect, doubt in found.items()}
+
+
 def doubted(*sizes: float, gained: float = 0.0) -> dict[str, float]:
     fit, deviating = with_sizes(*sizes)
-    return doubts(fit, deviating, gained, SETTINGS, SETTINGS.sure)
+    return shares(doubts(fit, deviating, gained, SETTINGS, SETTINGS.sure))
 
 
 @pytest.mark.parametrize('size', [0.3, -0.3])
@@ -191,7 +197,7 @@ def test_a_weaker_effect_that_gains_very_much_beside_the_strongest_is_named() ->
 
     def doubt(own: float) -> float:
         return doubts(fit, deviating, 0.0, SETTINGS, SETTINGS.sure,
-                      {'part_1.effect': own})['part_1.effect']
+                      {'part_1.effect': own})['part_1.effect'].probability
 
     limit = SETTINGS.partner_sure_by_gain
     assert doubt(0.0) > 0.9
@@ -204,7 +210,7 @@ def test_a_weaker_effect_that_gains_very_much_beside_the_strongest_is_named() ->
 def test_a_weaker_effect_must_exceed_its_tolerance_by_more() -> None:
     between = 0.1 * (1.0 + 0.5 * (SETTINGS.sure + SETTINGS.sure_of_partner))
     fit, deviating = with_sizes(2.0, between)
-    found = doubts(fit, deviating, 0.0, SETTINGS, SETTINGS.sure)
+    found = shares(doubts(fit, deviating, 0.0, SETTINGS, SETTINGS.sure))
     assert found['part_0.effect'] < 0.01 < 0.5 < found['part_1.effect']
     assert doubted(between)['part_0.effect'] < 0.5
     assert replace(fit, doubts=found).named == ('part_0.effect',)
@@ -218,7 +224,8 @@ def test_an_effect_is_unsure_if_it_exceeds_its_tolerance_by_too_few_deviations(
     number = replace(CHANGE, tolerance=tolerance)
     fitted = Hypothesis(('part.effect',), (Form('', (number,)),),
                         replace(state([np.ones(4)], (number,)), x=np.array([size])))
-    judged = replace(fitted, doubts=doubts(fitted, {number.name: 0.1}, 0.0, SETTINGS, beyond))
+    judged = replace(fitted, doubts=shares(
+        doubts(fitted, {number.name: 0.1}, 0.0, SETTINGS, beyond)))
     assert judged.unsure == (frozenset(['part.effect']) if expected else frozenset())
     assert judged.named == (() if expected else ('part.effect',))
 
