@@ -334,8 +334,8 @@ class TestDesign:
         return self._settings.verdict.temperature
 
     def _score(self, told: Separation) -> float:
-        """Return the information that is left if less of the lack of fit comes true."""
-        return told.information(self._temperature * self._settings.planning.caution)
+        """Return the information that is left if less of the evidence comes true."""
+        return told.information(self._temperature, self._settings.planning.caution)
 
     # -- judging one test ----------------------------------------------------------------------
 

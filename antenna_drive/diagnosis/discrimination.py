@@ -89,9 +89,13 @@ class Separation:
         """Return the logarithm of the odds that rival j loses to i if i is true, shape (r, r)."""
         return np.asarray(np.minimum(self.lack / temperature, self.odds))
 
-    def posterior(self, temperature: float) -> FloatArray:
-        """Return the probability of rival j after the test if i is true, shape (r, r)."""
-        logits = np.log(np.maximum(self.prior, _LEAST)) - self.evidence(temperature)
+    def posterior(self, temperature: float, caution: float = 1.0) -> FloatArray:
+        """
+        Return the probability of rival j after the test if i is true, shape (r, r).
+
+        The evidence is divided by `caution`.
+        """
+        logits = np.log(np.maximum(self.prior, _LEAST)) - self.evidence(temperature) / caution
         weights = np.exp(logits - logits.max(axis=1, keepdims=True))
         return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
@@ -99,9 +103,9 @@ class Separation:
         """Return the probability that the true rival is expected to get, if one of them is."""
         return float(self.prior @ np.diag(self.posterior(temperature)))
 
-    def information(self, temperature: float) -> float:
+    def information(self, temperature: float, caution: float = 1.0) -> float:
         """Return the information on which rival is true that is expected, in nats."""
-        after = np.maximum(np.diag(self.posterior(temperature)), _LEAST)
+        after = np.maximum(np.diag(self.posterior(temperature, caution)), _LEAST)
         return float(self.prior @ np.log(after / np.maximum(self.prior, _LEAST)))
 
     def surely(self, temperature: float, sure: float) -> float:

@@ -329,7 +329,7 @@ class ConfusabilitySettings:
     """Which effects a planned test can tell apart, from derivatives alone."""
 
     caution: float = _setting(
-        3.0, '1', 'by what a promised lack of fit is divided where tests are compared')
+        3.0, '1', 'by what promised evidence is divided where tests are compared')
     alike: float = _setting(
         0.95, '1', 'share of what an effect does that another must imitate to pass for it')
 
@@ -346,7 +346,7 @@ class PlanningSettings:
         0.02, 'nat', 'expected information from which a test helps; of standard deviations, the '
         'share by which one shrinks')
     caution: float = _setting(
-        3.0, '1', 'by what a promised lack of fit is divided where tests are compared')
+        3.0, '1', 'by what promised evidence is divided where tests are compared')
     unlisted: float = _setting(
         0.25, 'probability', 'probability that no answer of an open verdict is true: weight of '
         'how well a test shows other effects')
