@@ -18,7 +18,7 @@ Wild cases are drawn and sealed as by `antenna-drive trial --wild`. All tests ru
 independent antenna.
 
   --kind third        cases whose first two recordings leave the answer open (best answer below
-                      0.7, or a second one of 0.06 or more beside 'unknown') get a third test of
+                      0.7, or a set of effects that they cannot tell apart) get a third test of
                       30 s by each rule: as `antenna-drive propose` designs it, D-optimal, at
                       random, and the four kinds of the standard programme, of which the best
                       counts in hindsight
@@ -26,7 +26,7 @@ independent antenna.
                       up to four tests of 30 s, beside a standard programme of three
 
 Most wild cases leave nothing open after two recordings. Small effects leave more open: with
---largest 0.3, sizes are at most this share of their range. So do short recordings, which also
+--largest 0.1, sizes are at most this share of their range. So do short recordings, which also
 take less time: with --longest 30, the first two take 10 to 30 s.
 
 A case takes about ten diagnoses. The same command resumes an interrupted trial. What was found is
@@ -34,7 +34,7 @@ in DIR/results.jsonl. To continue on another machine, put that file into a new D
 
 For example:
   antenna-drive trial-next --cases 40 --pool 400 --seed 71 --out next71 --jobs 8
-  antenna-drive trial-next --cases 40 --pool 400 --seed 71 --longest 30 --out short71 --jobs 8
+  antenna-drive trial-next --cases 40 --seed 71 --longest 30 --largest 0.1 --out small71 --jobs 8
   antenna-drive trial-next --kind investigate --cases 30 --seed 72 --out loops72 --jobs 8
 """
 

@@ -46,8 +46,8 @@ import numpy as np
 import yaml
 
 FIRST = ('rec_a', 'rec_b')
-# An answer is open below this probability; a set holds every answer with the second one or more.
-# No verdict gives 'unknown' less than 0.05, and that alone is no second answer.
+# An answer is open below the first probability. Answers with the second one or more are left: no
+# verdict gives 'unknown' less than 0.05, and that alone is no second answer.
 OPEN, IN_SET = 0.7, 0.06
 DESIGNED: Mapping[str, Sequence[str]] = {
     'proposed': (), 'd-optimal': ('--rule', 'd-optimal'), 'random': ('--rule', 'random')}
@@ -111,8 +111,9 @@ def run_trial(folder: Path, manifest: dict[str, Any], wanted: int, jobs: int, li
 
 
 def is_open(verdict: Verdict) -> bool:
-    """Return whether a verdict leaves the answer open: it is not sure, or leaves rivals."""
-    return verdict.which[0].probability < OPEN or rivals_of(verdict) > 1
+    """Return whether a verdict leaves the answer open: it is not sure, or names a set."""
+    first = verdict.which[0]
+    return first.probability < OPEN or _largest_set(verdict) > 1
 
 
 def set_of(verdict: Verdict) -> int:
@@ -126,8 +127,13 @@ def rivals_of(verdict: Verdict) -> int:
 
 
 def _left(verdict: Verdict, entries: Sequence[VerdictLine]) -> int:
-    return max(sum(entry.probability >= IN_SET for entry in entries),
-               *(len(verdict.confusable_with(effect)) for effect in verdict.which[0].effects))
+    return max(sum(entry.probability >= IN_SET for entry in entries), _largest_set(verdict))
+
+
+def _largest_set(verdict: Verdict) -> int:
+    """Return how many effects the first answer cannot be told from, itself included."""
+    return max((len(verdict.confusable_with(effect)) for effect in verdict.which[0].effects),
+               default=1)
 
 
 def _of_two(folder: Path, truth: Truth, limit: float, options: Sequence[str]) -> Verdict | None:

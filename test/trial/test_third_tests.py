@@ -42,18 +42,19 @@ def parsed(*rest: Any) -> Verdict:
     return parse_verdict(verdict_of(*rest))
 
 
-def test_a_case_is_open_if_unsure_or_if_rivals_are_left() -> None:
+def test_a_case_is_open_if_unsure_or_if_a_set_is_named() -> None:
     assert is_open(parsed({'motor_1.coulomb_friction': 0.6, 'unknown': 0.4}))
     assert not is_open(parsed({'motor_1.coulomb_friction': 0.9, 'unknown': 0.1}))
     pair = ['motor_1.coulomb_friction', 'motors.coulomb_friction']
     sure_of_a_set = parsed({pair[0]: 0.9, 'unknown': 0.1}, [pair])
     assert is_open(sure_of_a_set) and set_of(sure_of_a_set) == 2
     assert set_of(parsed({pair[0]: 0.5, pair[1]: 0.3, 'none': 0.16, 'unknown': 0.04})) == 3
-    # no test rules out the unknown, but a rival
+    # a small second answer is left, and opens nothing
     rivals = parsed({pair[0]: 0.75, pair[1]: 0.1, 'unknown': 0.15})
-    assert is_open(rivals) and set_of(rivals) == 3 and rivals_of(rivals) == 2
+    assert not is_open(rivals) and set_of(rivals) == 3 and rivals_of(rivals) == 2
     alone = parsed({pair[0]: 0.75, pair[1]: 0.05, 'unknown': 0.2})
     assert not is_open(alone) and set_of(alone) == 2 and rivals_of(alone) == 1
+    assert is_open(parsed({'none': 0.5, pair[0]: 0.45, 'unknown': 0.05}))
 
 
 class Commands:
