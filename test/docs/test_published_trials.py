@@ -20,8 +20,10 @@ from pathlib import Path
 import re
 
 from antenna_drive.cli.twin_trial import of_onsets, of_verdicts
+from antenna_drive.trial.results import FILE, TrialResults
 from antenna_drive.trial.scorecard import score
 from antenna_drive.trial.scored_cases import read_scored
+from antenna_drive.trial.third_tests import summary
 import pytest
 
 DOCS = Path(__file__).resolve().parents[2] / 'docs'
@@ -65,6 +67,24 @@ def test_figures_of_a_wild_trial_are_those_of_its_cases(
             stated = re.match(r'[\d.]+', row[titles.index(title)])
             assert stated is not None
             assert float(stated.group()) == pytest.approx(figures[key], abs=0.005001), title
+
+
+@pytest.mark.parametrize('trial', [1, 2])
+def test_figures_of_third_tests_are_those_of_their_cases(trial: int, tmp_path: Path) -> None:
+    lines = (DOCS / 'trials' / f'next_test_{trial}.jsonl').read_text(encoding='utf-8')
+    (tmp_path / FILE).write_text(lines, encoding='utf-8')
+    cases = [json.loads(line) for line in lines.splitlines()]
+    results = TrialResults(tmp_path, {'settings': {'seed': cases[0]['seed']},
+                                      'seals': [case['case'] for case in cases]})
+    rules = summary(results)['rules']
+    text = (DOCS / 'next-test.md').read_text(encoding='utf-8')
+    table = text.split('| third test |')[trial].split('\n\n')[0].splitlines()[2:]
+    rows = [[cell.strip() for cell in line.strip('|').split('|')] for line in table]
+    assert len(rows) == len(rules)
+    for name, share, *_, left in rows:
+        found = rules['best_built_in' if name.startswith('best') else name.lower()]
+        assert share == f'{round(found["top1"] * found["cases"])} of {found["cases"]}', name
+        assert float(left) == found['median_set'], name
 
 
 @pytest.mark.parametrize('trial', ['5', '6'])
