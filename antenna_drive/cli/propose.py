@@ -98,7 +98,8 @@ def run(arguments: argparse.Namespace) -> int:
     with Progress('proposal', 1.0) as progress:
         try:
             found = TestDesign(space, rivals, inflated, objective, arguments.suspect,
-                               arguments.jobs, seed=arguments.seed).run(
+                               arguments.jobs, seed=arguments.seed,
+                               noise=planning.get('noise', {})).run(
                 lambda share, doing: progress.update(share))
         except KeyError as error:
             raise UserError(f'{arguments.verdict}: {error.args[0]}: this configuration knows no '

@@ -38,6 +38,7 @@ from antenna_drive.diagnosis.discrimination import (
     deviations, known_to, refitted, Separation, separation,
 )
 from antenna_drive.diagnosis.machine import FloatArray, Machine, Point
+from antenna_drive.diagnosis.noise import with_found_noise
 from antenna_drive.diagnosis.rivals import Rival
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
 import numpy as np
@@ -246,6 +247,8 @@ class TestDesign:
         thresholds, and how much is searched
     seed
         of the tests that are drawn
+    noise
+        that the tests so far have shown, see `noise.found_noise`; by default that of the sensors
 
     """
 
@@ -254,12 +257,13 @@ class TestDesign:
     def __init__(self, space: TestSpace, rivals: Sequence[Rival] = (), inflated: float = 1.0,
                  objective: str = SEPARATE, suspected: Sequence[str] = (), threads: int = 2,
                  settings: Settings = DEFAULT, effort: DesignEffort = DesignEffort(),
-                 seed: int = 0) -> None:
+                 seed: int = 0,
+                 noise: Mapping[str, Mapping[str, float]] = MappingProxyType({})) -> None:
         """Prepare to search."""
         self._space, self._rivals, self._inflated = space, list(rivals), inflated
         self._objective, self._suspected = objective, list(suspected)
         self._threads, self._settings, self._effort = threads, settings, effort
-        self._random = np.random.default_rng(seed)
+        self._random, self._noise = np.random.default_rng(seed), noise
         self._judge: Callable[[Judged], Judged] = {
             SEPARATE: self._separated, SHARPEN: self._sharpened, D_OPTIMAL: self._sharpened,
             DETECT: self._detected, RANDOM: lambda test: test}[objective]
@@ -337,11 +341,16 @@ class TestDesign:
         """Return the information that is left if less of the evidence comes true."""
         return told.information(self._temperature, self._settings.planning.caution)
 
+    def _planned(self, test: Judged) -> Machine:
+        """Return the machine in a test, as noisy as it has been so far."""
+        machine = self._space.machine(test.test)
+        return machine.with_experiments(with_found_noise(machine.experiments, self._noise))
+
     # -- judging one test ----------------------------------------------------------------------
 
     def _screened(self, test: Judged) -> Judged:
         """Simulate a test with each rival; no rival's numbers follow yet."""
-        machine = self._space.machine(test.test).low_fidelity()
+        machine = self._planned(test).low_fidelity()
         points = [known_to(machine, rival) for rival in self._rivals] or [{}]
         use = self._space.use(machine, points)
         if self._objective != SEPARATE:
@@ -351,7 +360,7 @@ class TestDesign:
 
     def _separated(self, test: Judged) -> Judged:
         """Judge a test with all tolerances free, to first order, and what else it shows."""
-        machine = self._space.machine(test.test)
+        machine = self._planned(test)
         told = separation(machine, self._rivals, self._inflated, self._settings)
         # no size is told, only their mean is compared
         return replace(test, told=told, sizes=self._sizes(machine.low_fidelity()))
@@ -359,12 +368,12 @@ class TestDesign:
     def _confirmed(self, test: Judged) -> Judged:
         """Fit each rival to the readings of the others."""
         return replace(test, confirmed=refitted(
-            self._space.machine(test.test), self._rivals, self._inflated, self._settings,
+            self._planned(test), self._rivals, self._inflated, self._settings,
             test.told.shrunk if test.told else ()))
 
     def _sharpened(self, test: Judged) -> Judged:
         """Judge how well a test determines the numbers of the likeliest rival."""
-        machine = self._space.machine(test.test)
+        machine = self._planned(test)
         rival = max(self._rivals, key=lambda item: item.probability)
         names, before, after = deviations(machine, rival, self._inflated, self._settings)
         own = {p.name for form in rival.forms_of(machine) for p in form.parameters}
@@ -379,7 +388,7 @@ class TestDesign:
 
     def _detected(self, test: Judged) -> Judged:
         """Judge a test by what it shows."""
-        return replace(test, sizes=self._sizes(self._space.machine(test.test)))
+        return replace(test, sizes=self._sizes(self._planned(test)))
 
     def _sizes(self, machine: Machine) -> dict[str, tuple[float, str]]:
         """Return the smallest size of each effect that shows in a test, and its unit."""
@@ -423,7 +432,7 @@ class TestDesign:
         return found
 
     def _unread(self, test: Judged, i: int, j: int) -> Mapping[str, float]:
-        machine = self._space.machine(test.test)
+        machine = self._planned(test)
         one = known_to(machine, self._rivals[i])
         other = test.confirmed.points[i, j] if test.confirmed else (
             known_to(machine, self._rivals[j]))

@@ -35,6 +35,7 @@ from antenna_drive.diagnosis.intervals import values_with_intervals
 from antenna_drive.diagnosis.interventions import interventions, lines as lines_of_labels
 from antenna_drive.diagnosis.lack_of_fit import remainders, residual_tests
 from antenna_drive.diagnosis.machine import Machine
+from antenna_drive.diagnosis.noise import found_noise
 from antenna_drive.diagnosis.rivals import rivals_of
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
 
@@ -210,7 +211,8 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         'may_enter_at': [vars(place) for place in places if place.evidence > 0.0],
         'fits': found.evidence.as_data(),
         'planning': {
-            'inflation': found.evidence.inflation, **machine.planning,
+            'inflation': found.evidence.inflation, 'noise': found_noise(problem.experiments),
+            **machine.planning,
             'rivals': [rival.as_data() for rival in rivals_of(
                 problem, decision.answers, found.evidence.inflation, settings.planning,
                 found.doubted)]},

@@ -24,7 +24,7 @@ use them, so that a slow residual counts once and not with each of its samples.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
 
@@ -44,6 +44,14 @@ class Process:
     white: float
     slow: float
     pole: float
+
+    @classmethod
+    def of(cls, colour: Colour) -> Process:
+        """Return the process that has a colour; the inverse of `colour`."""
+        innovation, decay = colour.level ** 2, 1.0 - colour.pole ** 2
+        slow = (colour.gain * innovation * (1.0 - colour.pole ** 2 * (1.0 - colour.gain)) / decay
+                if colour.gain else 0.0)
+        return cls((1.0 - colour.gain) * innovation, slow, colour.pole)
 
     @property
     def colour(self) -> Colour:
@@ -154,16 +162,63 @@ def with_estimated_noise(experiments: Sequence[Experiment], residuals: Sequence[
     return tuple(replace(e, colours=tuple(colours)) for e in experiments)
 
 
+def found_noise(experiments: Sequence[Experiment]) -> dict[str, dict[str, float]]:
+    """
+    Return the noise that a diagnosis has found, by signal, for the JSON.
+
+    Each has the variances `white` and `slow`, in variances of the stated noise, and `corner_hz` of
+    the slow part.
+    """
+    first = experiments[0]
+    interval = float(np.median(np.diff(first.time)))
+    found = {}
+    for channel, colour in zip(first.channels, first.colours, strict=False):
+        process = Process.of(colour)
+        found[channel] = {
+            'white': process.white, 'slow': process.slow,
+            'corner_hz': -math.log(max(process.pole, 1e-9)) / (2.0 * math.pi * interval)}
+    return found
+
+
+def with_found_noise(experiments: Sequence[Experiment],
+                     found: Mapping[str, Mapping[str, float]]) -> tuple[Experiment, ...]:
+    """
+    Return planned experiments with the noise that other ones have shown.
+
+    Parameters
+    ----------
+    experiments
+        with the noise that their sensors should have
+    found
+        as `found_noise`; a signal that it lacks has the noise that it should have
+
+    """
+    def colour(channel: str, interval: float) -> Colour:
+        if channel not in found:
+            return Colour()
+        item = found[channel]
+        pole = math.exp(-2.0 * math.pi * item['corner_hz'] * interval)
+        return Process(item['white'], item['slow'], pole).colour
+
+    return tuple(replace(e, colours=tuple(
+        colour(channel, float(np.median(np.diff(e.time)))) for channel in e.channels))
+        for e in experiments)
+
+
 def with_model_error(experiments: Sequence[Experiment],
                      settings: NoiseSettings) -> tuple[Experiment, ...]:
-    """Return planned experiments with the stated noise and the error that every model has."""
+    """Return planned experiments with their noise and the error that every model has."""
     pole = math.exp(-2.0 * math.pi * settings.model_error_hz
                     * float(np.median(np.diff(experiments[0].time))))
     slow = [max(_model_error(e, c, settings) for e in experiments)
             for c, channel in enumerate(experiments[0].channels)]
+    known = [Process.of(colour) for colour in experiments[0].colours] or (
+        [Process(1.0, 0.0, 0.0)] * len(slow))
+    # what is slower or faster than the other counts as the larger of the two
     colours = tuple(
-        Colour() if channel in experiments[0].quantised else Process(1.0, error, pole).colour
-        for channel, error in zip(experiments[0].channels, slow, strict=True))
+        Colour() if channel in experiments[0].quantised else
+        (replace(noise, slow=error, pole=pole) if error > noise.slow else noise).colour
+        for channel, error, noise in zip(experiments[0].channels, slow, known, strict=True))
     return tuple(replace(e, colours=colours) for e in experiments)
 
 

@@ -62,7 +62,8 @@ def designed(planning: Mapping[str, Any], drive: Drive) -> dict[str, Any]:
     space = AntennaTests(parse_sheet(planning['sheet']), drive, DriveLimits.of_drive(drive),
                          DURATION_S)
     try:
-        found = TestDesign(space, rivals, inflation, objective_for(rivals), threads=1).run()
+        found = TestDesign(space, rivals, inflation, objective_for(rivals), threads=1,
+                           noise=planning.get('noise', {})).run()
     except KeyError as error:
         raise UserError(f'{error.args[0]}: this configuration knows no such effect') from error
     data = as_data(found, space)

@@ -16,13 +16,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+import json
 import math
 
 from antenna_drive.diagnosis import Colour, Experiment, FloatArray
 from antenna_drive.diagnosis.noise import (
-    estimated, Process, same_noise, whitened, with_estimated_noise, with_model_error,
+    estimated, found_noise, Process, same_noise, whitened, with_estimated_noise,
+    with_found_noise, with_model_error,
 )
 from antenna_drive.diagnosis.settings import DEFAULT
+from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from scipy.linalg import cholesky, solve_triangular, toeplitz
@@ -108,6 +111,39 @@ def test_noise_of_an_experiment_is_taken_by_channel() -> None:
     assert found.colours[1] == Colour(), 'a quantised reading has no noise of its own'
     assert not same_noise(found, item, SETTINGS)
     assert same_noise(found, replace(found), SETTINGS)
+
+
+@given(st.floats(0.1, 10.0), st.floats(0.01, 10.0), st.floats(0.0, 0.99))
+def test_a_process_is_known_from_its_colour(white: float, slow: float, pole: float) -> None:
+    process = Process(white, slow if pole else 0.0, pole)
+    back = Process.of(process.colour)
+    assert back.white == pytest.approx(process.white, rel=1e-6)
+    assert back.slow == pytest.approx(process.slow, rel=1e-6, abs=1e-9)
+
+
+def test_a_planned_test_has_the_noise_that_others_have_shown() -> None:
+    """At another sample rate, the slow part has the same variance and the same corner."""
+    random = np.random.default_rng(5)
+    size, pole = 200_000, math.exp(-2.0 * math.pi * 2.0 / 500.0)
+    slow = lfilter([math.sqrt(1.0 - pole ** 2)], [1.0, -pole], random.normal(size=size))
+    item = replace(experiment(np.zeros(size)), time=np.arange(size) / 500.0)
+    noise = 0.5 * (1.5 * random.normal(size=size) + slow)
+    [shown] = with_estimated_noise([item], [np.stack([noise, noise], axis=1)], SETTINGS)
+    found = json.loads(json.dumps(found_noise([shown])))
+    first = item.channels[0]
+    assert found[first]['white'] == pytest.approx(1.5 ** 2, rel=0.05)
+    assert found[first]['slow'] == pytest.approx(1.0, rel=0.2)
+    assert 1.0 < found[first]['corner_hz'] < 4.0
+    other = replace(experiment(np.zeros(1000)), time=np.arange(1000) / 100.0)
+    [planned] = with_model_error(with_found_noise([other], found), SETTINGS)
+    process = Process.of(planned.colours[0])
+    assert process.white == pytest.approx(found[first]['white'])
+    assert process.slow == pytest.approx(found[first]['slow'])
+    assert process.pole == pytest.approx(math.exp(
+        -2.0 * math.pi * found[first]['corner_hz'] / 100.0))
+    # a signal of which nothing is known has the noise of its sensor
+    [stated] = with_model_error(with_found_noise([other], {}), SETTINGS)
+    assert Process.of(stated.colours[0]).white == pytest.approx(1.0)
 
 
 def test_a_models_error_does_not_vanish_with_the_sampling_rate() -> None:

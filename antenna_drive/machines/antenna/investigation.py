@@ -176,14 +176,15 @@ class Investigation:
             return {'objective': 'given', 'family': 'given',
                     'test': self._space.as_data(self._first)}
         rivals: list[Rival] = []
-        inflated = 1.0
+        inflated, noise = 1.0, dict[str, Any]()
         if number > 1:
             verdict = _read(self._path('verdict', number - 1, '.json')) or {}
             rivals, inflated = planned_rivals(verdict['planning'])
+            noise = verdict['planning'].get('noise', {})
         found = TestDesign(
             self._space, rivals, inflated, objective_for(rivals),
             threads=self._threads, settings=self._settings, effort=self._effort,
-            seed=self._plan.seed + number).run(
+            seed=self._plan.seed + number, noise=noise).run(
                 lambda share, doing: progress(f'design of test {number}', share))
         return as_data(found, self._space, self._settings)
 
