@@ -36,6 +36,7 @@ The exit code is 1 if no test within the limits helps. docs/next-test.md has mor
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 import json
 from pathlib import Path
 import time
@@ -91,15 +92,14 @@ def run(arguments: argparse.Namespace) -> int:
     planning = _planning(arguments)
     from antenna_drive.diagnosis import objective_for, TestDesign
     from antenna_drive.diagnosis.proposal import as_data, contents, lines
-    rivals, inflated = _rivals(arguments, planning)
+    rivals, inflated, noise = _known(arguments, planning)
     objective = arguments.rule or arguments.objective or objective_for(rivals)
     space = (_tests_of_own if arguments.model else _tests_of_drive)(arguments, planning)
     began = time.monotonic()
     with Progress('proposal', 1.0) as progress:
         try:
             found = TestDesign(space, rivals, inflated, objective, arguments.suspect,
-                               arguments.jobs, seed=arguments.seed,
-                               noise=planning.get('noise', {})).run(
+                               arguments.jobs, seed=arguments.seed, noise=noise).run(
                 lambda share, doing: progress.update(share))
         except KeyError as error:
             raise UserError(f'{arguments.verdict}: {error.args[0]}: this configuration knows no '
@@ -139,16 +139,18 @@ def _planning(arguments: argparse.Namespace) -> dict[str, Any]:
                         'diagnose the recordings again') from error
 
 
-def _rivals(arguments: argparse.Namespace, planning: dict[str, Any],
-            ) -> tuple[list[Rival], float]:
+def _known(arguments: argparse.Namespace, planning: dict[str, Any],
+           ) -> tuple[list[Rival], float, Mapping[str, Mapping[str, float]]]:
+    """Return the rivals, the inflation of the variance and the noise of the tests so far."""
     from antenna_drive.diagnosis import planned_rivals
-    if arguments.objective == 'detect':
-        return [], 1.0
+    if not planning:
+        return [], 1.0, {}
     try:
-        return planned_rivals(planning)
+        rivals, inflated, noise = planned_rivals(planning)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise UserError(f'{arguments.verdict}: planning: {error!r}: damaged; diagnose the '
                         'recordings again') from error
+    return ([], 1.0, noise) if arguments.objective == 'detect' else (rivals, inflated, noise)
 
 
 def _tests_of_drive(arguments: argparse.Namespace, planning: dict[str, Any]) -> TestSpace:

@@ -422,12 +422,13 @@ class TestDesign:
     def _alike(self, judged: Sequence[Judged]) -> list[tuple[int, int, Mapping[str, float]]]:
         """Return the pairs of rivals that no judged test tells apart."""
         told = [test for test in judged if test.separation is not None]
+        limit = self._settings.planning.alike * self._temperature
         found = []
         for i, j in combinations(range(len(self._rivals)), 2):
-            apart = [test.separation.least_evidence(self._temperature)[i, j] for test in told
+            lacks = [test.separation.least_lack()[i, j] for test in told
                      if test.separation is not None]
-            if apart and max(apart) < self._settings.planning.alike:
-                best = told[int(np.argmax(apart))]
+            if lacks and max(lacks) < limit:
+                best = told[int(np.argmax(lacks))]
                 found.append((i, j, self._unread(best, i, j)))
         return found
 

@@ -30,12 +30,12 @@ true rival gets, in the mean over the rivals, is the information that the test i
 To first order the best that a rival can do is a projection (`separation`). That is a promise. A
 fit of each rival to the readings of the others keeps or breaks it (`refitted`).
 
-Most open verdicts have two answers of which one names one effect more, and the verdict doubts that
-it is larger than its tolerance. The simpler answer misses the readings by hundreds of units
-already. What ends such a doubt is a smaller deviation of the effect's size, or a larger gain: see
-`doubts`. So two such rivals are told apart by no more than the doubt falls (`Separation.odds`).
-D_s-optimality asks for the same: A. C. Atkinson, A. N. Donev, R. D. Tobias, Optimum Experimental
-Designs (2007), section 10.3.
+In most open verdicts, one answer names one effect more than the other. The simpler answer already
+misses the readings by hundreds of units. The verdict is open because it doubts that the effect is
+larger than its tolerance. A smaller deviation of the effect's size or a larger gain ends the
+doubt: see `doubts`. Two such rivals are told apart by no more than the doubt falls
+(`Separation.odds`). D_s-optimality asks for the same: A. C. Atkinson, A. N. Donev, R. D. Tobias,
+Optimum Experimental Designs (2007), section 10.3.
 """
 
 from __future__ import annotations
@@ -47,6 +47,7 @@ from itertools import permutations
 import math
 
 from antenna_drive.diagnosis.cholesky import factored, ROUNDING, solved
+from antenna_drive.diagnosis.doubts import Doubt
 from antenna_drive.diagnosis.least_squares import LeastSquares, proper_precision
 from antenna_drive.diagnosis.machine import FloatArray, Machine, Parameter, Point
 from antenna_drive.diagnosis.noise import with_model_error
@@ -112,10 +113,9 @@ class Separation:
         """Return how probable it is that the true rival gets at least the probability `sure`."""
         return float(self.prior @ (np.diag(self.posterior(temperature)) >= sure))
 
-    def least_evidence(self, temperature: float) -> FloatArray:
+    def least_lack(self) -> FloatArray:
         """Return by how much two rivals are told apart at least, whichever is true, (r, r)."""
-        found = self.evidence(temperature)
-        return np.asarray(np.minimum(found, found.T))
+        return np.asarray(np.minimum(self.lack, self.lack.T))
 
 
 def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
@@ -310,21 +310,38 @@ def _odds(rivals: Sequence[Rival], lack: FloatArray, shrunk: Sequence[Mapping[st
         one, other = rivals[i], rivals[j]
         more = set(one.named) - set(other.named)
         if more and set(other.named) < set(one.named) and more <= set(one.doubts):
-            odds[i, j] = odds[j, i] = 0.0
-            for doubt in (one.doubts[effect] for effect in more):
-                share = shrunk[i].get(doubt.size, 1.0)
-                known = one.deviation(doubt.size)
-                # what follows from a tolerance, or from how tests differ, does not shrink
-                after = replace(doubt, deviation=math.sqrt(max(
-                    doubt.deviation ** 2 - (1.0 - share ** 2) * known ** 2, _LEAST)))
-                # a gain that no fit has told will not be told by the next one either
-                confirmed = replace(after, gain=doubt.gain + float(lack[i, j]) if doubt.gain
-                                    else 0.0)
-                # if the effect is not there, its size goes to zero as it gets certain
-                denied = replace(after, excess=doubt.excess * share ** 2)
-                odds[i, j] += doubt.slope * math.log(confirmed.certainty / doubt.certainty)
-                odds[j, i] += doubt.slope * math.log(doubt.certainty / denied.certainty)
+            odds[[i, j], [j, i]] = sum(
+                _ended(doubt, one.deviation(doubt.size), shrunk[i].get(doubt.size, 1.0),
+                       float(lack[i, j]))
+                for doubt in (one.doubts[effect] for effect in sorted(more)))
     return odds
+
+
+def _ended(doubt: Doubt, known: float, share: float, gain: float) -> FloatArray:
+    """
+    Return the logarithms of the odds by which a test moves a doubt, shape (2,).
+
+    By how much the doubt falls if the effect is there, and by how much the effect does if not.
+
+    Parameters
+    ----------
+    doubt
+        before the test
+    known, share
+        deviation of its size from the readings alone, and the share to which that shrinks
+    gain
+        that the test adds if the effect is there
+
+    """
+    # what follows from a tolerance, or from how tests differ, does not shrink
+    after = replace(doubt, deviation=math.sqrt(max(
+        doubt.deviation ** 2 - (1.0 - share ** 2) * known ** 2, _LEAST)))
+    # a gain that no fit has told will not be told by the next one either
+    there = replace(after, gain=doubt.gain + gain if doubt.gain else 0.0)
+    # the size of what is not there goes to zero as it gets certain
+    absent = replace(after, excess=doubt.excess * share ** 2)
+    return doubt.slope * np.log([there.certainty / doubt.certainty,
+                                 doubt.certainty / absent.certainty])
 
 
 def _shrunk_at_most(rivals: Sequence[Rival], i: int, lack: FloatArray) -> dict[str, float]:
@@ -380,11 +397,13 @@ def _followed(problem: LeastSquares, rival: Rival, point: dict[str, float], off:
     slopes = (off.astype(np.float32) @ jacobian).astype(float) / scale
     factor = factored(known / np.outer(scale, scale), ROUNDING)
     steps = solved(factor, slopes.T).T / scale
+    in_doubt = {doubt.size for doubt in rival.doubts.values()}
     shares = {}
-    for name in {doubt.size for doubt in rival.doubts.values()} & {p.name for p in numbers}:
-        place = [p.name for p in numbers].index(name)
-        variance = inflated * solved(factor, np.eye(scale.size)[place])[place] / scale[place] ** 2
-        shares[name] = min(math.sqrt(max(variance, 0.0)) / rival.deviation(name), 1.0)
+    for place, name in enumerate(p.name for p in numbers):
+        if name in in_doubt:
+            unit = np.eye(scale.size)[place]
+            variance = inflated * solved(factor, unit)[place] / scale[place] ** 2
+            shares[name] = min(math.sqrt(max(variance, 0.0)) / rival.deviation(name), 1.0)
     # summed directly: the difference of two large sums in single precision cannot resolve it
     return (np.asarray(np.sum((steps @ precision) * steps, axis=1)),
             np.asarray(off - steps @ jacobian.T), shares)

@@ -15,7 +15,7 @@
 The doubt whether an effect of a fit is larger than its tolerance.
 
 A fit may have an effect because the machine has it, or because it mends what is a little wrong
-elsewhere. In doubt is what exceeds its tolerance by few standard deviations and gains little.
+elsewhere. It is in doubt if it exceeds its tolerance by few standard deviations and gains little.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any
 
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.settings import IntervalSettings
@@ -63,10 +62,6 @@ class Doubt:
     def probability(self) -> float:
         """Return the probability that the effect is within its tolerance after all."""
         return float(1.0 / (1.0 + self.certainty ** self.slope))
-
-    def as_data(self) -> dict[str, Any]:
-        """Return the doubt as plain data, for the JSON."""
-        return dict(vars(self))
 
 
 def doubts(hypothesis: Hypothesis, deviating: Mapping[str, float], gained: float,

@@ -167,7 +167,7 @@ def found_noise(experiments: Sequence[Experiment]) -> dict[str, dict[str, float]
     Return the noise that a diagnosis has found, by signal, for the JSON.
 
     Each has the variances `white` and `slow`, in variances of the stated noise, and `corner_hz` of
-    the slow part.
+    the slow part, 0 if there is none.
     """
     first = experiments[0]
     interval = float(np.median(np.diff(first.time)))
@@ -176,7 +176,8 @@ def found_noise(experiments: Sequence[Experiment]) -> dict[str, dict[str, float]
         process = Process.of(colour)
         found[channel] = {
             'white': process.white, 'slow': process.slow,
-            'corner_hz': -math.log(max(process.pole, 1e-9)) / (2.0 * math.pi * interval)}
+            'corner_hz': (-math.log(process.pole) / (2.0 * math.pi * interval)
+                          if process.slow else 0.0)}
     return found
 
 
@@ -197,7 +198,7 @@ def with_found_noise(experiments: Sequence[Experiment],
         if channel not in found:
             return Colour()
         item = found[channel]
-        pole = math.exp(-2.0 * math.pi * item['corner_hz'] * interval)
+        pole = math.exp(-2.0 * math.pi * item['corner_hz'] * interval) if item['slow'] else 0.0
         return Process(item['white'], item['slow'], pole).colour
 
     return tuple(replace(e, colours=tuple(
@@ -214,7 +215,7 @@ def with_model_error(experiments: Sequence[Experiment],
             for c, channel in enumerate(experiments[0].channels)]
     known = [Process.of(colour) for colour in experiments[0].colours] or (
         [Process(1.0, 0.0, 0.0)] * len(slow))
-    # what is slower or faster than the other counts as the larger of the two
+    # of the two slow parts the larger one counts, with its own pole
     colours = tuple(
         Colour() if channel in experiments[0].quantised else
         (replace(noise, slow=error, pole=pole) if error > noise.slow else noise).colour

@@ -19,14 +19,14 @@ Numbers of a single test, such as where it starts, are integrated out: the next 
 
 Two answers may come from the same fit, where it is not sure that one of its effects is larger than
 its tolerance. Each of them is then taken at its mean in its own region: what it names is beyond
-the tolerances, and the rest is within them. A verdict leaves answers apart by such doubts where
-no fit does, so a rival holds what tells of them.
+the tolerances, and the rest is within them. A rival also holds these doubts: they say what it
+would take to end them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 import math
 from typing import Any
 
@@ -112,7 +112,7 @@ class Rival:
         return {'named': list(self.named), 'effects': list(self.effects),
                 'forms': list(self.forms), 'probability': self.probability,
                 'names': list(self.names), 'values': self.values.tolist(), 'covariance': rows,
-                'doubts': {effect: doubt.as_data() for effect, doubt in self.doubts.items()}}
+                'doubts': {effect: asdict(doubt) for effect, doubt in self.doubts.items()}}
 
     @classmethod
     def of_data(cls, data: Mapping[str, Any]) -> Rival:
@@ -131,19 +131,24 @@ class Rival:
         return cls(tuple(data['named']), tuple(data['effects']), tuple(data['forms']),
                    float(data['probability']), names, np.array(data['values'], float),
                    lower + np.tril(lower, -1).T,
-                   {effect: Doubt(**doubt) for effect, doubt in data['doubts'].items()})
+                   {effect: Doubt(**doubt) for effect, doubt in data.get('doubts', {}).items()})
 
 
-def planned_rivals(planning: Mapping[str, Any]) -> tuple[list[Rival], float]:
+def planned_rivals(planning: Mapping[str, Any],
+                   ) -> tuple[list[Rival], float, dict[str, Mapping[str, float]]]:
     """
-    Take from a verdict, its entry `planning`, the rivals and the inflation of the variance.
+    Take from a verdict, its entry `planning`, the rivals, the inflation and the noise.
+
+    The noise is as `noise.found_noise`. A verdict of an earlier version has neither noise nor
+    doubts, which is no error.
 
     Raises
     ------
     KeyError, TypeError, ValueError, AttributeError : it holds none
 
     """
-    return ([Rival.of_data(item) for item in planning['rivals']], float(planning['inflation']))
+    return ([Rival.of_data(item) for item in planning['rivals']], float(planning['inflation']),
+            dict(planning.get('noise', {})))
 
 
 def rivals_of(problem: LeastSquares, answers: Sequence[Answer], inflated: float,

@@ -328,8 +328,6 @@ class HeldOutSettings:
 class ConfusabilitySettings:
     """Which effects a planned test can tell apart, from derivatives alone."""
 
-    caution: float = _setting(
-        3.0, '1', 'by what promised evidence is divided where tests are compared')
     alike: float = _setting(
         0.95, '1', 'share of what an effect does that another must imitate to pass for it')
 
@@ -351,7 +349,7 @@ class PlanningSettings:
         0.25, 'probability', 'probability that no answer of an open verdict is true: weight of '
         'how well a test shows other effects')
     alike: float = _setting(
-        1.0, 'logarithm of odds', 'evidence up to which a test does not tell two rivals apart')
+        1.0, 'temperature', 'lack of fit up to which a test does not tell two rivals apart')
     sure: float = _setting(0.9, 'probability', 'probability from which an answer is sure')
 
 

@@ -58,12 +58,12 @@ def designed(planning: Mapping[str, Any], drive: Drive) -> dict[str, Any]:
     from antenna_drive.diagnosis.proposal import lines
     from antenna_drive.machines.antenna.allowed_tests import AntennaTests
     from antenna_drive.machines.antenna.drive_limits import DriveLimits
-    rivals, inflation = planned_rivals(planning)
+    rivals, inflation, noise = planned_rivals(planning)
     space = AntennaTests(parse_sheet(planning['sheet']), drive, DriveLimits.of_drive(drive),
                          DURATION_S)
     try:
         found = TestDesign(space, rivals, inflation, objective_for(rivals), threads=1,
-                           noise=planning.get('noise', {})).run()
+                           noise=noise).run()
     except KeyError as error:
         raise UserError(f'{error.args[0]}: this configuration knows no such effect') from error
     data = as_data(found, space)

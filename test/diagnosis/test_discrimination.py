@@ -119,7 +119,7 @@ def test_probabilities_after_a_test() -> None:
     assert told.information(8.0) == pytest.approx(
         0.7 * math.log(first / 0.7) + 0.3 * math.log(second / 0.3))
     assert told.surely(8.0, 0.8) == pytest.approx(0.7)
-    assert told.least_evidence(1.0)[0, 1] == 8.0
+    assert told.least_lack()[0, 1] == 8.0
 
 
 def test_the_signals_that_tell_have_their_shares() -> None:
@@ -134,6 +134,10 @@ def test_a_rival_survives_its_file() -> None:
         'part.waves': Doubt('waves_0', 0.3, 0.1, 3.5, 20.0, 2000.0, 3.0)})
     back = Rival.of_data(json.loads(json.dumps(one.as_data())))
     assert back.doubts == one.doubts
+    # a verdict of an earlier version has none
+    plain = one.as_data()
+    del plain['doubts']
+    assert Rival.of_data(plain).doubts == {}
     assert back.named == one.named and back.names == one.names
     assert back.point == one.point
     assert back.covariance == pytest.approx(one.covariance)

@@ -14,8 +14,9 @@
 """
 What the samples of a command tell of it: where it jumps, has a corner, or is not known.
 
-Between two samples that differ by more than their neighbours do, a jump is assumed, and where a
-motion is cut off: where the regular times of many jumps put it, or else halfway.
+A jump is assumed between two samples that differ by more than their neighbours do, and where a
+motion is cut off. It is at the time of a regular sequence of jumps if there is one, or else
+halfway between the samples.
 """
 
 from __future__ import annotations

@@ -176,11 +176,10 @@ class Investigation:
             return {'objective': 'given', 'family': 'given',
                     'test': self._space.as_data(self._first)}
         rivals: list[Rival] = []
-        inflated, noise = 1.0, dict[str, Any]()
+        inflated, noise = 1.0, dict[str, Mapping[str, float]]()
         if number > 1:
             verdict = _read(self._path('verdict', number - 1, '.json')) or {}
-            rivals, inflated = planned_rivals(verdict['planning'])
-            noise = verdict['planning'].get('noise', {})
+            rivals, inflated, noise = planned_rivals(verdict['planning'])
         found = TestDesign(
             self._space, rivals, inflated, objective_for(rivals),
             threads=self._threads, settings=self._settings, effort=self._effort,
