@@ -132,7 +132,7 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
         return replace(hypothesis, doubts={
             effect: doubt.probability for effect, doubt in doubted(hypothesis, fitted).items()})
 
-    hypotheses = _with_rests(fits, hypotheses, judged(best, hypotheses))
+    hypotheses = _with_rests(fits, hypotheses, judged(best, hypotheses), settings)
     hypotheses, best = [judged(h, hypotheses) for h in hypotheses], judged(best, hypotheses)
     if best.unsure:
         notes.append(f'{" + ".join(sorted(best.unsure))}: not surely beyond the tolerance, and '
@@ -160,16 +160,16 @@ def _between_tests(reach: Mapping[str, Any]) -> dict[str, float]:
     return {name: jackknife(found) for name, found in values.items()}
 
 
-def _with_rests(fits: FullFits, hypotheses: Sequence[Hypothesis],
-                best: Hypothesis) -> list[Hypothesis]:
+def _with_rests(fits: FullFits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
+                settings: Settings) -> list[Hypothesis]:
     """
-    Return hypotheses, and those that show what each unsure effect of the best gains.
+    Return hypotheses, and those that show what each doubted effect of the best gains.
 
     The search gives up what is far behind the best, and so the best without what gains most.
     """
     known = {frozenset(h.effects) for h in hypotheses}
     return [*hypotheses, *(fits.without(best, effect) for effect in best.effects
-                           if effect in best.unsure
+                           if best.doubts.get(effect, 0.0) >= settings.interval.least_doubt
                            and frozenset(best.effects) - {effect} not in known)]
 
 

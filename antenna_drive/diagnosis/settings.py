@@ -285,6 +285,9 @@ class IntervalSettings:
         TRIALS_12_AND_13)
     sure_slope: float = _setting(
         3.0, '1', 'how sharply the doubt of an effect falls at these limits', TRIALS_9_TO_12)
+    least_doubt: float = _setting(
+        0.02, 'probability', 'doubt from which it is found out what the effect gains beside the '
+        'others')
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,8 @@ from antenna_drive.diagnosis import (
     diagnose, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point, rank_hypotheses,
 )
 from antenna_drive.diagnosis.diagnosis import share_text
+from antenna_drive.diagnosis.rivals import Rival
+from antenna_drive.diagnosis.settings import DEFAULT
 from blas_threads import during, Look
 import numpy as np
 import pytest
@@ -131,6 +133,17 @@ def test_an_effect_that_gains_very_much_is_named_though_its_interval_is_wide() -
     low, high = top['parameters']['load.creep.size']['ci95']
     assert low < 0.0 < 1.0 < high
     assert set(top['effects']) == {'load.creep', 'floor.wave'}
+
+
+def test_a_small_doubt_is_settled_by_what_an_effect_gains() -> None:
+    """The doubt of a tenth is left by the width of an interval; the waves end it, too."""
+    easier = DEFAULT.changed('interval.sure', 0.15).changed('interval.sure_of_partner', 0.15)
+    result = diagnose(Scale({'load.creep.size': 1.0, 'floor.wave.size': 0.05}),
+                      settings=easier).result
+    creep = Rival.of_data(result['planning']['rivals'][0]).doubts['load.creep']
+    by_interval = replace(creep, gain=0.0).probability
+    assert 0.05 < by_interval < 0.5
+    assert result['which'][0]['probability'] > 1.0 - by_interval
 
 
 def test_an_effect_that_the_catalogue_lacks_is_unknown() -> None:
