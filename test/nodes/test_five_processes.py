@@ -15,7 +15,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 import json
 import math
 from pathlib import Path
@@ -235,12 +235,10 @@ def test_each_node_killed_is_missed_and_started_again_begins_a_new_run(
             said = len(processes.log(neighbour))
             processes.kill(victim)
             # The last that was said, for an earlier wait may name it too: a drive that has just
-            # begun may wait for the recorder of this test. A frame sent while its sender dies
-            # reaches some peers only: those it did not reach stand still as well, and the
-            # neighbour names them beside the one that is gone.
-            watch.until(lambda: victim in _named(processes.log(neighbour)),
+            # begun may wait for the recorder of this test.
+            watch.until(lambda: _misses(_named(processes.log(neighbour)), recorder, victim),
                         f'{neighbour} to say that it waits for {victim}')
-            watch.until(lambda: _missed(watch, neighbour, victim),
+            watch.until(lambda: _misses(_reported(watch, neighbour), recorder, victim),
                         f'{neighbour} to report that it waits for {victim}')
             runs = len(recorder.runs)
             processes.start(victim)
@@ -311,10 +309,21 @@ def _named(log: str) -> list[str]:
     return said[-1].split(', ') if said else []
 
 
-def _missed(watch: Watch, neighbour: str, victim: str) -> bool:
+def _reported(watch: Watch, neighbour: str) -> list[str]:
+    """Return whom a node reports that it waits for."""
     status = watch.reports.get(neighbour)
-    return (status is not None and 'at step' in status.message
-            and victim in watch.value(neighbour, 'waiting for').split(', '))
+    return (watch.value(neighbour, 'waiting for').split(', ')
+            if status is not None and 'at step' in status.message else [])
+
+
+def _misses(named: Sequence[str], recorder: Recorder, victim: str) -> bool:
+    """
+    Return whether who waits for these waits for a victim.
+
+    A frame sent while its sender dies reaches some peers only. Those it did not reach stand still
+    as well, and the others wait for them: for the recorder of the test perhaps, and for it alone.
+    """
+    return victim in named or NAME in named and victim in recorder.observer.missing
 
 
 def _at_step(recorder: Recorder, processes: DriveProcesses, step: int) -> bool:
