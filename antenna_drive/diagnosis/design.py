@@ -60,6 +60,8 @@ CRITERIA: Mapping[str, str] = {
     RANDOM: 'none: the first test within the limits'}
 # An effect that does not show at any size is as bad as this many times the best.
 _NEVER = 1e3
+# Information below this is none [nat].
+_NOTHING = 1e-6
 
 Progress = Callable[[float, str], None]
 
@@ -144,7 +146,8 @@ class DesignEffort:
     judged : of all, those that are judged with all tolerances free
     varied : of these, those that are varied
     variants : of each of them
-    confirmed : of all, those that every rival is fitted to
+    confirmed : of the best, those that every rival is fitted to at a time
+    rounds : of that at most, while another test promises more than the best of those
     margin : share of each limit that a test may use
 
     """
@@ -154,6 +157,7 @@ class DesignEffort:
     varied: int = 3
     variants: int = 4
     confirmed: int = 2
+    rounds: int = 3
     margin: float = 0.9
 
 
@@ -304,8 +308,7 @@ class TestDesign:
             judged = self._compared([*judged, *pool.map(self._judge, tried)])
             progress(0.8, 'each rival fitted to the others')
             if self._objective == SEPARATE:
-                judged = self._compared([*pool.map(self._confirmed, judged[:effort.confirmed]),
-                                         *judged[effort.confirmed:]])
+                judged = self._with_fits(judged, pool)
             helpful = [test for test in judged if self._helps(test)]
             beyond: Sequence[Judged] = ()
             if not helpful:
@@ -365,6 +368,19 @@ class TestDesign:
         # no size is told, only their mean is compared
         return replace(test, told=told, sizes=self._sizes(machine.low_fidelity()))
 
+    def _with_fits(self, judged: Sequence[Judged], pool: ThreadPoolExecutor) -> list[Judged]:
+        """Confirm the best tests until no other one promises more, and put those first."""
+        best = list(judged)
+        for _ in range(self._effort.rounds):
+            if not best or best[0].confirmed is not None:
+                break
+            known = [test for test in best if test.confirmed is not None]
+            promised = [test for test in best if test.confirmed is None]
+            count = self._effort.confirmed
+            best = self._compared([*pool.map(self._confirmed, promised[:count]), *known,
+                                   *promised[count:]])
+        return sorted(best, key=lambda test: test.confirmed is None)
+
     def _confirmed(self, test: Judged) -> Judged:
         """Fit each rival to the readings of the others."""
         return replace(test, confirmed=refitted(
@@ -402,19 +418,23 @@ class TestDesign:
             found.effects, found.detectable, found.units, strict=True)}
 
     def _compared(self, tests: Iterable[Judged]) -> list[Judged]:
-        """Return judged tests by their scores, the best first, confirmed ones before others."""
+        """Return judged tests by their scores, the best first."""
         found = list(tests)
         if self._objective in (SEPARATE, DETECT):
             found = [replace(test, coarseness=coarseness, score=self._compound(test, coarseness))
                      for test, coarseness in zip(found, _coarseness(found), strict=True)]
-        return sorted(found, key=lambda test: (test.confirmed is None, -test.score))
+        return sorted(found, key=lambda test: -test.score)
 
     def _compound(self, test: Judged, coarseness: float) -> float:
-        """Return what a test tells of the rivals and of other effects, by their weights."""
+        """
+        Return what a test tells of the rivals and of other effects, by their weights.
+
+        Each part is the logarithm of an efficiency, but for what all tests share.
+        """
         if test.separation is None:
             return -math.log(coarseness)
         unlisted = self._settings.planning.unlisted
-        return ((1.0 - unlisted) * self._score(test.separation)
+        return ((1.0 - unlisted) * math.log(max(self._score(test.separation), _NOTHING))
                 - unlisted * math.log(coarseness))
 
     # -- what no test tells --------------------------------------------------------------------

@@ -237,14 +237,16 @@ class Judge:
         own = {p.name for p in testing.parameters(self._nuisances) if p.experiment is not None}
         begin = {name: value for name, value in found.point().items() if name not in own}
         state = self._fitted(testing, self._nuisances, held, {**begin, **held}, self._with)
-        # they begin again where the fit without effects has left them, or the fit to all tests
-        others = [bare.point()] if problem.leaves_much(state) else []
+        # They begin again where the fit without effects has left them, or the fit to all tests.
+        # The loss of a fit hardly sees what is wrong for a moment, such as where a motor starts.
+        worse = np.sum(np.square(state.residual)) > np.sum(np.square(bare.residual))
+        others = [(bare.point(), self._without)] if worse or problem.leaves_much(state) else []
         if self._in_local_minimum(
                 LeastSquares(testing.holding(held), settings=self._settings), state):
-            others.append(self._best.state.point())
+            others.append((self._best.state.point(), self._with))
         state = min([state, *(
-            self._fitted(testing, self._nuisances, held, {**other, **held}, self._with)
-            for other in others)], key=lambda fit: fit.cost)
+            self._fitted(testing, self._nuisances, held, {**other, **held}, slopes)
+            for other, slopes in others)], key=lambda fit: fit.cost)
         point = {**held, **state.point()}
         fold = replace(fold, reasons={**reasons, **self._unseen(problem, point, state.residual,
                                                                 reasons)})

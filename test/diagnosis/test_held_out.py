@@ -126,6 +126,35 @@ def test_what_a_tolerance_has_of_an_effect_in_training_is_the_effect() -> None:
         [0.37] * 3, abs=1e-3)
 
 
+class Thrown(Ramp):
+    """A ramp after a start that has two sides: from 0 no gradient leads to the true one."""
+
+    true = -1.9
+    starts = [Parameter(f'start {k}', '1', -3.0, 3.0, 1e-3, 2.0, experiment=k) for k in range(3)]
+
+    def __init__(self) -> None:
+        super().__init__([0.5, 0.5, 0.5])
+        self.nuisances = [ZERO, *self.starts]
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return the ramp, and for 0.4 s what a start on the other side does."""
+        side = point.get(f'start {experiment}', 0.0) - self.true - 1.0
+        wrong = 100.0 * ((side ** 2 - 1.0) ** 2 + 0.3 * (1.0 + side))
+        return np.asarray(super().predict(point, experiment)
+                          + wrong * (TIME < 0.4)[:, np.newaxis])
+
+
+def test_a_start_in_which_a_fit_got_stuck_is_not_held_against_the_effect() -> None:
+    machine = Thrown()
+    problem = LeastSquares(machine)
+    thrown = {p.name: machine.true for p in machine.starts}
+    none = Hypothesis((), (), problem.fit(problem.start(machine.nuisances, thrown), 20))
+    best = problem.fit(problem.start([*machine.nuisances, SIZE], {}), 20)
+    assert all(best.point()[name] > -0.5 for name in thrown), 'on the other side'
+    found = held_out(problem, none, Hypothesis((EFFECT.id,), EFFECT.forms, best))
+    assert found['explained_fraction']['value'] == pytest.approx(1.0, abs=1e-3)
+
+
 def test_a_share_names_the_effects_that_it_is_of() -> None:
     """What belongs to one test is never judged, and has no part in what the other explains."""
     machine = Ramp([0.5, 0.5, 0.5])
