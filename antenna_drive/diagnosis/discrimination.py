@@ -171,6 +171,10 @@ def refitted(machine: Machine, rivals: Sequence[Rival], inflated: float,
     """
     Return the same as `separation`, with each rival fitted to the readings of each other one.
 
+    The true rival is fitted as well, from a standard deviation away along each direction. A fit
+    that sticks there would stick in a diagnosis, which compares two fits. What it leaves is no
+    evidence against the others.
+
     Parameters
     ----------
     machine, rivals, inflated, settings
@@ -186,26 +190,26 @@ def refitted(machine: Machine, rivals: Sequence[Rival], inflated: float,
     points = [known_to(machine, rival) for rival in rivals]
     problem = _problem(machine, rivals, points, settings)
     readings = machine.simulate(points)
-    lack = np.zeros((len(rivals), len(rivals)))
+    left = np.zeros((len(rivals), len(rivals)))
     ends: dict[tuple[int, int], Point] = {}
     for j, rival in enumerate(rivals):
         own = _Continued(problem.machine, rival, inflated)
         jacobian = None
         for i, truth in enumerate(readings):
-            if i == j:
-                continue
             fitted = LeastSquares(own.with_experiments([
                 replace(e, measured=values) for e, values in zip(
                     problem.experiments, truth, strict=True) if values is not None]),
                 settings=settings)
-            state = fitted.start(own.nuisances, {}, jacobian)
-            # it does not depend on what was measured
-            jacobian = state.base_jacobian
+            state = fitted.start(own.nuisances, own.elsewhere() if i == j else {}, jacobian)
+            if i != j:
+                # it does not depend on what was measured
+                jacobian = state.base_jacobian
             state = fitted.fit(state, settings.search.iterations)
             for _ in range(settings.planning.passes):
                 state = fitted.fit(fitted.refreshed(state), settings.search.iterations)
-            lack[i, j] = state.cost / inflated
+            left[i, j] = state.cost / inflated
             ends[i, j] = own.own(state.point())
+    lack = np.maximum(left - np.diag(left)[:, np.newaxis], 0.0)
     shrunk = shrunk or [{} for _ in rivals]
     return Separation(_prior(rivals), lack, points=ends, odds=_odds(rivals, lack, shrunk),
                       shrunk=shrunk)
@@ -277,6 +281,11 @@ class _Continued(Machine):
         other = copy(self)
         other._machine = self._machine.low_fidelity()
         return other
+
+    def elsewhere(self) -> dict[str, float]:
+        """Return a point a standard deviation away along each direction, to one side or other."""
+        signs = np.random.default_rng(0).choice([-1.0, 1.0], len(self._free))
+        return dict(zip(self._free, signs.tolist(), strict=True))
 
     def own(self, point: Point) -> dict[str, float]:
         """Return a point in the machine's own numbers, each within its bounds."""

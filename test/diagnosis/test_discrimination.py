@@ -110,6 +110,34 @@ def test_fits_of_linear_curves_end_where_the_projection_says() -> None:
     assert kept.points[0, 1].keys() == {f'parabola_{k}' for k in range(3)}
 
 
+class Tone(Machine):
+    """A tone of a frequency, or none."""
+
+    time: FloatArray = np.linspace(0.0, 5.0, 400)
+
+    def __init__(self) -> None:
+        super().__init__([Experiment(
+            'one', self.time, ('y',), ('1',), np.zeros((400, 1)), np.ones((400, 1)),
+            model_error=np.zeros(1))], (), [Effect('part.tone', 'part', '', '', (Form('', (
+                Parameter('frequency', 'Hz', 0.0, 10.0, 1e-4),)),))])
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        return np.sin(2.0 * np.pi * point.get('frequency', 0.0) * self.time)[:, np.newaxis]
+
+
+def test_what_a_fit_of_the_true_rival_may_miss_is_no_evidence() -> None:
+    """From half a hertz away no gradient leads to a frequency that 5 s tell."""
+    def lack(deviation: float) -> float:
+        tone = Rival(('part.tone',), ('part.tone',), ('',), 0.5, ('frequency',), np.array([1.0]),
+                     np.array([[deviation ** 2]]))
+        none = Rival((), (), (), 0.5, (), np.zeros(0), np.zeros((0, 0)))
+        return float(refitted(Tone(), [tone, none], 1.0).lack[0, 1])
+
+    # half the sum of the squares of a sine
+    assert lack(1e-3) == pytest.approx(400 / 4, rel=0.02)
+    assert lack(0.5) < 0.1 * 400 / 4
+
+
 def test_probabilities_after_a_test() -> None:
     told = Separation(np.array([0.7, 0.3]), np.array([[0.0, 8.0], [16.0, 0.0]]))
     first = 0.7 / (0.7 + 0.3 * math.exp(-1.0))
