@@ -69,7 +69,7 @@ def test_figures_of_a_wild_trial_are_those_of_its_cases(
             assert float(stated.group()) == pytest.approx(figures[key], abs=0.005001), title
 
 
-@pytest.mark.parametrize('trial', [1, 2, 3])
+@pytest.mark.parametrize('trial', [1, 2, 3, 4])
 def test_figures_of_third_tests_are_those_of_their_cases(trial: int, tmp_path: Path) -> None:
     lines = (DOCS / 'trials' / f'next_test_{trial}.jsonl').read_text(encoding='utf-8')
     (tmp_path / FILE).write_text(lines, encoding='utf-8')
