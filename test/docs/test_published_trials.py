@@ -20,10 +20,10 @@ from pathlib import Path
 import re
 
 from antenna_drive.cli.twin_trial import of_onsets, of_verdicts
+from antenna_drive.trial import investigations, third_tests
 from antenna_drive.trial.results import FILE, TrialResults
 from antenna_drive.trial.scorecard import score
 from antenna_drive.trial.scored_cases import read_scored
-from antenna_drive.trial.third_tests import summary
 import pytest
 
 DOCS = Path(__file__).resolve().parents[2] / 'docs'
@@ -69,14 +69,18 @@ def test_figures_of_a_wild_trial_are_those_of_its_cases(
             assert float(stated.group()) == pytest.approx(figures[key], abs=0.005001), title
 
 
+def results_of(folder: Path, name: str) -> TrialResults:
+    """Return the results of a trial that goes on, as they are published."""
+    lines = (DOCS / 'trials' / f'{name}.jsonl').read_text(encoding='utf-8')
+    (folder / FILE).write_text(lines, encoding='utf-8')
+    cases = [json.loads(line) for line in lines.splitlines()]
+    return TrialResults(folder, {'settings': {'seed': cases[0]['seed']},
+                                 'seals': [case['case'] for case in cases]})
+
+
 @pytest.mark.parametrize('trial', [1, 2, 3, 4])
 def test_figures_of_third_tests_are_those_of_their_cases(trial: int, tmp_path: Path) -> None:
-    lines = (DOCS / 'trials' / f'next_test_{trial}.jsonl').read_text(encoding='utf-8')
-    (tmp_path / FILE).write_text(lines, encoding='utf-8')
-    cases = [json.loads(line) for line in lines.splitlines()]
-    results = TrialResults(tmp_path, {'settings': {'seed': cases[0]['seed']},
-                                      'seals': [case['case'] for case in cases]})
-    rules = summary(results)['rules']
+    rules = third_tests.summary(results_of(tmp_path, f'next_test_{trial}'))['rules']
     text = (DOCS / 'next-test.md').read_text(encoding='utf-8')
     table = text.split('| third test |')[trial].split('\n\n')[0].splitlines()[2:]
     rows = [[cell.strip() for cell in line.strip('|').split('|')] for line in table]
@@ -85,6 +89,21 @@ def test_figures_of_third_tests_are_those_of_their_cases(trial: int, tmp_path: P
         found = rules['best_built_in' if name.startswith('best') else name.lower()]
         assert share == f'{round(found["top1"] * found["cases"])} of {found["cases"]}', name
         assert float(left) == found['median_set'], name
+
+
+def test_figures_of_investigations_are_those_of_their_cases(tmp_path: Path) -> None:
+    found = investigations.summary(results_of(tmp_path, 'investigate_1'))
+    text = (DOCS / 'next-test.md').read_text(encoding='utf-8')
+    table = text[text.index('| tests of an investigation |'):].split('\n\n')[0].splitlines()[2:]
+    rows = [[cell.strip() for cell in line.strip('|').split('|')] for line in table]
+    assert {row[0] for row in rows} == set(found)
+    for way, sure, _, wrong, tests, seconds in rows:
+        item = found[way]
+        right = round(item['sure_and_right'] * item['cases'])
+        assert sure == f'{right} of {item["cases"]}', way
+        assert int(wrong) == item['sure_and_wrong'], way
+        assert float(tests) == item['median_tests'], way
+        assert float(seconds) == item['median_seconds'], way
 
 
 @pytest.mark.parametrize('trial', ['5', '6'])
