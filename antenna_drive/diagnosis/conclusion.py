@@ -132,15 +132,19 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
         return replace(hypothesis, doubts={
             effect: doubt.probability for effect, doubt in doubted(hypothesis, fitted).items()})
 
-    hypotheses = _with_rests(fits, hypotheses, judged(best, hypotheses), settings)
-    hypotheses, best = [judged(h, hypotheses) for h in hypotheses], judged(best, hypotheses)
+    first = judged(best, hypotheses)
+    rests = _rests(fits, hypotheses, first, settings)
+    fitted = [*hypotheses, *rests.values()]
+    # the fit that a small doubt has asked for is compared, but is no answer
+    answers = [*hypotheses, *(rests[effect] for effect in rests if effect in first.unsure)]
+    hypotheses, best = [judged(h, fitted) for h in answers], judged(best, fitted)
     if best.unsure:
         notes.append(f'{" + ".join(sorted(best.unsure))}: not surely beyond the tolerance, and '
                      'therefore not named')
     evidence = _evidence(
         problem, hypotheses, best, reach['explained_fraction']['ci95'][1], usual)
     return Conclusion(problem, none, best, reach, deviating,
-                      lambda hypothesis: doubted(hypothesis, hypotheses), evidence,
+                      lambda hypothesis: doubted(hypothesis, fitted), evidence,
                       evidence.decide(settings), tuple(notes))
 
 
@@ -160,17 +164,17 @@ def _between_tests(reach: Mapping[str, Any]) -> dict[str, float]:
     return {name: jackknife(found) for name, found in values.items()}
 
 
-def _with_rests(fits: FullFits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
-                settings: Settings) -> list[Hypothesis]:
+def _rests(fits: FullFits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
+           settings: Settings) -> dict[str, Hypothesis]:
     """
-    Return hypotheses, and those that show what each doubted effect of the best gains.
+    Return the best without each doubted effect, where there is no such fit, by effect.
 
     The search gives up what is far behind the best, and so the best without what gains most.
     """
     known = {frozenset(h.effects) for h in hypotheses}
-    return [*hypotheses, *(fits.without(best, effect) for effect in best.effects
-                           if best.doubts.get(effect, 0.0) >= settings.interval.least_doubt
-                           and frozenset(best.effects) - {effect} not in known)]
+    return {effect: fits.without(best, effect) for effect in best.effects
+            if best.doubts.get(effect, 0.0) >= settings.interval.least_doubt
+            and frozenset(best.effects) - {effect} not in known}
 
 
 def _least_costs(hypotheses: Sequence[Hypothesis]) -> dict[frozenset[str], float]:
