@@ -200,9 +200,11 @@ def refitted(machine: Machine, rivals: Sequence[Rival], inflated: float,
                 replace(e, measured=values) for e, values in zip(
                     problem.experiments, truth, strict=True) if values is not None]),
                 settings=settings)
-            state = fitted.start(own.nuisances, own.elsewhere() if i == j else {}, jacobian)
-            if i != j:
-                # it does not depend on what was measured
+            if i == j:
+                state = fitted.start(own.nuisances, own.elsewhere(), None)
+            else:
+                state = fitted.start(own.nuisances, {}, jacobian)
+                # it depends on the point, and not on what was measured
                 jacobian = state.base_jacobian
             state = fitted.fit(state, settings.search.iterations)
             for _ in range(settings.planning.passes):

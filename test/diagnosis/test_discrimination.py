@@ -125,17 +125,25 @@ class Tone(Machine):
         return np.sin(2.0 * np.pi * point.get('frequency', 0.0) * self.time)[:, np.newaxis]
 
 
+def lack_of_silence(deviation: float, order: int = 1) -> float:
+    """Return by how much silence misses a tone whose frequency is known to a deviation [Hz]."""
+    tone = Rival(('part.tone',), ('part.tone',), ('',), 0.5, ('frequency',), np.array([1.0]),
+                 np.array([[deviation ** 2]]))
+    silence = Rival((), (), (), 0.5, (), np.zeros(0), np.zeros((0, 0)))
+    lack = refitted(Tone(), [tone, silence][::order], 1.0).lack[::order, ::order]
+    return float(lack[0, 1])
+
+
 def test_what_a_fit_of_the_true_rival_may_miss_is_no_evidence() -> None:
     """From half a hertz away no gradient leads to a frequency that 5 s tell."""
-    def lack(deviation: float) -> float:
-        tone = Rival(('part.tone',), ('part.tone',), ('',), 0.5, ('frequency',), np.array([1.0]),
-                     np.array([[deviation ** 2]]))
-        none = Rival((), (), (), 0.5, (), np.zeros(0), np.zeros((0, 0)))
-        return float(refitted(Tone(), [tone, none], 1.0).lack[0, 1])
-
     # half the sum of the squares of a sine
-    assert lack(1e-3) == pytest.approx(400 / 4, rel=0.02)
-    assert lack(0.5) < 0.1 * 400 / 4
+    assert lack_of_silence(1e-3) == pytest.approx(400 / 4, rel=0.02)
+    assert lack_of_silence(0.5) < 0.1 * 400 / 4
+
+
+@pytest.mark.parametrize('deviation', [0.02, 0.05, 0.1, 0.2])
+def test_the_order_of_rivals_changes_nothing(deviation: float) -> None:
+    assert lack_of_silence(deviation, -1) == pytest.approx(lack_of_silence(deviation), rel=1e-6)
 
 
 def test_probabilities_after_a_test() -> None:
