@@ -36,7 +36,7 @@ The exit code is 1 if no test within the limits helps. docs/next-test.md has mor
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from dataclasses import replace
 import json
 from pathlib import Path
 import time
@@ -47,7 +47,7 @@ from antenna_drive.errors import UserError
 from antenna_drive.parameters.schema import Entry
 
 if TYPE_CHECKING:
-    from antenna_drive.diagnosis import Proposal, Rival, TestSpace
+    from antenna_drive.diagnosis import Findings, Proposal, TestSpace
 
 _OBJECTIVES = ('separate', 'sharpen', 'detect')
 _RULES = ('d-optimal', 'random')
@@ -92,14 +92,14 @@ def run(arguments: argparse.Namespace) -> int:
     planning = _planning(arguments)
     from antenna_drive.diagnosis import objective_for, TestDesign
     from antenna_drive.diagnosis.proposal import as_data, contents, lines
-    rivals, inflated, noise = _known(arguments, planning)
-    objective = arguments.rule or arguments.objective or objective_for(rivals)
+    findings = _findings(arguments, planning)
+    objective = arguments.rule or arguments.objective or objective_for(findings.rivals)
     space = (_tests_of_own if arguments.model else _tests_of_drive)(arguments, planning)
     began = time.monotonic()
     with Progress('proposal', 1.0) as progress:
         try:
-            found = TestDesign(space, rivals, inflated, objective, arguments.suspect,
-                               arguments.jobs, seed=arguments.seed, noise=noise).run(
+            found = TestDesign(space, findings, objective, arguments.suspect, arguments.jobs,
+                               seed=arguments.seed).run(
                 lambda share, doing: progress.update(share))
         except KeyError as error:
             raise UserError(f'{arguments.verdict}: {error.args[0]}: this configuration knows no '
@@ -139,18 +139,17 @@ def _planning(arguments: argparse.Namespace) -> dict[str, Any]:
                         'diagnose the recordings again') from error
 
 
-def _known(arguments: argparse.Namespace, planning: dict[str, Any],
-           ) -> tuple[list[Rival], float, Mapping[str, Mapping[str, float]]]:
-    """Return the rivals, the inflation of the variance and the noise of the tests so far."""
-    from antenna_drive.diagnosis import planned_rivals
+def _findings(arguments: argparse.Namespace, planning: dict[str, Any]) -> Findings:
+    """Return what the tests so far have told; of the rivals none where others are looked for."""
+    from antenna_drive.diagnosis import Findings
     if not planning:
-        return [], 1.0, {}
+        return Findings()
     try:
-        rivals, inflated, noise = planned_rivals(planning)
+        found = Findings.of_data(planning)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise UserError(f'{arguments.verdict}: planning: {error!r}: damaged; diagnose the '
                         'recordings again') from error
-    return ([], 1.0, noise) if arguments.objective == 'detect' else (rivals, inflated, noise)
+    return replace(found, rivals=(), inflated=1.0) if arguments.objective == 'detect' else found
 
 
 def _tests_of_drive(arguments: argparse.Namespace, planning: dict[str, Any]) -> TestSpace:

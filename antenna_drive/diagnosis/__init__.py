@@ -35,16 +35,16 @@ from antenna_drive.diagnosis.machine import (
 from antenna_drive.diagnosis.motion import Motion
 from antenna_drive.diagnosis.proposal import as_data
 from antenna_drive.diagnosis.ranking import rank_hypotheses, Ranking
-from antenna_drive.diagnosis.rivals import planned_rivals, Rival
+from antenna_drive.diagnosis.rivals import Findings, Rival
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
 from antenna_drive.diagnosis.unknown_input import courses
 
 __all__ = [
     'as_data', 'ByLabel', 'check_machine', 'Colour', 'Confusability', 'confusability', 'Course',
     'courses', 'DEFAULT', 'DesignEffort', 'diagnose', 'Diagnosis', 'Diagram', 'DiagramBlock',
-    'DisturbanceInput', 'Effect', 'Evidence', 'Experiment', 'FloatArray', 'Form', 'Hypothesis',
-    'idle_effects', 'Judged', 'LeastSquares', 'Machine', 'MachineError', 'Motion',
-    'objective_for', 'Parameter', 'planned_rivals', 'Point', 'Progress', 'Proposal',
-    'rank_hypotheses', 'Ranking', 'Regimes', 'Rival', 'Settings', 'TestDesign', 'TestSpace',
-    'TimeScales', 'with_initial_conditions', 'without_labels',
+    'DisturbanceInput', 'Effect', 'Evidence', 'Experiment', 'Findings', 'FloatArray', 'Form',
+    'Hypothesis', 'idle_effects', 'Judged', 'LeastSquares', 'Machine', 'MachineError', 'Motion',
+    'objective_for', 'Parameter', 'Point', 'Progress', 'Proposal', 'rank_hypotheses', 'Ranking',
+    'Regimes', 'Rival', 'Settings', 'TestDesign', 'TestSpace', 'TimeScales',
+    'with_initial_conditions', 'without_labels',
 ]

@@ -94,7 +94,7 @@ class Confusability:
 
 
 def confusability(machine: Machine, progress: Callable[[float], None] = lambda share: None,
-                  settings: Settings = DEFAULT) -> Confusability:
+                  settings: Settings = DEFAULT, inflated: float = 1.0) -> Confusability:
     """
     Say which effects the tests of a machine can tell apart.
 
@@ -106,15 +106,18 @@ def confusability(machine: Machine, progress: Callable[[float], None] = lambda s
         called with the share that is done
     settings
         thresholds
+    inflated
+        by what differences of the cost are divided
 
     """
     problem = LeastSquares(machine.with_experiments(
         with_model_error(machine.experiments, settings.noise)), settings=settings)
-    return visibility(problem, problem.start(machine.nuisances, {}), progress)
+    return visibility(problem, problem.start(machine.nuisances, {}), progress, inflated)
 
 
 def visibility(problem: LeastSquares, state: FitState,
-               progress: Callable[[float], None] = lambda share: None) -> Confusability:
+               progress: Callable[[float], None] = lambda share: None,
+               inflated: float = 1.0) -> Confusability:
     """
     Say how large each effect must be to show beside a fit of the nuisances, and what it is like.
 
@@ -124,6 +127,8 @@ def visibility(problem: LeastSquares, state: FitState,
         the tests, and a fit of the nuisances with its Jacobian
     progress
         called with the share that is done
+    inflated
+        by what differences of the cost are divided
 
     """
     machine, settings = problem.machine, problem.settings
@@ -132,7 +137,7 @@ def visibility(problem: LeastSquares, state: FitState,
     scale = np.sqrt(np.diag(known))
     factor = factored(known / np.outer(scale, scale), ROUNDING)
     ids, units, sizes, remainders = [], [], [], []
-    price = settings.penalty.effect + settings.penalty.parameter
+    price = inflated * (settings.penalty.effect + settings.penalty.parameter)
     imitation = _Imitation(state, settings.interval.derivative_error)
     for i, effect in enumerate(machine.effects.values()):
         progress(i / len(machine.effects))
@@ -211,9 +216,10 @@ class _Imitation:
                    for sign, bound in ((-1.0, -number.low), (1.0, number.high)) if bound > 0.0)
 
 
-def could_hide(problem: LeastSquares, state: FitState) -> list[dict[str, Any]]:
+def could_hide(problem: LeastSquares, state: FitState,
+               inflated: float = 1.0) -> list[dict[str, Any]]:
     """Return how large each effect could be and still hide in these tests, for the JSON."""
-    found = visibility(problem, problem.refreshed(state))
+    found = visibility(problem, problem.refreshed(state), inflated=inflated)
     return [{'effect': effect, 'size': float(size) if np.isfinite(size) else None, 'unit': unit}
             for effect, size, unit in zip(found.effects, found.detectable, found.units,
                                           strict=True)]

@@ -39,7 +39,7 @@ from antenna_drive.diagnosis.discrimination import (
 )
 from antenna_drive.diagnosis.machine import FloatArray, Machine, Point
 from antenna_drive.diagnosis.noise import with_found_noise
-from antenna_drive.diagnosis.rivals import Rival
+from antenna_drive.diagnosis.rivals import Findings, Rival
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
 import numpy as np
 
@@ -53,8 +53,8 @@ CRITERIA: Mapping[str, str] = {
               '(compound design: Atkinson, Donev and Tobias 2007, chapter 21)',
     SHARPEN: "D_s-optimality: determinant of the covariance of the likeliest rival's effects, all "
              'tolerances free (Atkinson, Donev and Tobias 2007, section 10.3)',
-    DETECT: 'smallest size of each effect that shows beside all tolerances, over that in the '
-            'best test that was tried, in the geometric mean',
+    DETECT: 'smallest size of each effect that shows beside all tolerances, in the tests so far '
+            'or in this one, over that with the best test that was tried, in the geometric mean',
     D_OPTIMAL: "D-optimality: determinant of the covariance of all the likeliest rival's numbers "
                '(Kiefer and Wolfowitz 1959)',
     RANDOM: 'none: the first test within the limits'}
@@ -237,10 +237,8 @@ class TestDesign:
     ----------
     space
         the tests that the machine may run
-    rivals
-        of a verdict; empty for `detect`
-    inflated
-        by what differences of the cost are divided
+    findings
+        of the tests so far; without rivals for `detect`
     objective
         one of `OBJECTIVES`, or `D_OPTIMAL` or `RANDOM` to compare with
     suspected
@@ -251,23 +249,21 @@ class TestDesign:
         thresholds, and how much is searched
     seed
         of the tests that are drawn
-    noise
-        that the tests so far have shown, see `noise.found_noise`; by default that of the sensors
 
     """
 
     __test__ = False
 
-    def __init__(self, space: TestSpace, rivals: Sequence[Rival] = (), inflated: float = 1.0,
+    def __init__(self, space: TestSpace, findings: Findings = Findings(),
                  objective: str = SEPARATE, suspected: Sequence[str] = (), threads: int = 2,
                  settings: Settings = DEFAULT, effort: DesignEffort = DesignEffort(),
-                 seed: int = 0,
-                 noise: Mapping[str, Mapping[str, float]] = MappingProxyType({})) -> None:
+                 seed: int = 0) -> None:
         """Prepare to search."""
-        self._space, self._rivals, self._inflated = space, list(rivals), inflated
+        self._space, self._findings = space, findings
+        self._rivals, self._inflated = findings.rivals, findings.inflated
         self._objective, self._suspected = objective, list(suspected)
         self._threads, self._settings, self._effort = threads, settings, effort
-        self._random, self._noise = np.random.default_rng(seed), noise
+        self._random = np.random.default_rng(seed)
         self._judge: Callable[[Judged], Judged] = {
             SEPARATE: self._separated, SHARPEN: self._sharpened, D_OPTIMAL: self._sharpened,
             DETECT: self._detected, RANDOM: lambda test: test}[objective]
@@ -347,7 +343,8 @@ class TestDesign:
     def _planned(self, test: Judged) -> Machine:
         """Return the machine in a test, as noisy as it has been so far."""
         machine = self._space.machine(test.test)
-        return machine.with_experiments(with_found_noise(machine.experiments, self._noise))
+        return machine.with_experiments(with_found_noise(
+            machine.experiments, self._findings.noise))
 
     # -- judging one test ----------------------------------------------------------------------
 
@@ -403,8 +400,11 @@ class TestDesign:
             for j in wanted})
 
     def _detected(self, test: Judged) -> Judged:
-        """Judge a test by what it shows."""
-        return replace(test, sizes=self._sizes(self._planned(test)))
+        """Judge a test by what it shows, or the tests so far have shown."""
+        shown = self._findings.shown
+        return replace(test, sizes={
+            name: (min(size, shown.get(name, math.inf)), unit)
+            for name, (size, unit) in self._sizes(self._planned(test)).items()})
 
     def _sizes(self, machine: Machine) -> dict[str, tuple[float, str]]:
         """Return the smallest size of each effect that shows in a test, and its unit."""
@@ -413,7 +413,7 @@ class TestDesign:
             for k, e in enumerate(machine.experiments)])
         machine.effects = {name: effect for name, effect in machine.effects.items()
                            if not self._suspected or name in self._suspected}
-        found = confusability(machine, settings=self._settings)
+        found = confusability(machine, settings=self._settings, inflated=self._inflated)
         return {name: (float(size), unit) for name, size, unit in zip(
             found.effects, found.detectable, found.units, strict=True)}
 

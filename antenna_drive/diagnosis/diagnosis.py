@@ -36,7 +36,7 @@ from antenna_drive.diagnosis.interventions import interventions, lines as lines_
 from antenna_drive.diagnosis.lack_of_fit import remainders, residual_tests
 from antenna_drive.diagnosis.machine import Machine
 from antenna_drive.diagnosis.noise import found_noise
-from antenna_drive.diagnosis.rivals import rivals_of
+from antenna_drive.diagnosis.rivals import Findings, rivals_of
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
 
 Progress = Callable[[float, str], None]
@@ -195,6 +195,11 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         located, places = localisation.of_the_unknown(problem, none.state, decision.lack)
     if decision.word in ('explained', 'partly_explained'):
         located = localisation.of_effects(problem, decision.answers, none.state, best.state)
+    rivals = rivals_of(problem, decision.answers, found.evidence.inflation, settings.planning,
+                       found.doubted)
+    healthy = decision.word == 'no_gap'
+    hidden = could_hide(problem, (none if healthy else best).state, found.evidence.inflation) if (
+        healthy or len(rivals) < 2) else []
     result = {
         'verdict': decision.word,
         'statements': verdict.statements(decision, best),
@@ -205,17 +210,16 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
             found.evidence.hypotheses, settings, found.evidence.inflation),
         'confusable': decision.confusable,
         'how_far': found.reach,
-        'could_hide': could_hide(problem, none.state) if decision.word == 'no_gap' else [],
+        'could_hide': hidden if healthy else [],
         'remains': remainders(problem, best.state, limits),
         'residual_tests': residual_tests(problem, best.state, decision.lack),
         'may_enter_at': [vars(place) for place in places if place.evidence > 0.0],
         'fits': found.evidence.as_data(),
         'planning': {
-            'inflation': found.evidence.inflation, 'noise': found_noise(problem.experiments),
             **machine.planning,
-            'rivals': [rival.as_data() for rival in rivals_of(
-                problem, decision.answers, found.evidence.inflation, settings.planning,
-                found.doubted)]},
+            **Findings(rivals, found.evidence.inflation, found_noise(problem.experiments),
+                       {item['effect']: item['size'] for item in hidden
+                        if item['size'] is not None}).as_data()},
         'seconds': time.monotonic() - began,
         'notes': [*machine.notes, *found.notes],
     }

@@ -134,21 +134,46 @@ class Rival:
                    {effect: Doubt(**doubt) for effect, doubt in data.get('doubts', {}).items()})
 
 
-def planned_rivals(planning: Mapping[str, Any],
-                   ) -> tuple[list[Rival], float, dict[str, Mapping[str, float]]]:
+@dataclass(frozen=True)
+class Findings:
     """
-    Take from a verdict, its entry `planning`, the rivals, the inflation and the noise.
+    What the design of a further test takes from the tests so far.
 
-    The noise is as `noise.found_noise`. A verdict of an earlier version has neither noise nor
-    doubts, which is no error.
-
-    Raises
-    ------
-    KeyError, TypeError, ValueError, AttributeError : it holds none
+    Attributes
+    ----------
+    rivals : answers of the verdict; none before the first test
+    inflated : by what differences of the cost are divided
+    noise : of each sensor, see `noise.found_noise`; by default that of its data sheet
+    shown : smallest size at which an effect shows in these tests, in the unit of its first
+        parameter, by effect; where answers are to be told apart nobody asks for it
 
     """
-    return ([Rival.of_data(item) for item in planning['rivals']], float(planning['inflation']),
-            dict(planning.get('noise', {})))
+
+    rivals: Sequence[Rival] = ()
+    inflated: float = 1.0
+    noise: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    shown: Mapping[str, float] = field(default_factory=dict)
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the findings as plain data: the entry `planning` of a verdict."""
+        return {'inflation': self.inflated, 'noise': dict(self.noise), 'shown': dict(self.shown),
+                'rivals': [rival.as_data() for rival in self.rivals]}
+
+    @classmethod
+    def of_data(cls, planning: Mapping[str, Any]) -> Findings:
+        """
+        Take the findings from the entry `planning` of a verdict.
+
+        A verdict of an earlier version lacks noise, doubts or what has shown, which is no error.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError, AttributeError : it holds none
+
+        """
+        return cls([Rival.of_data(item) for item in planning['rivals']],
+                   float(planning['inflation']), dict(planning.get('noise', {})),
+                   {effect: float(size) for effect, size in planning.get('shown', {}).items()})
 
 
 def rivals_of(problem: LeastSquares, answers: Sequence[Answer], inflated: float,

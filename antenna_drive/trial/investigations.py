@@ -140,10 +140,22 @@ def _standard(case: Path, truth: Truth, limit: float, options: Sequence[str]) ->
     return {'answers': answers}
 
 
-def until_sure(answers: Sequence[Mapping[str, Any]]) -> tuple[float, bool]:
-    """Return how many tests there were until an answer was sure, inf for never, and if right."""
+def until_sure(answers: Sequence[Mapping[str, Any]], alike: int = 1) -> tuple[float, bool]:
+    """
+    Return how many tests there were until an answer was sure, inf for never, and if it was right.
+
+    Parameters
+    ----------
+    answers
+        first ones, after each test
+    alike
+        how many of them in a row must be the same, the sure one included
+
+    """
     for number, answer in enumerate(answers, 1):
-        if answer['probability'] >= UNTIL:
+        last = answers[max(number - alike, 0):number]
+        if answer['probability'] >= UNTIL and len(last) == alike and all(
+                other['first'] == answer['first'] for other in last):
             return float(number), bool(answer['right'])
     return math.inf, False
 
@@ -152,10 +164,9 @@ def summary(results: TrialResults) -> dict[str, Any]:
     """
     Return what the investigations of a trial took, as far as it has got.
 
-    For each way: `cases`, the share that was `sure_and_right` with `ci95`, how many were
-    `sure_and_wrong`, the `median_tests` and `median_seconds` until sure and right (None if most
-    cases never were), and `after_all`, the share whose last answer is right.
-    Antennas with an effect from outside the catalogue count apart: 'unknown' is never sure.
+    For each way: `cases`, `after_all`, the share whose last answer is right, and as `until_sure`
+    and as `until_confirmed` by the next test, see `_until`. Antennas with an effect from outside
+    the catalogue count apart: 'unknown' is never sure.
     """
     found: dict[str, Any] = {}
     for way in WAYS:
@@ -163,17 +174,26 @@ def summary(results: TrialResults) -> dict[str, Any]:
                  for name in results if way in results[name]]
         inside = [answers for kind, answers in cases if kind != 'outside' and answers]
         outside = [answers for kind, answers in cases if kind == 'outside' and answers]
-        until = [until_sure(answers) for answers in inside]
-        share = rate(right for _, right in until)
-        middle = median(tests if right else math.inf for tests, right in until) if until else (
-            math.inf)
         found[way] = {
-            'cases': share.cases, 'failures': sum(not answers for _, answers in cases),
-            'sure_and_right': share.value, 'ci95': [share.low, share.high],
-            'sure_and_wrong': sum(math.isfinite(tests) and not right for tests, right in until),
-            'median_tests': middle if math.isfinite(middle) else None,
-            'median_seconds': DURATION_S * middle if math.isfinite(middle) else None,
+            'cases': len(inside), 'failures': sum(not answers for _, answers in cases),
+            'until_sure': _until(inside, 1), 'until_confirmed': _until(inside, 2),
             'after_all': rate(answers[-1]['right'] for answers in inside).value,
             'outside': len(outside),
             'outside_right': sum(answers[-1]['right'] for answers in outside)}
     return found
+
+
+def _until(cases: Sequence[Sequence[Mapping[str, Any]]], alike: int) -> dict[str, Any]:
+    """
+    Return what it took until answers were sure.
+
+    The share of cases whose answer was then `right` with `ci95`, how many were `wrong`, and
+    `median_tests` and `median_seconds` until sure and right (None if most cases never were).
+    """
+    until = [until_sure(answers, alike) for answers in cases]
+    share = rate(right for _, right in until)
+    middle = median(tests if right else math.inf for tests, right in until) if until else math.inf
+    return {'right': share.value, 'ci95': [share.low, share.high],
+            'wrong': sum(math.isfinite(tests) and not right for tests, right in until),
+            'median_tests': middle if math.isfinite(middle) else None,
+            'median_seconds': DURATION_S * middle if math.isfinite(middle) else None}

@@ -54,16 +54,15 @@ def designed(planning: Mapping[str, Any], drive: Drive) -> dict[str, Any]:
     UserError : the verdict is of another configuration
 
     """
-    from antenna_drive.diagnosis import as_data, objective_for, planned_rivals, TestDesign
+    from antenna_drive.diagnosis import as_data, Findings, objective_for, TestDesign
     from antenna_drive.diagnosis.proposal import lines
     from antenna_drive.machines.antenna.allowed_tests import AntennaTests
     from antenna_drive.machines.antenna.drive_limits import DriveLimits
-    rivals, inflation, noise = planned_rivals(planning)
+    findings = Findings.of_data(planning)
     space = AntennaTests(parse_sheet(planning['sheet']), drive, DriveLimits.of_drive(drive),
                          DURATION_S)
     try:
-        found = TestDesign(space, rivals, inflation, objective_for(rivals), threads=1,
-                           noise=noise).run()
+        found = TestDesign(space, findings, objective_for(findings.rivals), threads=1).run()
     except KeyError as error:
         raise UserError(f'{error.args[0]}: this configuration knows no such effect') from error
     data = as_data(found, space)

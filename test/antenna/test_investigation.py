@@ -22,7 +22,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from antenna_drive.cli import main
-from antenna_drive.diagnosis import Judged, Proposal, Rival, TestSpace
+from antenna_drive.diagnosis import Findings, Judged, Proposal, Rival, TestSpace
 from antenna_drive.errors import UserError
 from antenna_drive.machines.antenna import investigation
 from antenna_drive.machines.antenna.drive_limits import DriveLimits
@@ -50,9 +50,10 @@ ANSWERS = ({'motor_1.torque_constant': 0.5, 'motors.torque_constant': 0.4, 'unkn
 class Laboratory:
     """Stands for the drive, the diagnosis and the design, and counts what they are asked for."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, helps: bool = True) -> None:
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, helps: bool = True,
+                 answers: Sequence[Mapping[str, float]] = ANSWERS) -> None:
         self.done: list[str] = []
-        self.helps = helps
+        self.helps, self.answers = helps, answers
         monkeypatch.setattr(investigation, 'diagnose_recordings', self.diagnose)
         monkeypatch.setattr(investigation, 'TestDesign', self.design)
 
@@ -67,7 +68,7 @@ class Laboratory:
         self.note(f'diagnosis of {len(recordings)}')
         # each recording comes with the sheet that was played
         assert all(item.sheet.waveform is not None for item in recordings.values())
-        answers = ANSWERS[len(recordings) - 1]
+        answers = self.answers[len(recordings) - 1]
         rivals = [Rival((name,), (name,), ('',), p, (), np.zeros(0), np.zeros((0, 0))).as_data()
                   for name, p in answers.items() if name != 'unknown']
         return SimpleNamespace(result={
@@ -75,10 +76,9 @@ class Laboratory:
             'which': [{'effects': [name], 'probability': p} for name, p in answers.items()],
             'planning': {'inflation': 1.5, 'rivals': rivals}})
 
-    def design(self, space: TestSpace, rivals: Sequence[Rival], inflated: float, objective: str,
-               **rest: Any) -> Any:
+    def design(self, space: TestSpace, findings: Findings, objective: str, **rest: Any) -> Any:
         def search(progress: Any) -> Proposal:
-            self.note(f'{objective} {len(rivals)} at {inflated:g}')
+            self.note(f'{objective} {len(findings.rivals)} at {findings.inflated:g}')
             tests = [Judged('triangle', BUILT_IN['triangle'], {'rate_deg_s': 0.5})]
             return Proposal(objective, 'by hand', (), tests if self.helps else [], {})
         return SimpleNamespace(run=search)
@@ -103,6 +103,21 @@ def test_it_tests_until_an_answer_is_sure(
     assert [item['obtained'] for item in story['tests']] == [0.5, 0.7, 0.94]
     assert load_sheet(tmp_path / 'found/test_2.yaml').waveform == BUILT_IN['triangle'].waveform
     assert lines(story)[-1] == 'decided after 3 tests, 60 s of testing'
+
+
+@pytest.mark.parametrize('named, tests', [
+    # sure at once: a second test has to leave it so
+    (['a', 'a'], 2),
+    # the second test contradicts the first, and is confirmed by a third
+    (['a', 'b', 'b'], 3),
+    # each test contradicts the one before
+    (['a', 'b', 'a', 'b'], 4)])
+def test_an_answer_that_a_single_test_made_sure_is_not_decided(
+        named: list[str], tests: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = [{name: 0.95, 'unknown': 0.05} for name in named]
+    story = investigate(tmp_path, Laboratory(monkeypatch, answers=answers))
+    assert len(story['tests']) == tests
+    assert story['ended'] == ('decided' if named[-1] == named[-2] else 'no more tests')
 
 
 @pytest.mark.parametrize('step', range(len(WHOLE)))

@@ -84,6 +84,13 @@ def test_nuisances_imitate_an_effect_as_far_as_their_bounds_allow(bound: float, 
         [(room + np.sqrt(room ** 2 - sure * rest)) / sure], rel=0.01)
 
 
+def test_where_evidence_counts_less_more_can_hide() -> None:
+    problem = LeastSquares(Line())
+    state = problem.start(problem.machine.nuisances, {})
+    plain, inflated = (visibility(problem, state, inflated=by).detectable for by in (1.0, 9.0))
+    assert inflated == pytest.approx(3.0 * plain, rel=0.01)
+
+
 def test_an_effect_that_no_size_shows_could_always_hide() -> None:
     problem = LeastSquares(Shifted(2.0 * SHIFT.high))
     found = visibility(problem, problem.start(problem.machine.nuisances, {}))

@@ -16,11 +16,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+import json
 from typing import Any
 
 from antenna_drive.diagnosis import (
-    DesignEffort, Effect, Experiment, FloatArray, Form, Judged, Machine, Parameter, Point, Rival,
-    TestDesign, TestSpace,
+    DesignEffort, Effect, Experiment, Findings, FloatArray, Form, Judged, Machine, Parameter,
+    Point, Rival, TestDesign, TestSpace,
 )
 from antenna_drive.diagnosis.design import CRITERIA
 from antenna_drive.diagnosis.proposal import as_data, contents, lines
@@ -92,7 +93,7 @@ HARD = [rival('compliance', 0.2, 0.6), rival('hardening', 0.3, 0.4)]
 
 @pytest.mark.parametrize('objective', sorted(CRITERIA))
 def test_a_strong_load_within_the_limit_is_proposed(objective: str) -> None:
-    found = TestDesign(Loads(1.6), HARD, 1.0, objective, effort=SMALL).run()
+    found = TestDesign(Loads(1.6), Findings(HARD), objective, effort=SMALL).run()
     assert found.criterion == CRITERIA[objective]
     assert all(test.use['load_N'] <= SMALL.margin for test in found.tests)
     assert found.refused['load_N'] > 0
@@ -102,7 +103,7 @@ def test_a_strong_load_within_the_limit_is_proposed(objective: str) -> None:
 
 
 def test_the_promise_for_the_best_test_is_confirmed_by_fits() -> None:
-    found = TestDesign(Loads(1.6), HARD, 1.0, effort=SMALL).run()
+    found = TestDesign(Loads(1.6), Findings(HARD), effort=SMALL).run()
     best = found.tests[0]
     assert best.confirmed is not None and best.told is not None
     data = as_data(found, Loads(1.6))
@@ -113,7 +114,7 @@ def test_the_promise_for_the_best_test_is_confirmed_by_fits() -> None:
 
 
 def test_where_no_load_within_the_limit_helps_the_limit_is_named() -> None:
-    found = TestDesign(Loads(0.2), HARD, 1.0, effort=SMALL).run()
+    found = TestDesign(Loads(0.2), Findings(HARD), effort=SMALL).run()
     assert not found.tests
     data = as_data(found, Loads(0.2))
     said = lines(data)
@@ -124,7 +125,7 @@ def test_where_no_load_within_the_limit_helps_the_limit_is_named() -> None:
 
 def test_what_no_test_tells_apart_is_said_with_the_sensor_that_would() -> None:
     alike = [rival('compliance', 0.2, 0.5), rival('copy', 0.2, 0.3), rival('hardening', 0.3, 0.2)]
-    found = TestDesign(Loads(1.6), alike, 1.0, effort=SMALL).run()
+    found = TestDesign(Loads(1.6), Findings(alike), effort=SMALL).run()
     data = as_data(found, Loads(1.6))
     [pair] = data['not_told_apart']
     assert pair['rivals'] == ['lever.compliance', 'lever.copy']
@@ -137,13 +138,13 @@ def test_what_no_test_tells_apart_is_said_with_the_sensor_that_would() -> None:
 
 
 def test_with_a_single_answer_there_is_nothing_to_tell_apart() -> None:
-    found = TestDesign(Loads(1.6), [rival('compliance', 0.2, 0.95)], 1.0, effort=SMALL).run()
+    found = TestDesign(Loads(1.6), Findings([rival('compliance', 0.2, 0.95)]), effort=SMALL).run()
     assert not found.tests
     assert 'nothing to tell apart' in lines(as_data(found, Loads(1.6)))[1]
 
 
 def test_a_sharpening_test_has_the_deviation_of_the_closed_form() -> None:
-    found = TestDesign(Loads(1.6), [rival('compliance', 0.2, 0.95)], 1.0, 'sharpen',
+    found = TestDesign(Loads(1.6), Findings([rival('compliance', 0.2, 0.95)]), 'sharpen',
                        effort=SMALL).run()
     best = found.tests[0]
     # y = (1 + c) load sin: the information is load^2 n / 2 / sigma^2, and the prior's; the zero is
@@ -210,7 +211,7 @@ class HotLever(Lever):
 
 @pytest.mark.parametrize('seed', range(5))
 def test_of_tests_that_tell_the_rivals_apart_one_that_shows_more_is_proposed(seed: int) -> None:
-    found = TestDesign(Heated(1.6), HARD, 1.0, effort=SMALL, seed=seed).run()
+    found = TestDesign(Heated(1.6), Findings(HARD), effort=SMALL, seed=seed).run()
     best, cold = found.tests[0], next(t for t in found.tests if not t.test[1])
     for test in (best, cold):
         assert test.told is not None and test.told.expected(8.0) > 0.95
@@ -222,9 +223,40 @@ def test_of_tests_that_tell_the_rivals_apart_one_that_shows_more_is_proposed(see
     assert any(f'{best.coarseness:.1f} times the least size' in line for line in lines(data))
 
 
+def test_what_the_tests_so_far_have_shown_counts_for_no_further_test() -> None:
+    class Softened(Heated):
+        """An oven holds half the load: a hot test shows the expansion, and all else worse."""
+
+        def machine(self, test: Any) -> Lever:
+            load, hot = test
+            return super().machine((load / 2.0 if hot else load, hot))
+
+    def found(shown: Mapping[str, float]) -> Judged:
+        return TestDesign(Softened(1.6), Findings(shown=shown), 'detect',
+                          effort=SMALL).run().tests[0]
+
+    _, hot = found({}).test
+    assert hot
+    best = found({'lever.expansion': 1e-6})
+    assert not best.test[1]
+    assert best.sizes['lever.expansion'] == (1e-6, '1')
+    # shown at a great size only, it is left to the next test
+    assert found({'lever.expansion': 9.0}).test[1]
+
+
+def test_findings_come_back_from_the_file_of_a_verdict() -> None:
+    findings = Findings(HARD, 2.5, {'y': {'white': 0.1}}, {'lever.copy': 0.3})
+    again = Findings.of_data(json.loads(json.dumps(findings.as_data())))
+    assert again.as_data() == findings.as_data()
+    assert again.shown == {'lever.copy': 0.3} and again.inflated == 2.5
+    # an earlier version wrote neither noise nor what has shown
+    assert Findings.of_data({'rivals': [], 'inflation': 1.0}) == Findings([])
+
+
 def test_the_same_seed_proposes_the_same_test() -> None:
-    one, other, third = (TestDesign(Loads(1.6), HARD, 1.0, effort=SMALL, seed=seed).run().tests[0]
-                         for seed in (3, 3, 4))
+    one, other, third = (
+        TestDesign(Loads(1.6), Findings(HARD), effort=SMALL, seed=seed).run().tests[0]
+        for seed in (3, 3, 4))
     assert isinstance(one, Judged) and one.test == other.test != third.test
 
 
@@ -238,4 +270,5 @@ def test_linear_algebra_has_one_thread_because_tests_are_judged_side_by_side() -
             self.look()
             return super().machine(test)
 
-    assert during(lambda look: TestDesign(Watched(look), HARD, effort=SMALL).run()) == {1}
+    assert during(lambda look: TestDesign(
+        Watched(look), Findings(HARD), effort=SMALL).run()) == {1}

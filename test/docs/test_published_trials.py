@@ -98,10 +98,9 @@ def test_figures_of_investigations_are_those_of_their_cases(tmp_path: Path) -> N
     rows = [[cell.strip() for cell in line.strip('|').split('|')] for line in table]
     assert {row[0] for row in rows} == set(found)
     for way, sure, _, wrong, tests, seconds in rows:
-        item = found[way]
-        right = round(item['sure_and_right'] * item['cases'])
-        assert sure == f'{right} of {item["cases"]}', way
-        assert int(wrong) == item['sure_and_wrong'], way
+        item, cases = found[way]['until_sure'], found[way]['cases']
+        assert sure == f'{round(item["right"] * cases)} of {cases}', way
+        assert int(wrong) == item['wrong'], way
         assert float(tests) == item['median_tests'], way
         assert float(seconds) == item['median_seconds'], way
 

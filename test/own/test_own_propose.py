@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from antenna_drive.cli import main
-from antenna_drive.diagnosis import DesignEffort, Rival, TestDesign
+from antenna_drive.diagnosis import DesignEffort, Findings, Rival, TestDesign
 from antenna_drive.machines.own import effect, Log, Model, ModelError, own_tests, read_log, size
 import numpy as np
 from own.swing import swing
@@ -59,7 +59,7 @@ def rivals() -> list[Rival]:
 
 
 def test_the_limit_of_a_reading_is_kept() -> None:
-    found = TestDesign(own_tests(model(), 10.0), rivals(), 1.0, effort=SMALL).run()
+    found = TestDesign(own_tests(model(), 10.0), Findings(rivals()), effort=SMALL).run()
     best = found.tests[0]
     assert best.test.constants['height'] <= SMALL.margin * 1.5
     assert found.refused == {'angle': sum(found.refused.values())}

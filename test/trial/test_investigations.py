@@ -58,6 +58,15 @@ def test_tests_are_counted_until_the_answer_is_sure() -> None:
     assert until_sure(answers(0.5, 0.89)) == (math.inf, False)
 
 
+def test_an_answer_is_confirmed_by_the_next_test() -> None:
+    assert until_sure(answers(0.95), 2) == (math.inf, False)
+    assert until_sure(answers(0.5, 0.95), 2) == (2.0, True)
+    changed = answers(0.95, right=False) + answers(0.95, 0.92)
+    changed[0]['first'] = ['motors.torque_constant']
+    assert until_sure(changed) == (1.0, False)
+    assert until_sure(changed, 2) == (3.0, True)
+
+
 def test_the_summary_counts_what_was_never_sure_and_outsiders_apart(tmp_path: Path) -> None:
     manifest = batch.prepare(tmp_path, 5, 5, 0.02, 200.0, 30.0, wild=True)
     results = TrialResults(tmp_path, manifest)
@@ -67,13 +76,15 @@ def test_the_summary_counts_what_was_never_sure_and_outsiders_apart(tmp_path: Pa
             ('outside', answers(0.8, 0.85))], 1):
         results.put(f'case_000{k}', kind=kind, designed={'answers': found})
     found = summary(results)['designed']
-    assert (found['cases'], found['sure_and_right'], found['sure_and_wrong']) == (4, 0.5, 1)
+    until = found['until_sure']
+    assert (found['cases'], until['right'], until['wrong']) == (4, 0.5, 1)
     # of 1, 3, never and never, the middle is never
-    assert found['median_tests'] is None
+    assert until['median_tests'] is None
+    assert (found['until_confirmed']['right'], found['until_confirmed']['wrong']) == (0.25, 0)
     assert (found['outside'], found['outside_right']) == (1, 1)
     assert summary(results)['standard']['cases'] == 0
     results.put('case_0003', kind='none', designed={'answers': answers(0.5, 0.91)})
-    found = summary(results)['designed']
+    found = summary(results)['designed']['until_sure']
     assert found['median_tests'] == 2.5 and found['median_seconds'] == 75.0
 
 
@@ -120,7 +131,7 @@ def test_each_case_is_taken_both_ways_and_a_trial_goes_on(
              for name in manifest['seals']]
     inside = [kind for kind in kinds if kind != 'outside']
     assert found['designed']['cases'] == found['standard']['cases'] == len(inside)
-    assert found['designed']['sure_and_right'] == pytest.approx(
+    assert found['designed']['until_sure']['right'] == pytest.approx(
         inside.count('none') / len(inside))
     designed = TrialResults(tmp_path / 'one', manifest)['case_0001']['designed']
     assert [answer['probability'] for answer in designed['answers']] == [0.55, 0.9]

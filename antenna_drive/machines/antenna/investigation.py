@@ -14,6 +14,9 @@
 """
 The whole loop: a test, its verdict, the next test, until the answer is sure.
 
+An answer that a single test has made sure may be wrong: nothing has contradicted it yet. So one
+test more must leave it sure.
+
 Everything lies in one folder, a file for each step. A step whose file is there is not done again,
 so an investigation that was interrupted goes on where it was.
 """
@@ -29,8 +32,7 @@ import shutil
 from typing import Any
 
 from antenna_drive.diagnosis import (
-    as_data, DEFAULT, DesignEffort, Diagnosis, objective_for, planned_rivals, Rival, Settings,
-    TestDesign,
+    as_data, DEFAULT, DesignEffort, Diagnosis, Findings, objective_for, Settings, TestDesign,
 )
 from antenna_drive.drafts import drafted
 from antenna_drive.errors import UserError
@@ -64,7 +66,7 @@ class InvestigationPlan:
     Attributes
     ----------
     most : greatest number of tests
-    until : probability of an answer from which it is decided
+    until : probability from which an answer is decided that one test less had named, too
     duration : of each test [s]
     seed : of the tests that are drawn
 
@@ -151,13 +153,19 @@ class Investigation:
             verdict = self._verdict(number, progress)
             tests.append(_chapter(number, proposal, verdict))
             _write(self._folder / STORY, {'tests': tests, 'ended': None})
-            if verdict['which'][0]['probability'] >= self._plan.until:
+            if self._is_decided(tests):
                 ended = DECIDED
                 break
         story = {'tests': tests, 'ended': ended,
                  'seconds_of_testing': self._plan.duration * len(tests)}
         _write(self._folder / STORY, story)
         return story
+
+    def _is_decided(self, tests: Sequence[Mapping[str, Any]]) -> bool:
+        """Return whether an answer is sure that the tests before the last one had named, too."""
+        first, *before = [test['answers'][0] for test in tests[:-3:-1]]
+        return first['probability'] >= self._plan.until and any(
+            answer['effects'] == first['effects'] for answer in before)
 
     def _path(self, stem: str, number: int, suffix: str = '') -> Path:
         return self._folder / f'{stem}_{number}{suffix}'
@@ -175,15 +183,11 @@ class Investigation:
         if number == 1 and self._first is not None:
             return {'objective': 'given', 'family': 'given',
                     'test': self._space.as_data(self._first)}
-        rivals: list[Rival] = []
-        inflated, noise = 1.0, dict[str, Mapping[str, float]]()
-        if number > 1:
-            verdict = _read(self._path('verdict', number - 1, '.json')) or {}
-            rivals, inflated, noise = planned_rivals(verdict['planning'])
+        verdict = _read(self._path('verdict', number - 1, '.json'))
+        findings = Findings.of_data(verdict['planning']) if verdict else Findings()
         found = TestDesign(
-            self._space, rivals, inflated, objective_for(rivals),
-            threads=self._threads, settings=self._settings, effort=self._effort,
-            seed=self._plan.seed + number, noise=noise).run(
+            self._space, findings, objective_for(findings.rivals), threads=self._threads,
+            settings=self._settings, effort=self._effort, seed=self._plan.seed + number).run(
                 lambda share, doing: progress(f'design of test {number}', share))
         return as_data(found, self._space, self._settings)
 
