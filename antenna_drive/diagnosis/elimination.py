@@ -124,8 +124,9 @@ def settled_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesi
     Take fits close behind the best to their ends, too: only there can they be told apart.
 
     A rival may be close only together with a partner that is no larger than its tolerance. It is
-    then fitted without the partner, and so is the best itself. An effect in another place that the
-    search has given up is a rival, too: of two motors, far from its end, the wrong one may win.
+    then fitted without the partner, and so is the best itself. An effect in another place is a
+    rival, too, also where the search has given it up: of two motors, far from its end, the wrong
+    one may win. It begins where the best has ended, because its own fit may have got stuck.
 
     Parameters and what is returned are those of `forward_selection`.
     """
@@ -140,13 +141,19 @@ def settled_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesi
     # a member that is no larger than its tolerance only helped the fit of the others along
     helped = [(h, effect) for h in hypotheses for effect in sorted(set(h.effects) - set(h.named))
               if len(h.effects) == size + 1 > 1 and h.cost < first.cost + close]
-    nearest: list[tuple[float, Callable[[], Hypothesis]]] = [
-        *((h.cost, partial(fits.converged, h)) for h in rivals),
-        *((h.cost, partial(fits.without, h, effect)) for h, effect in helped)]
-    ends = [taken for _, taken in sorted(nearest, key=lambda item: item[0])[:options.rivals]]
+    ways: list[tuple[float, frozenset[str], Callable[[], Hypothesis]]] = [
+        *((h.cost, frozenset(h.effects), partial(fits.converged, h)) for h in rivals),
+        *((h.cost, frozenset(h.effects) - {effect}, partial(fits.without, h, effect))
+          for h, effect in helped)]
+    # of several ways to the same effects the nearest one is gone
+    nearest = {effects: taken for _, effects, taken in sorted(
+        ways, key=lambda way: way[0], reverse=True)}
+    ends = [nearest.pop(own)] if (own := frozenset(best.effects)) in nearest else []
+    ends += list(nearest.values())[:-1 - options.rivals:-1]
     ends += [partial(fits.exchanged, best, effect, other)
              for effect, other in fits.elsewhere(best)
-             if frozenset(best.effects) - {effect} | {other} not in found]
+             if (there := found.get(frozenset(best.effects) - {effect} | {other})) is None
+             or there.cost < first.cost + close]
     for taken in ends:
         end = taken()
         rival = found.get(frozenset(end.effects))

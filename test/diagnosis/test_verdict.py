@@ -325,6 +325,29 @@ def test_an_effect_in_another_place_that_was_given_up_is_tried_before_one_is_nam
     assert fits.asked == []
 
 
+def test_an_effect_in_another_place_whose_fit_got_stuck_begins_where_the_best_has_ended() -> None:
+    fits = Ends({('left',): 15990.0, ('right',): 15900.0})
+    stuck = fitted(('right',), 16040.0)
+    fits.converged = lambda hypothesis: hypothesis  # type: ignore[method-assign]
+    hypotheses, end = settled_rivals(
+        fits, [fitted((), 90000.0), fitted(('left',), 15990.0), stuck],
+        fitted(('left',), 15990.0), DEFAULT)
+    assert end.effects == ('right',)
+    assert {h.effects: h.cost for h in hypotheses}['right',] == 15900.0
+
+
+def test_ways_to_the_same_effects_are_not_all_gone() -> None:
+    """Partners of no size help the best along; a rival further behind is settled all the same."""
+    fits = Ends({('a',): 15995.0, ('b',): 15994.0})
+    helped = [within_tolerance(fitted((name, partner), cost), partner) for name, partner, cost in (
+        ('a', 'c', 15980.0), ('a', 'd', 15981.0), ('a', 'e', 15982.0), ('b', 'c', 16060.0))]
+    hypotheses, _ = settled_rivals(
+        fits, [fitted((), 90000.0), fitted(('a',), 15995.0), *helped],
+        fitted(('a',), 15995.0), DEFAULT)
+    assert sorted(fits.asked) == [('a',), ('b',)]
+    assert {h.effects: h.cost for h in hypotheses}['b',] == 15994.0
+
+
 def test_what_a_quadratic_fit_loses_without_an_effect() -> None:
     """Against the fit without it, whose solution is known."""
     random = np.random.default_rng(5)
