@@ -146,13 +146,15 @@ def settled_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesi
         *((h.cost, frozenset(h.effects) - {effect}, partial(fits.without, h, effect))
           for h, effect in helped)]
     # of several ways to the same effects the nearest one is gone
-    nearest = {effects: taken for _, effects, taken in sorted(
-        ways, key=lambda way: way[0], reverse=True)}
-    ends = [nearest.pop(own)] if (own := frozenset(best.effects)) in nearest else []
-    ends += list(nearest.values())[:-1 - options.rivals:-1]
+    nearest: dict[frozenset[str], Callable[[], Hypothesis]] = {}
+    for _, effects, taken in sorted(ways, key=lambda way: way[0]):
+        nearest.setdefault(effects, taken)
+    own = frozenset(best.effects)
+    others = [effects for effects in nearest if effects != own][:options.rivals]
+    ends = [nearest[effects] for effects in (own, *others) if effects in nearest]
     ends += [partial(fits.exchanged, best, effect, other)
              for effect, other in fits.elsewhere(best)
-             if (there := found.get(frozenset(best.effects) - {effect} | {other})) is None
+             if (there := found.get(own - {effect} | {other})) is None
              or there.cost < first.cost + close]
     for taken in ends:
         end = taken()

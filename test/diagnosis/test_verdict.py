@@ -338,13 +338,15 @@ def test_an_effect_in_another_place_whose_fit_got_stuck_begins_where_the_best_ha
 
 def test_ways_to_the_same_effects_are_not_all_gone() -> None:
     """Partners of no size help the best along; a rival further behind is settled all the same."""
-    fits = Ends({('a',): 15995.0, ('b',): 15994.0})
+    fits = Ends({(name,): 15994.0 for name in 'abxy'})
     helped = [within_tolerance(fitted((name, partner), cost), partner) for name, partner, cost in (
-        ('a', 'c', 15980.0), ('a', 'd', 15981.0), ('a', 'e', 15982.0), ('b', 'c', 16060.0))]
+        ('a', 'c', 15980.0), ('a', 'd', 15981.0), ('a', 'e', 15982.0), ('b', 'c', 16060.0),
+        ('x', 'c', 16050.0), ('x', 'd', 16090.0), ('y', 'c', 16070.0), ('b', 'd', 16080.0))]
     hypotheses, _ = settled_rivals(
         fits, [fitted((), 90000.0), fitted(('a',), 15995.0), *helped],
         fitted(('a',), 15995.0), DEFAULT)
-    assert sorted(fits.asked) == [('a',), ('b',)]
+    # the best, and the two rivals that are nearest in any way
+    assert fits.asked == [('a',), ('x',), ('b',)]
     assert {h.effects: h.cost for h in hypotheses}['b',] == 15994.0
 
 
