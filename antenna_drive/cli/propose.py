@@ -23,7 +23,7 @@ that test_signal plays and `diagnose` reads:
   antenna-drive propose verdict.json --out next.yaml --report next.html
   ros2 run antenna_drive test_signal --ros-args -p sheet:=next.yaml
 
-If the verdict has one answer only, the test looks for other effects, as with --objective detect.
+If one answer is left or sure, the test looks for other effects, as with --objective detect.
 --objective sharpen asks for the test that makes the numbers of the likeliest answer most certain.
 --objective detect needs no verdict: it asks for the first test, for the effects of --suspect or
 for the whole catalogue. limits.yaml may hold rate_deg_s, acceleration_deg_s2, travel_deg,
@@ -93,7 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
     from antenna_drive.diagnosis import objective_for, TestDesign
     from antenna_drive.diagnosis.proposal import as_data, contents, lines
     findings = _findings(arguments, planning)
-    objective = arguments.rule or arguments.objective or objective_for(findings.rivals)
+    objective = arguments.rule or arguments.objective or objective_for(findings)
     space = (_tests_of_own if arguments.model else _tests_of_drive)(arguments, planning)
     began = time.monotonic()
     with Progress('proposal', 1.0) as progress:
@@ -116,7 +116,7 @@ def run(arguments: argparse.Namespace) -> int:
             stream.write(render('proposal.html', **{**vars(shown), 'data': data}).encode())
     told = lines(data)
     if objective == 'detect' and not arguments.objective:
-        told.insert(0, 'one answer only, and nothing to tell apart: this test looks for others')
+        told.insert(0, 'one answer only, or a sure one: this test looks for other effects')
     give(data, arguments.json, '\n'.join(told))
     return 0 if found.tests else 1
 

@@ -23,7 +23,7 @@ the others: what derivatives promise is not always kept.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from itertools import combinations
@@ -66,9 +66,9 @@ _NOTHING = 1e-6
 Progress = Callable[[float, str], None]
 
 
-def objective_for(rivals: Collection[Rival]) -> str:
-    """Return what the next test is for: with a single answer there is nothing to tell apart."""
-    return SEPARATE if len(rivals) > 1 else DETECT
+def objective_for(findings: Findings, settings: Settings = DEFAULT) -> str:
+    """Return what the next test is for: a single answer, or a sure one, is to be contradicted."""
+    return SEPARATE if findings.are_open(settings.planning) else DETECT
 
 
 class TestSpace(ABC):

@@ -20,7 +20,7 @@ It works on any `Machine`; the antenna's is in `machines.antenna`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import time
 from typing import Any
 
@@ -195,11 +195,12 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         located, places = localisation.of_the_unknown(problem, none.state, decision.lack)
     if decision.word in ('explained', 'partly_explained'):
         located = localisation.of_effects(problem, decision.answers, none.state, best.state)
-    rivals = rivals_of(problem, decision.answers, found.evidence.inflation, settings.planning,
-                       found.doubted)
+    findings = Findings(
+        rivals_of(problem, decision.answers, found.evidence.inflation, settings.planning,
+                  found.doubted), found.evidence.inflation, found_noise(problem.experiments))
     healthy = decision.word == 'no_gap'
-    hidden = could_hide(problem, (none if healthy else best).state, found.evidence.inflation) if (
-        healthy or len(rivals) < 2) else []
+    hidden = could_hide(problem, (none if healthy else best).state, findings.inflated) if (
+        healthy or not findings.are_open(settings.planning)) else []
     result = {
         'verdict': decision.word,
         'statements': verdict.statements(decision, best),
@@ -217,9 +218,8 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         'fits': found.evidence.as_data(),
         'planning': {
             **machine.planning,
-            **Findings(rivals, found.evidence.inflation, found_noise(problem.experiments),
-                       {item['effect']: item['size'] for item in hidden
-                        if item['size'] is not None}).as_data()},
+            **replace(findings, shown={item['effect']: item['size'] for item in hidden
+                                       if item['size'] is not None}).as_data()},
         'seconds': time.monotonic() - began,
         'notes': [*machine.notes, *found.notes],
     }

@@ -145,7 +145,7 @@ class Findings:
     inflated : by what differences of the cost are divided
     noise : of each sensor, see `noise.found_noise`; by default that of its data sheet
     shown : smallest size at which an effect shows in these tests, in the unit of its first
-        parameter, by effect; where answers are to be told apart nobody asks for it
+        parameter, by effect; where answers are open nobody asks for it
 
     """
 
@@ -153,6 +153,11 @@ class Findings:
     inflated: float = 1.0
     noise: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     shown: Mapping[str, float] = field(default_factory=dict)
+
+    def are_open(self, settings: PlanningSettings) -> bool:
+        """Return whether there are answers to tell apart: several, and none of them sure."""
+        return len(self.rivals) > 1 and all(
+            rival.probability < settings.sure for rival in self.rivals)
 
     def as_data(self) -> dict[str, Any]:
         """Return the findings as plain data: the entry `planning` of a verdict."""

@@ -350,12 +350,14 @@ class Search:
             far = self._priced(base) > options.base_ratio * self._priced(best) + options.reach
             if far or (base.has_course and base is not best):
                 continue
+            # settled, an effect may pay more, and fall behind one that has not been
+            base = base.with_jacobian(self.problem)
             partners: list[tuple[Sensitivity, Point | None]] = [
                 (item, None) for gain, item in screened(
                     self.problem, base.state, self.sensitivities,
                     base.effects)[:options.partners] if gain > worth]
             pairs = self._sorted(partial(self._partnered, best, base), partners, 0)
-            if self.problem.scale > 1.0 and base is best:
+            if self.problem.scale > 1.0 and not i:
                 pairs += self._sorted(partial(self._partnered, best, base), scan(
                     self.problem, base.state, self.sensitivities, base.effects), 0)
             pairs += [pair.without_jacobian() for pair in self._split(base)]

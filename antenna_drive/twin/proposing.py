@@ -62,7 +62,7 @@ def designed(planning: Mapping[str, Any], drive: Drive) -> dict[str, Any]:
     space = AntennaTests(parse_sheet(planning['sheet']), drive, DriveLimits.of_drive(drive),
                          DURATION_S)
     try:
-        found = TestDesign(space, findings, objective_for(findings.rivals), threads=1).run()
+        found = TestDesign(space, findings, objective_for(findings), threads=1).run()
     except KeyError as error:
         raise UserError(f'{error.args[0]}: this configuration knows no such effect') from error
     data = as_data(found, space)

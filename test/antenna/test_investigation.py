@@ -120,6 +120,13 @@ def test_an_answer_that_a_single_test_made_sure_is_not_decided(
     assert story['ended'] == ('decided' if named[-1] == named[-2] else 'no more tests')
 
 
+def test_beside_a_sure_answer_the_next_test_looks_for_others(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    lab = Laboratory(monkeypatch, answers=[{'a': 0.93, 'b': 0.02, 'unknown': 0.05}] * 2)
+    assert investigate(tmp_path, lab)['ended'] == 'decided'
+    assert [what for what in lab.done if 'at' in what] == ['detect 0 at 1', 'detect 2 at 1.5']
+
+
 @pytest.mark.parametrize('step', range(len(WHOLE)))
 def test_interrupted_it_goes_on_where_it_was(
         step: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

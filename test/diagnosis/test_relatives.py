@@ -110,6 +110,19 @@ def test_no_pair_has_one_effect_twice() -> None:
         ('left.pull', 'right.pull'), ('both.pull', 'right.pull'), ('left.pull', 'both.pull')}
 
 
+def test_a_base_that_was_not_settled_is_given_partners_too() -> None:
+    """A settled effect may pay more than before, and fall behind one without derivatives."""
+    problem = LeastSquares(Springs(0.5, 0.5))
+    search = Search(problem, lambda share, doing: None)
+    none = search._nuisances_alone()
+    search._take_sensitivities(none.state)
+    form = problem.machine.effects['left.pull'].forms[0]
+    start = search.problem.start([*problem.machine.nuisances, *form.parameters], {})
+    bare = Hypothesis(('left.pull',), (form,), search.problem.fit(start, 5)).without_jacobian()
+    assert {frozenset(h.effects) for h in search._pairs([bare])} >= {
+        frozenset({'left.pull', 'drift'})}
+
+
 class Scale(Machine):
     """A scale whose zero is off by five thousand standard deviations of its noise."""
 

@@ -110,7 +110,7 @@ def test_beside_a_single_answer_something_else_is_looked_for(
     data = json.loads((tmp_path / 'next.json').read_text())
     assert data['objective'] == objective and data['test']
     assert len(data['rivals']) == 1, 'it must stay within the limits with that answer too'
-    assert ('nothing to tell apart' in capsys.readouterr().out) == (not asked)
+    assert ('this test looks for other effects' in capsys.readouterr().out) == (not asked)
 
 
 def test_the_command_writes_the_commands_of_the_test(

@@ -186,7 +186,7 @@ class Investigation:
         verdict = _read(self._path('verdict', number - 1, '.json'))
         findings = Findings.of_data(verdict['planning']) if verdict else Findings()
         found = TestDesign(
-            self._space, findings, objective_for(findings.rivals), threads=self._threads,
+            self._space, findings, objective_for(findings, self._settings), threads=self._threads,
             settings=self._settings, effort=self._effort, seed=self._plan.seed + number).run(
                 lambda share, doing: progress(f'design of test {number}', share))
         return as_data(found, self._space, self._settings)
