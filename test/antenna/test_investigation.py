@@ -120,6 +120,18 @@ def test_an_answer_that_a_single_test_made_sure_is_not_decided(
     assert story['ended'] == ('decided' if named[-1] == named[-2] else 'no more tests')
 
 
+def test_it_ends_where_nothing_known_explains_the_gap_twice(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No verdict gives 'unknown' more than 0.8."""
+    answers = [{'unknown': 0.64, 'a': 0.36}, {'unknown': 0.79, 'a': 0.21},
+               {'unknown': 0.78, 'a': 0.22}]
+    story = investigate(tmp_path, Laboratory(monkeypatch, answers=answers))
+    assert (story['ended'], len(story['tests'])) == ('nothing known explains it', 2)
+    assert 'no effect of the catalogue explains the gap' in lines(story)[-1]
+    page = render('story.html', title='a', lead='b', story=story, until=0.9)
+    assert 'No effect of the catalogue explains the gap' in page
+
+
 def test_beside_a_sure_answer_the_next_test_looks_for_others(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     lab = Laboratory(monkeypatch, answers=[{'a': 0.93, 'b': 0.02, 'unknown': 0.05}] * 2)

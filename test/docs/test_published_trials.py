@@ -91,18 +91,22 @@ def test_figures_of_third_tests_are_those_of_their_cases(trial: int, tmp_path: P
         assert float(left) == found['median_set'], name
 
 
-def test_figures_of_investigations_are_those_of_their_cases(tmp_path: Path) -> None:
-    found = investigations.summary(results_of(tmp_path, 'investigate_1'))
+@pytest.mark.parametrize('number', [1])
+def test_figures_of_investigations_are_those_of_their_cases(number: int, tmp_path: Path) -> None:
+    found = investigations.summary(results_of(tmp_path, f'investigate_{number}'))
     text = (DOCS / 'next-test.md').read_text(encoding='utf-8')
-    table = text[text.index('| tests of an investigation |'):].split('\n\n')[0].splitlines()[2:]
+    table = text.split('| tests of an investigation |')[number].split('\n\n')[0].splitlines()[2:]
     rows = [[cell.strip() for cell in line.strip('|').split('|')] for line in table]
-    assert {row[0] for row in rows} == set(found)
-    for way, sure, _, wrong, tests, seconds in rows:
-        item, cases = found[way]['until_sure'], found[way]['cases']
-        assert sure == f'{round(item["right"] * cases)} of {cases}', way
-        assert int(wrong) == item['wrong'], way
-        assert float(tests) == item['median_tests'], way
-        assert float(seconds) == item['median_seconds'], way
+    assert {row[0].removesuffix(', confirmed') for row in rows} == set(found)
+    for name, right, interval, wrong, tests, seconds in rows:
+        way = name.removesuffix(', confirmed')
+        cases = found[way]['cases']
+        item = found[way]['until_sure' if way == name else 'until_confirmed']
+        assert right == f'{round(item["right"] * cases)} of {cases}', name
+        assert interval == '{:.2f} to {:.2f}'.format(*item['ci95']), name
+        assert int(wrong) == item['wrong'], name
+        assert float(tests) == item['median_tests'], name
+        assert float(seconds) == item['median_seconds'], name
 
 
 @pytest.mark.parametrize('trial', ['5', '6'])

@@ -50,6 +50,9 @@ import numpy as np
 SETTINGS, STORY = 'investigation.json', 'story.json'
 # Why an investigation ends.
 DECIDED, NO_MORE, NOTHING_HELPS = 'decided', 'no more tests', 'nothing helps'
+NOTHING_KNOWN = 'nothing known explains it'
+
+_UNKNOWN = ['unknown']
 
 # Of a recording with added errors of sensors [Hz].
 _RATE_HZ = 200.0
@@ -153,18 +156,23 @@ class Investigation:
             verdict = self._verdict(number, progress)
             tests.append(_chapter(number, proposal, verdict))
             _write(self._folder / STORY, {'tests': tests, 'ended': None})
-            if self._is_decided(tests):
-                ended = DECIDED
+            if self._is_sure(tests):
+                named = tests[-1]['answers'][0]['effects']
+                ended = NOTHING_KNOWN if named == _UNKNOWN else DECIDED
                 break
         story = {'tests': tests, 'ended': ended,
                  'seconds_of_testing': self._plan.duration * len(tests)}
         _write(self._folder / STORY, story)
         return story
 
-    def _is_decided(self, tests: Sequence[Mapping[str, Any]]) -> bool:
+    def _is_sure(self, tests: Sequence[Mapping[str, Any]]) -> bool:
         """Return whether an answer is sure that the tests before the last one had named, too."""
         first, *before = [test['answers'][0] for test in tests[:-3:-1]]
-        return first['probability'] >= self._plan.until and any(
+        until = self._plan.until
+        if first['effects'] == _UNKNOWN:
+            # of what a verdict gives it at most
+            until *= self._settings.verdict.most_unknown
+        return first['probability'] >= until and any(
             answer['effects'] == first['effects'] for answer in before)
 
     def _path(self, stem: str, number: int, suffix: str = '') -> Path:
@@ -291,6 +299,8 @@ def lines(story: Mapping[str, Any]) -> list[str]:
     found.append({
         DECIDED: f'decided after {tests} tests, {story["seconds_of_testing"]:g} s of testing',
         NO_MORE: f'not decided after {tests} tests; --max-tests allows more',
+        NOTHING_KNOWN: f'no effect of the catalogue explains the gap, after {tests} tests; the '
+                       'last verdict says where it may enter',
         NOTHING_HELPS: f'not decided after {tests} tests, and no test within the limits helps',
     }[story['ended']])
     return found
