@@ -91,7 +91,7 @@ def test_figures_of_third_tests_are_those_of_their_cases(trial: int, tmp_path: P
         assert float(left) == found['median_set'], name
 
 
-@pytest.mark.parametrize('number', [1])
+@pytest.mark.parametrize('number', [1, 2])
 def test_figures_of_investigations_are_those_of_their_cases(number: int, tmp_path: Path) -> None:
     found = investigations.summary(results_of(tmp_path, f'investigate_{number}'))
     text = (DOCS / 'next-test.md').read_text(encoding='utf-8')
