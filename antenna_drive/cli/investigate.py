@@ -15,9 +15,9 @@
 Test a drive until it is clear what is wrong with it: test, verdict, better test.
 
 The first test is the one that detects most of the catalogue, or --first. After each test all
-recordings are diagnosed. The next test, the one that tells the answers apart, is designed, run and
-recorded until an answer is --until sure that the verdict before had named, too: one test alone
-decides nothing. One page tells the story.
+recordings are diagnosed, and the test that tells the answers apart is designed, run and recorded.
+This ends when the verdict is --until sure of an answer that the verdict before also named: one
+test alone decides nothing. One page tells the story.
 
   antenna-drive investigate --out found --real my_drive.yaml
   antenna-drive investigate --out found --set motor_1.motor.coulomb_torque=0.095 --until 0.9

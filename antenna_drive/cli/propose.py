@@ -36,7 +36,6 @@ The exit code is 1 if no test within the limits helps. docs/next-test.md has mor
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 import json
 from pathlib import Path
 import time
@@ -140,16 +139,15 @@ def _planning(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def _findings(arguments: argparse.Namespace, planning: dict[str, Any]) -> Findings:
-    """Return what the tests so far have told; of the rivals none where others are looked for."""
+    """Return what the tests so far have told."""
     from antenna_drive.diagnosis import Findings
     if not planning:
         return Findings()
     try:
-        found = Findings.of_data(planning)
+        return Findings.of_data(planning)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise UserError(f'{arguments.verdict}: planning: {error!r}: damaged; diagnose the '
                         'recordings again') from error
-    return replace(found, rivals=(), inflated=1.0) if arguments.objective == 'detect' else found
 
 
 def _tests_of_drive(arguments: argparse.Namespace, planning: dict[str, Any]) -> TestSpace:

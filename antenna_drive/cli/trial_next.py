@@ -139,14 +139,14 @@ def _of_ways(found: Mapping[str, Any]) -> list[str]:
     lines = ['until an answer is 0.9 sure',
              'tests                cases  right                wrong  median until right']
     for way, item in found.items():
+        if not item['cases']:
+            continue
         for rule, name in (('until_sure', way), ('until_confirmed', f'{way}, confirmed')):
-            if item['cases']:
-                until = item[rule]
-                share = _share(until['right'], until['ci95'])
-                middle = ('most never' if until['median_tests'] is None else
-                          f'{until["median_tests"]:g} tests, {until["median_seconds"]:g} s')
-                lines.append(f'{name:20s} {item["cases"]:5d}  {share}  {until["wrong"]:5d}  '
-                             f'{middle}')
+            until = item[rule]
+            share = _share(until['right'], until['ci95'])
+            middle = ('most never' if until['median_tests'] is None else
+                      f'{until["median_tests"]:g} tests, {until["median_seconds"]:g} s')
+            lines.append(f'{name:20s} {item["cases"]:5d}  {share}  {until["wrong"]:5d}  {middle}')
     return lines
 
 

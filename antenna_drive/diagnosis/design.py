@@ -238,7 +238,7 @@ class TestDesign:
     space
         the tests that the machine may run
     findings
-        of the tests so far; without rivals for `detect`
+        of the tests so far
     objective
         one of `OBJECTIVES`, or `D_OPTIMAL` or `RANDOM` to compare with
     suspected

@@ -145,7 +145,7 @@ def settled_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesi
         *((h.cost, frozenset(h.effects), partial(fits.converged, h)) for h in rivals),
         *((h.cost, frozenset(h.effects) - {effect}, partial(fits.without, h, effect))
           for h, effect in helped)]
-    # of several ways to the same effects the nearest one is gone
+    # several ways may lead to the same effects: only the nearest one is taken
     nearest: dict[frozenset[str], Callable[[], Hypothesis]] = {}
     for _, effects, taken in sorted(ways, key=lambda way: way[0]):
         nearest.setdefault(effects, taken)

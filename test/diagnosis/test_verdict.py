@@ -336,7 +336,7 @@ def test_an_effect_in_another_place_whose_fit_got_stuck_begins_where_the_best_ha
     assert {h.effects: h.cost for h in hypotheses}['right',] == 15900.0
 
 
-def test_ways_to_the_same_effects_are_not_all_gone() -> None:
+def test_only_the_nearest_of_several_ways_to_the_same_effects_is_taken() -> None:
     """Partners of no size help the best along; a rival further behind is settled all the same."""
     fits = Ends({(name,): 15994.0 for name in 'abxy'})
     helped = [within_tolerance(fitted((name, partner), cost), partner) for name, partner, cost in (

@@ -69,7 +69,7 @@ class InvestigationPlan:
     Attributes
     ----------
     most : greatest number of tests
-    until : probability from which an answer is decided that one test less had named, too
+    until : probability from which an answer that the verdict before also named is decided
     duration : of each test [s]
     seed : of the tests that are drawn
 
@@ -166,14 +166,15 @@ class Investigation:
         return story
 
     def _is_sure(self, tests: Sequence[Mapping[str, Any]]) -> bool:
-        """Return whether an answer is sure that the tests before the last one had named, too."""
-        first, *before = [test['answers'][0] for test in tests[:-3:-1]]
+        """Return whether the last verdict is sure of what the verdict before also named."""
+        if len(tests) < 2:
+            return False
+        before, last = (test['answers'][0] for test in tests[-2:])
         until = self._plan.until
-        if first['effects'] == _UNKNOWN:
-            # of what a verdict gives it at most
+        if last['effects'] == _UNKNOWN:
+            # no verdict gives it more
             until *= self._settings.verdict.most_unknown
-        return first['probability'] >= until and any(
-            answer['effects'] == first['effects'] for answer in before)
+        return last['probability'] >= until and last['effects'] == before['effects']
 
     def _path(self, stem: str, number: int, suffix: str = '') -> Path:
         return self._folder / f'{stem}_{number}{suffix}'
