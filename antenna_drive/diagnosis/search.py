@@ -17,8 +17,9 @@ The search for effects: from the nuisances alone over single effects to pairs.
 1. The nuisances are fitted without any effect: the hypothesis 'none'. While something strong is
    missing, the misfit counts as noise, and the nuisances stay close to their priors.
 2. A screening by derivatives says how much of the residual each effect could explain.
-3. The best dozen are fitted, each together with all nuisances. If the best explains much, the
-   noise is lowered to what it leaves, and the best are fitted again.
+3. The best dozen are fitted, each together with all nuisances. While they leave much, so is what
+   each test alone promises most of. If the best explains much, the noise is lowered to what it
+   leaves, and the best are fitted again.
 4. Several of the best are given partners, and the pairs are fitted.
 
 All this is done with coarser steps of the simulation. The best are then fitted to the whole tests
@@ -28,7 +29,7 @@ and compared (`full_fits`).
 from __future__ import annotations
 
 from bisect import insort
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -43,6 +44,7 @@ from antenna_drive.diagnosis.refitting import dropped, refitted, shared_jacobian
 from antenna_drive.diagnosis.screening import (
     jacobian_of_form, rescaled, scan, screened, sensitivities, Sensitivity,
 )
+import numpy as np
 
 Item = TypeVar('Item')
 
@@ -214,9 +216,41 @@ class Search:
         self.progress(0.35, 'single effects')
         leading = self._sorted(lambda h: self._continued(h, options.iterations),
                                found[:options.finalists])
+        if self.problem.leaves_much(leading[0].state):
+            leading = self._with_better(leading, self._led_by_tests(
+                none, [h.effects[0] for h in leading[:options.bases]]))
         leading[:2] = self._sorted(self._settled, leading[:2])
         leading = self._with_relatives(leading)
         return [*leading[:options.bases], *(h.without_jacobian() for h in leading[options.bases:])]
+
+    def _led_by_tests(self, none: Hypothesis, known: Collection[str]) -> list[Hypothesis]:
+        """
+        Return the effects that single tests promise, each fitted to its test and then to all.
+
+        A creep in which motors stick holds every fit to all tests in one of its minima, and what
+        it promises there is wrong. Another test alone may still show what is missing.
+        """
+        asked: dict[str, tuple[int, Form]] = {}
+        for k in range(len(self.problem.experiments)):
+            weight = np.zeros_like(none.state.weight)
+            weight[self.problem.rows(k)] = none.state.weight[self.problem.rows(k)]
+            promises = screened(
+                self.problem, replace(none.state, weight=weight), self.sensitivities)
+            best = next((item for _, item in promises if not item.form.is_course), None)
+            if best is not None and best.effect not in known:
+                asked.setdefault(best.effect, (k, best.form))
+
+        def fitted(entry: tuple[str, tuple[int, Form]]) -> Hypothesis:
+            effect, (k, form) = entry
+            parameters = (*none.state.parameters, *form.parameters)
+            point = {**none.state.point(), **form.start}
+            for part in (self.problem.of_experiment(k), self.problem):
+                state = part.fit(part.start(parameters, with_initial_conditions(part, point)),
+                                 self.settings.settling_iterations)
+                point = state.point()
+            return Hypothesis((effect,), (form,), state)
+
+        return list(self._pool.map(fitted, asked.items()))
 
     def _added(self, base: Hypothesis, item: Sensitivity, columns: Jacobian) -> Hypothesis:
         """Fit an effect on top of a hypothesis, with these derivatives, for a few iterations."""

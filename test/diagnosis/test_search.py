@@ -1,0 +1,79 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The search for single effects, where fits to all tests at once get stuck."""
+
+from __future__ import annotations
+
+import math
+
+from antenna_drive.diagnosis import (
+    Effect, Experiment, FloatArray, Form, LeastSquares, Machine, Parameter, Point,
+)
+from antenna_drive.diagnosis.search import Search
+import numpy as np
+import pytest
+
+TIME = np.arange(0.0, 30.0, 0.02)
+NOISE = 0.05
+PARTS = 6
+
+
+def effect(key: str) -> Effect:
+    """Return an effect of one number."""
+    return Effect(key, 'string', '', '', (Form('', (Parameter(f'{key}.size', '1', -1.0, 1.0,
+                                                              1e-4),)),))
+
+
+class String(Machine):
+    """
+    A string that is tuned too high: one test hears it, the other reads a dial of its tension.
+
+    The sound has a minimum of the cost for each whole period, and its volume may seem wrong in
+    any part of the time.
+    """
+
+    def __init__(self, tension: float, tests: tuple[str, ...]) -> None:
+        random = np.random.default_rng(3)
+        self._tests = tests
+        super().__init__(
+            [Experiment(test, TIME, ('y',), ('1',), np.zeros((TIME.size, 1)),
+                        np.full((TIME.size, 1), NOISE)) for test in tests],
+            [Parameter('zero', '1', -0.01, 0.01, 1e-4, 0.001)],
+            [*(effect(f'volume.part_{k}') for k in range(PARTS)), effect('string.tension')])
+        self.experiments = [
+            Experiment(e.name, e.time, e.channels, e.units,
+                       self.predict({'string.tension.size': tension}, k)
+                       + NOISE * random.normal(size=(TIME.size, 1)), e.noise)
+            for k, e in enumerate(self.experiments)]
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return the closed form."""
+        tension, zero = point.get('string.tension.size', 0.0), point.get('zero', 0.0)
+        if self._tests[experiment] == 'dial':
+            return np.full((TIME.size, 1), 0.4 * tension + zero)
+        volume = np.array([point.get(f'volume.part_{k}.size', 0.0) for k in range(PARTS)])
+        loud = 1.0 + volume[(PARTS * TIME / TIME[-1]).astype(int).clip(max=PARTS - 1)]
+        return np.asarray(loud * np.sin(10.0 * math.pi * (1.0 + tension) * TIME)
+                          + zero)[:, np.newaxis]
+
+
+@pytest.mark.parametrize('tests', [('heard', 'dial'), ('dial', 'heard')])
+def test_an_effect_that_one_test_shows_is_fitted_to_it_first(tests: tuple[str, ...]) -> None:
+    search = Search(LeastSquares(String(0.23, tests)), lambda share, doing: None)
+    none, singles, _ = search.run()
+    assert singles[0].effects == ('string.tension',)
+    assert singles[0].values[0][1] == pytest.approx(0.23, abs=1e-3)
+    # what is left is noise of the size that was put in
+    assert search.problem.loss(singles[0].state.residual) == pytest.approx(
+        0.5 * len(tests) * TIME.size, rel=0.1)
