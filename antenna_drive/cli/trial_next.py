@@ -127,7 +127,10 @@ def _of_rules(found: Mapping[str, Any]) -> list[str]:
                          f'{item["median_set_before"]:g}, {item["median_set"]:g}               '
                          f'{item["median_rivals_before"]:g}, {item["median_rivals"]:g}    '
                          f'{item["violations"]}')
-    promise = found['promise']
+    before, promise = found['before'], found['promise']
+    if before['cases']:
+        lines.append(f'without a third test the first answer is right in {before["right"]} of '
+                     f'{before["cases"]} of these cases')
     if promise['cases']:
         lines.append(f'the true answer was to get {promise["expected"]:.2f} by the proposals of '
                      f'{promise["cases"]} cases; of what unknown left it got '

@@ -156,7 +156,8 @@ def _is_open(folder: Path, truth: Truth, results: TrialResults, limit: float,
         verdict = _of_two(folder, truth, limit, options)
         results.put(name, open=verdict is not None and is_open(verdict),
                     set_before=None if verdict is None else set_of(verdict),
-                    rivals_before=None if verdict is None else rivals_of(verdict))
+                    rivals_before=None if verdict is None else rivals_of(verdict),
+                    right_before=answer_of(folder / name / TWO, truth).get('right'))
     return bool(results[name]['open'])
 
 
@@ -225,7 +226,8 @@ def summary(results: TrialResults) -> dict[str, Any]:
     For each rule: `cases`, exact `top1` with `ci95`, the `median_set` before and after, with
     'unknown' as an answer, the same without it as `median_rivals` (NaN for trials that did not
     count them), and `violations`, tests that exceeded a limit on the independent antenna.
-    `best_built_in` takes in each case the best of the standard kinds, in hindsight. `promise`
+    `best_built_in` takes in each case the best of the standard kinds, in hindsight. `before` says
+    of how many of the cases with third tests the first answer was right without one. `promise`
     compares what a proposal expected for the true answer with the share that it got of what
     'unknown' left.
     """
@@ -242,6 +244,8 @@ def summary(results: TrialResults) -> dict[str, Any]:
     found: dict[str, Any] = {
         'diagnosed': sum('open' in results[name] for name in results),
         'open': sum(results[name].get('open', False) for name in results), 'rules': {}}
+    before = [right for name in tests if (right := results[name].get('right_before')) is not None]
+    found['before'] = {'cases': len(before), 'right': sum(before)}
     for rule, items in rows.items():
         judged = [(name, item) for name, item in items if 'right' in item]
         share = rate(item['right'] for _, item in judged)

@@ -81,7 +81,7 @@ def results_of(folder: Path, name: str) -> TrialResults:
 @pytest.mark.parametrize('trial', [1, 2, 3, 4])
 def test_figures_of_third_tests_are_those_of_their_cases(trial: int, tmp_path: Path) -> None:
     rules = third_tests.summary(results_of(tmp_path, f'next_test_{trial}'))['rules']
-    text = (DOCS / 'next-test.md').read_text(encoding='utf-8')
+    text = (DOCS / 'next-test-trials.md').read_text(encoding='utf-8')
     table = text.split('| third test |')[trial].split('\n\n')[0].splitlines()[2:]
     rows = [[cell.strip() for cell in line.strip('|').split('|')] for line in table]
     assert len(rows) == len(rules)
@@ -94,7 +94,7 @@ def test_figures_of_third_tests_are_those_of_their_cases(trial: int, tmp_path: P
 @pytest.mark.parametrize('number', [1, 2])
 def test_figures_of_investigations_are_those_of_their_cases(number: int, tmp_path: Path) -> None:
     found = investigations.summary(results_of(tmp_path, f'investigate_{number}'))
-    text = (DOCS / 'next-test.md').read_text(encoding='utf-8')
+    text = (DOCS / 'next-test-trials.md').read_text(encoding='utf-8')
     table = text.split('| tests of an investigation |')[number].split('\n\n')[0].splitlines()[2:]
     rows = [[cell.strip() for cell in line.strip('|').split('|')] for line in table]
     assert {row[0].removesuffix(', confirmed') for row in rows} == set(found)

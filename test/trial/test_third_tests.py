@@ -20,7 +20,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.trial import batch, further_tests, third_tests
+from antenna_drive.trial import batch, further_tests, sealing, third_tests
 from antenna_drive.trial.results import FILE, TrialResults
 from antenna_drive.trial.third_tests import is_open, rivals_of, run_trial, set_of, summary
 from antenna_drive.trial.verdict import parse_verdict, Verdict
@@ -113,6 +113,8 @@ def test_open_cases_get_third_tests_on_the_independent_antenna_and_a_trial_goes_
     assert found['rules']['proposed']['median_rivals_before'] == 2
     assert found['rules']['proposed']['median_rivals'] == 1
     assert found['rules']['best_built_in']['cases'] == 1
+    healthy = not sealing.open_truth(tmp_path, 'case_0002', manifest)['effects']
+    assert found['before'] == {'cases': 1, 'right': healthy}, 'after two it is called healthy'
     assert (tmp_path / 'case_0002/rec_proposed.csv').exists()
     asked = len(commands.words)
     assert run_trial(tmp_path, manifest, 2, 1, 60.0, rules=rules) == found
