@@ -29,6 +29,7 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 import math
 from pathlib import Path
+from statistics import fmean
 from types import MappingProxyType
 from typing import Any
 
@@ -175,6 +176,7 @@ class Judged:
         test that was judged, in the geometric mean; NaN where it was not asked for
     told : how well it tells the rivals apart to first order
     confirmed : the same with every rival fitted to the readings of the others
+    kept : share of its promise that is expected to be kept, as by other tests of its family
     deviations : of each number of the effects, its standard deviation before and after
     sizes : of each effect, the smallest size that shows, and its unit
 
@@ -187,6 +189,7 @@ class Judged:
     coarseness: float = math.nan
     told: Separation | None = None
     confirmed: Separation | None = None
+    kept: float = 1.0
     deviations: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     sizes: Mapping[str, tuple[float, str]] = field(default_factory=dict)
 
@@ -366,17 +369,32 @@ class TestDesign:
         return replace(test, told=told, sizes=self._sizes(machine.low_fidelity()))
 
     def _with_fits(self, judged: Sequence[Judged], pool: ThreadPoolExecutor) -> list[Judged]:
-        """Confirm the best tests until no other one promises more, and put those first."""
+        """
+        Confirm the best tests until no other one promises more, and put those first.
+
+        Tests of a family break their promises alike: a promise counts as far as others were kept.
+        """
         best = list(judged)
         for _ in range(self._effort.rounds):
             if not best or best[0].confirmed is not None:
                 break
-            known = [test for test in best if test.confirmed is not None]
             promised = [test for test in best if test.confirmed is None]
             count = self._effort.confirmed
-            best = self._compared([*pool.map(self._confirmed, promised[:count]), *known,
-                                   *promised[count:]])
+            known = [*(test for test in best if test.confirmed is not None),
+                     *pool.map(self._confirmed, promised[:count])]
+            kept = self._kept(known)
+            best = self._compared([*known, *(
+                replace(test, kept=kept.get(test.family, 1.0)) for test in promised[count:])])
         return sorted(best, key=lambda test: test.confirmed is None)
+
+    def _kept(self, confirmed: Iterable[Judged]) -> dict[str, float]:
+        """Return the share of the promises of each family that fits have kept, in the mean."""
+        shares: dict[str, list[float]] = {}
+        for test in confirmed:
+            assert test.told is not None and test.confirmed is not None
+            shares.setdefault(test.family, []).append(
+                self._score(test.confirmed) / max(self._score(test.told), _NOTHING))
+        return {family: min(fmean(found), 1.0) for family, found in shares.items()}
 
     def _confirmed(self, test: Judged) -> Judged:
         """Fit each rival to the readings of the others."""
@@ -434,7 +452,8 @@ class TestDesign:
         if test.separation is None:
             return -math.log(coarseness)
         unlisted = self._settings.planning.unlisted
-        return ((1.0 - unlisted) * math.log(max(self._score(test.separation), _NOTHING))
+        told = test.kept * self._score(test.separation)
+        return ((1.0 - unlisted) * math.log(max(told, _NOTHING))
                 - unlisted * math.log(coarseness))
 
     # -- what no test tells --------------------------------------------------------------------

@@ -16,14 +16,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 import json
 from typing import Any
 
 from antenna_drive.diagnosis import (
-    DesignEffort, Effect, Experiment, Findings, FloatArray, Form, Judged, Machine, Parameter,
-    Point, Rival, TestDesign, TestSpace,
+    design, DesignEffort, Effect, Experiment, Findings, FloatArray, Form, Judged, Machine,
+    Parameter, Point, Rival, TestDesign, TestSpace,
 )
 from antenna_drive.diagnosis.design import CRITERIA
+from antenna_drive.diagnosis.discrimination import refitted, Separation
 from antenna_drive.diagnosis.proposal import as_data, contents, lines
 from blas_threads import during, Look
 import numpy as np
@@ -111,6 +113,31 @@ def test_the_promise_for_the_best_test_is_confirmed_by_fits() -> None:
     assert data['expected']['right_after'] > 0.95 > data['expected']['right_before']
     assert data['expected']['surely'] == 1.0
     assert len(data['others']) > 1
+
+
+class Promising(Loads):
+    """Great loads promise most, and there are enough of them to spend all fits on."""
+
+    families = ('modest', 'great')
+
+    def draw(self, family: str, random: np.random.Generator) -> float:
+        return float(random.uniform(*((0.3, 0.5) if family == 'modest' else (1.2, 1.6))))
+
+
+def test_where_a_family_breaks_its_promises_another_one_is_confirmed(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    def fitted(machine: Lever, *rest: Any) -> Separation:
+        told = refitted(machine, *rest)
+        return replace(told, lack=1e-3 * told.lack) if machine.load > 1.0 else told
+
+    monkeypatch.setattr(design, 'refitted', fitted)
+    found = TestDesign(Promising(2.0), Findings(HARD), effort=SMALL).run()
+    great = [test for test in found.tests if test.family == 'great']
+    assert len(great) > SMALL.rounds * SMALL.confirmed
+    assert found.tests[0].family == 'modest' and found.tests[0].confirmed is not None
+    # what a broken family still promises counts by the share that was kept
+    assert all(test.kept < 0.1 and test.score < found.tests[0].score
+               for test in great if test.confirmed is None)
 
 
 def test_where_no_load_within_the_limit_helps_the_limit_is_named() -> None:
