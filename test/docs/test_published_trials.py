@@ -78,7 +78,7 @@ def results_of(folder: Path, name: str) -> TrialResults:
                                  'seals': [case['case'] for case in cases]})
 
 
-@pytest.mark.parametrize('trial', [1, 2, 3, 4])
+@pytest.mark.parametrize('trial', [1, 2, 3, 4, 5])
 def test_figures_of_third_tests_are_those_of_their_cases(trial: int, tmp_path: Path) -> None:
     rules = third_tests.summary(results_of(tmp_path, f'next_test_{trial}'))['rules']
     text = (DOCS / 'next-test-trials.md').read_text(encoding='utf-8')
