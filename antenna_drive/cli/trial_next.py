@@ -129,8 +129,8 @@ def _of_rules(found: Mapping[str, Any]) -> list[str]:
                          f'{item["violations"]}')
     before, promise = found['before'], found['promise']
     if before['cases']:
-        lines.append(f'without a third test the first answer is right in {before["right"]} of '
-                     f'{before["cases"]} of these cases')
+        lines.append(f'without a third test the first answer was right in {before["right"]} of '
+                     f'{before["cases"]} cases')
     if promise['cases']:
         lines.append(f'the true answer was to get {promise["expected"]:.2f} by the proposals of '
                      f'{promise["cases"]} cases; of what unknown left it got '

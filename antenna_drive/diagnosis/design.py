@@ -176,7 +176,8 @@ class Judged:
         test that was judged, in the geometric mean; NaN where it was not asked for
     told : how well it tells the rivals apart to first order
     confirmed : the same with every rival fitted to the readings of the others
-    kept : share of its promise that is expected to be kept, as by other tests of its family
+    kept : while not confirmed, the share of its promise that counts: as other tests of its
+        family have kept theirs
     deviations : of each number of the effects, its standard deviation before and after
     sizes : of each effect, the smallest size that shows, and its unit
 
@@ -397,8 +398,8 @@ class TestDesign:
         return {family: min(fmean(found), 1.0) for family, found in shares.items()}
 
     def _confirmed(self, test: Judged) -> Judged:
-        """Fit each rival to the readings of the others."""
-        return replace(test, confirmed=refitted(
+        """Fit each rival to the readings of the others; what is left then counts in full."""
+        return replace(test, kept=1.0, confirmed=refitted(
             self._planned(test), self._rivals, self._inflated, self._settings,
             test.told.shrunk if test.told else ()))
 

@@ -17,9 +17,9 @@ The search for effects: from the nuisances alone over single effects to pairs.
 1. The nuisances are fitted without any effect: the hypothesis 'none'. While something strong is
    missing, the misfit counts as noise, and the nuisances stay close to their priors.
 2. A screening by derivatives says how much of the residual each effect could explain.
-3. The best dozen are fitted, each together with all nuisances. While they leave much, so is what
-   each test alone promises most of. If the best explains much, the noise is lowered to what it
-   leaves, and the best are fitted again.
+3. The best dozen are fitted, each together with all nuisances. While they leave much, the
+   effect that each single test promises most of is fitted, too. If the best explains much, the
+   noise is lowered to what it leaves, and the best are fitted again.
 4. Several of the best are given partners, and the pairs are fitted.
 
 All this is done with coarser steps of the simulation. The best are then fitted to the whole tests
@@ -242,13 +242,12 @@ class Search:
 
         def fitted(entry: tuple[str, tuple[int, Form]]) -> Hypothesis:
             effect, (k, form) = entry
-            parameters = (*none.state.parameters, *form.parameters)
-            point = {**none.state.point(), **form.start}
-            for part in (self.problem.of_experiment(k), self.problem):
-                state = part.fit(part.start(parameters, with_initial_conditions(part, point)),
-                                 self.settings.settling_iterations)
-                point = state.point()
-            return Hypothesis((effect,), (form,), state)
+            part = self.problem.of_experiment(k)
+            start = part.start(
+                (*none.state.parameters, *form.parameters),
+                with_initial_conditions(part, {**none.state.point(), **form.start}))
+            state = part.fit(start, self.settings.settling_iterations)
+            return self._settled(Hypothesis((effect,), (form,), state))
 
         return list(self._pool.map(fitted, asked.items()))
 

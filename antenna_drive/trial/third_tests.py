@@ -154,10 +154,9 @@ def _is_open(folder: Path, truth: Truth, results: TrialResults, limit: float,
     name = truth['case']
     if 'open' not in results[name]:
         verdict = _of_two(folder, truth, limit, options)
+        told = answer_of(folder / name / TWO, truth)
         results.put(name, open=verdict is not None and is_open(verdict),
-                    set_before=None if verdict is None else set_of(verdict),
-                    rivals_before=None if verdict is None else rivals_of(verdict),
-                    right_before=answer_of(folder / name / TWO, truth).get('right'))
+                    **{f'{key}_before': told.get(key) for key in ('set', 'rivals', 'right')})
     return bool(results[name]['open'])
 
 

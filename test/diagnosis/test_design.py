@@ -27,6 +27,7 @@ from antenna_drive.diagnosis import (
 from antenna_drive.diagnosis.design import CRITERIA
 from antenna_drive.diagnosis.discrimination import refitted, Separation
 from antenna_drive.diagnosis.proposal import as_data, contents, lines
+from antenna_drive.diagnosis.settings import DEFAULT
 from blas_threads import during, Look
 import numpy as np
 import pytest
@@ -138,6 +139,17 @@ def test_where_a_family_breaks_its_promises_another_one_is_confirmed(
     # what a broken family still promises counts by the share that was kept
     assert all(test.kept < 0.1 and test.score < found.tests[0].score
                for test in great if test.confirmed is None)
+
+
+def test_what_is_confirmed_counts_in_full_though_its_family_broke_promises() -> None:
+    design_of_test = TestDesign(Loads(1.6), Findings(HARD), effort=SMALL)
+    doubted = replace(design_of_test.run().tests[0], confirmed=None, kept=0.1)
+    [found] = design_of_test._compared([design_of_test._confirmed(doubted)])
+    assert found.confirmed is not None
+    told = found.confirmed.information(DEFAULT.verdict.temperature, DEFAULT.planning.caution)
+    unlisted = DEFAULT.planning.unlisted
+    assert found.score == pytest.approx(
+        (1.0 - unlisted) * np.log(told) - unlisted * np.log(found.coarseness))
 
 
 def test_where_no_load_within_the_limit_helps_the_limit_is_named() -> None:

@@ -15,6 +15,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import math
 
 from antenna_drive.diagnosis import (
@@ -52,9 +53,8 @@ class String(Machine):
             [Parameter('zero', '1', -0.01, 0.01, 1e-4, 0.001)],
             [*(effect(f'volume.part_{k}') for k in range(PARTS)), effect('string.tension')])
         self.experiments = [
-            Experiment(e.name, e.time, e.channels, e.units,
-                       self.predict({'string.tension.size': tension}, k)
-                       + NOISE * random.normal(size=(TIME.size, 1)), e.noise)
+            replace(e, measured=self.predict({'string.tension.size': tension}, k)
+                    + NOISE * random.normal(size=(TIME.size, 1)))
             for k, e in enumerate(self.experiments)]
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
@@ -71,7 +71,7 @@ class String(Machine):
 @pytest.mark.parametrize('tests', [('heard', 'dial'), ('dial', 'heard')])
 def test_an_effect_that_one_test_shows_is_fitted_to_it_first(tests: tuple[str, ...]) -> None:
     search = Search(LeastSquares(String(0.23, tests)), lambda share, doing: None)
-    none, singles, _ = search.run()
+    _, singles, _ = search.run()
     assert singles[0].effects == ('string.tension',)
     assert singles[0].values[0][1] == pytest.approx(0.23, abs=1e-3)
     # what is left is noise of the size that was put in
