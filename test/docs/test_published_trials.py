@@ -109,6 +109,25 @@ def test_figures_of_investigations_are_those_of_their_cases(number: int, tmp_pat
         assert float(seconds) == item['median_seconds'], name
 
 
+def test_the_summary_of_next_tests_is_that_of_all_their_cases(tmp_path: Path) -> None:
+    text = ' '.join((DOCS / 'next-test.md').read_text(encoding='utf-8').split())
+    found = [third_tests.summary(results_of(tmp_path, f'next_test_{trial}'))['rules']
+             for trial in (1, 2, 3, 4, 5)]
+    for rule, words in (('proposed', 'proposed tests'), ('square', 'square waves'),
+                        ('chirp', 'chirps'), ('triangle', 'triangles'),
+                        ('multisine', 'multisines'), ('d-optimal', 'D-optimal tests'),
+                        ('random', 'random ones')):
+        cases = sum(rules[rule]['cases'] for rules in found)
+        right = sum(round(rules[rule]['top1'] * rules[rule]['cases']) for rules in found)
+        assert f'{right} of {cases} {words}' in text
+    ways = investigations.summary(results_of(tmp_path, 'investigate_2'))
+    right_of = {way: round(item['until_sure']['right'] * item['cases'])
+                for way, item in ways.items()}
+    assert f'Of {ways["designed"]["cases"]} machines' in text
+    assert f'sure and right in {right_of["designed"]}, with one test' in text
+    assert f'does so in {right_of["standard"]}, with the same medians' in text
+
+
 @pytest.mark.parametrize('trial', ['5', '6'])
 @pytest.mark.parametrize('key', ROWS)
 def test_figures_of_a_tame_trial_are_those_of_its_cases(key: str, trial: str) -> None:
