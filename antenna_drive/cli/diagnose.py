@@ -23,10 +23,15 @@ For example:
   antenna-drive diagnose field.csv
   antenna-drive diagnose rec_a.csv rec_b.csv rec_c.csv --config my_drive.yaml \
       --json verdict.json --report verdict.html --corrected corrected.yaml
+  antenna-drive diagnose rec_a.csv rec_b.csv rec_c.csv rec_d.csv --after verdict.json
   antenna-drive diagnose --model my_machine.py:machine logs/*.csv --map map.yaml
 
 --corrected writes a configuration with the effects and the tolerances in it, as fitted;
 `antenna-drive predict` shows how well it predicts a recording that was not used here.
+
+--after takes the verdict on the recordings before. What it left open is fitted to all of them
+from where it had ended, beside what is found afresh. A test in which motors creep may hide it
+otherwise.
 
 --model diagnoses a machine of your own, see docs/own-machine.md; `antenna-drive check-model` tells
 beforehand what is wrong with it.
@@ -42,13 +47,14 @@ from typing import TYPE_CHECKING
 from antenna_drive.cli.large_arrays import give_back_large_arrays
 from antenna_drive.cli.output import add_json_option, check_options, give, Progress, replaced
 from antenna_drive.cli.reading import warnings_in_one_line
+from antenna_drive.cli.verdict_file import findings_of, planning_of
 from antenna_drive.errors import UserError
 from antenna_drive.parameters.schema import Entry
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.import_map import import_file, load_map
 
 if TYPE_CHECKING:
-    from antenna_drive.diagnosis import Diagnosis, Settings
+    from antenna_drive.diagnosis import Diagnosis, Rival, Settings
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -70,6 +76,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='write the configuration with what was found to FILE (.yaml)')
     parser.add_argument('--jobs', type=int, default=2, metavar='N',
                         help='simulations at once (default: 2)')
+    parser.add_argument('--after', type=Path, metavar='VERDICT',
+                        help='JSON of a diagnosis of some of these recordings, whose answers are '
+                             'fitted to all of them')
     parser.add_argument('--without', action='append', default=[], metavar='EFFECT',
                         help='leave an effect out of the catalogue, to see what is then said')
     parser.add_argument('--matters', action='append', default=[], metavar='SIGNAL=VALUE',
@@ -92,6 +101,7 @@ def run(arguments: argparse.Namespace) -> int:
     drive = load(*arguments.config)
     settings = _settings(arguments.threshold)
     limits = dict(_numbers('--matters', arguments.matters))
+    earlier = _earlier(arguments.after)
     recordings = {}
     with warnings_in_one_line():
         import_map = load_map(arguments.map) if arguments.map else None
@@ -104,7 +114,7 @@ def run(arguments: argparse.Namespace) -> int:
     with Progress('diagnosis', 1.0) as progress:
         diagnosis = diagnose_recordings(
             recordings, drive, lambda share, doing: progress.update(share), arguments.jobs,
-            settings, arguments.without, limits)
+            settings, arguments.without, limits, earlier)
     correction = corrected(drive, diagnosis)
     _report(arguments.report, diagnosis)
     lines = [diagnosis.summary()]
@@ -128,17 +138,22 @@ def _own_machine(arguments: argparse.Namespace) -> int:
     for option in ('config', 'corrected'):
         if getattr(arguments, option):
             raise UserError(f'--{option}: does not go with --model')
-    model = load_model(arguments.model)
+    model, earlier = load_model(arguments.model), _earlier(arguments.after)
     with warnings_in_one_line():
         logs = read_logs(arguments.recordings, arguments.map)
     with Progress('diagnosis', 1.0) as progress:
         diagnosis = diagnose_logs(
             model, logs, lambda share, doing: progress.update(share), arguments.jobs,
             _settings(arguments.threshold), arguments.without,
-            dict(_numbers('--matters', arguments.matters)))
+            dict(_numbers('--matters', arguments.matters)), earlier)
     _report(arguments.report, diagnosis)
     give(diagnosis.result, arguments.json, summary_of(diagnosis))
     return 0
+
+
+def _earlier(path: Path | None) -> Sequence[Rival]:
+    """Return the answers of the verdict of --after."""
+    return findings_of(path, planning_of(path)).rivals if path else ()
 
 
 def _report(path: str | None, diagnosis: Diagnosis) -> None:

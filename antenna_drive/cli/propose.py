@@ -36,17 +36,17 @@ The exit code is 1 if no test within the limits helps. docs/next-test.md has mor
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 import time
 from typing import Any, TYPE_CHECKING
 
 from antenna_drive.cli.output import add_json_option, check_options, give, Progress, replaced
+from antenna_drive.cli.verdict_file import findings_of, planning_of
 from antenna_drive.errors import UserError
 from antenna_drive.parameters.schema import Entry
 
 if TYPE_CHECKING:
-    from antenna_drive.diagnosis import Findings, Proposal, TestSpace
+    from antenna_drive.diagnosis import Proposal, TestSpace
 
 _OBJECTIVES = ('separate', 'sharpen', 'detect')
 _RULES = ('d-optimal', 'random')
@@ -89,9 +89,9 @@ def run(arguments: argparse.Namespace) -> int:
     check_options(arguments, jobs=Entry('', 1, whole=True), duration=Entry('s', 5.0, 600.0),
                   rate=Entry('Hz', 20.0, 10000.0), seed=Entry('', 0, whole=True))
     planning = _planning(arguments)
-    from antenna_drive.diagnosis import objective_for, TestDesign
+    from antenna_drive.diagnosis import Findings, objective_for, TestDesign
     from antenna_drive.diagnosis.proposal import as_data, contents, lines
-    findings = _findings(arguments, planning)
+    findings = findings_of(arguments.verdict, planning) if planning else Findings()
     objective = arguments.rule or arguments.objective or objective_for(findings)
     space = (_tests_of_own if arguments.model else _tests_of_drive)(arguments, planning)
     began = time.monotonic()
@@ -122,32 +122,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _planning(arguments: argparse.Namespace) -> dict[str, Any]:
     """Return what a verdict says for the design of a further test."""
-    path = arguments.verdict
-    if path is None:
+    if arguments.verdict is None:
         if arguments.objective != 'detect':
             raise UserError('which verdict? The JSON of a diagnosis is needed; without one there '
                             'is --objective detect')
         return {}
-    try:
-        data = json.loads(path.read_text(encoding='utf-8'))
-        return dict(data['planning'])
-    except (ValueError, TypeError) as error:
-        raise UserError(f'{path}: no JSON of a diagnosis: {error}') from error
-    except KeyError as error:
-        raise UserError(f'{path}: no entry {error.args[0]}: a verdict of an earlier version; '
-                        'diagnose the recordings again') from error
-
-
-def _findings(arguments: argparse.Namespace, planning: dict[str, Any]) -> Findings:
-    """Return what the tests so far have told."""
-    from antenna_drive.diagnosis import Findings
-    if not planning:
-        return Findings()
-    try:
-        return Findings.of_data(planning)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise UserError(f'{arguments.verdict}: planning: {error!r}: damaged; diagnose the '
-                        'recordings again') from error
+    return planning_of(arguments.verdict)
 
 
 def _tests_of_drive(arguments: argparse.Namespace, planning: dict[str, Any]) -> TestSpace:

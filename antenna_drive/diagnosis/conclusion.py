@@ -34,6 +34,7 @@ from antenna_drive.diagnosis.interventions import simplified
 from antenna_drive.diagnosis.lack_of_fit import lack_of_fit
 from antenna_drive.diagnosis.least_squares import LeastSquares
 from antenna_drive.diagnosis.machine import Machine
+from antenna_drive.diagnosis.rivals import Rival
 from antenna_drive.diagnosis.search import Search
 from antenna_drive.diagnosis.settings import Settings
 
@@ -68,7 +69,7 @@ class Conclusion:
 
 
 def concluded(machine: Machine, progress: Callable[[float, str], None], threads: int,
-              settings: Settings) -> Conclusion:
+              settings: Settings, earlier: Sequence[Rival] = ()) -> Conclusion:
     """
     Fit, select, withhold and decide.
 
@@ -77,7 +78,7 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
 
     Parameters
     ----------
-    machine, progress, threads, settings
+    machine, progress, threads, settings, earlier
         see `diagnosis.diagnose`
 
     """
@@ -87,13 +88,13 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
         progress(0.9 * share, doing)
 
     fits = FullFits(whole, told, threads)
-    found = fits.compared(*Search(whole, told, threads).run())
+    found = fits.compared(*Search(whole, told, threads, earlier).run())
     hypotheses, best = backward_elimination(fits, found, settings)
     hypotheses, best = settled_rivals(fits, hypotheses, best, settings)
     if courses := _implausible_courses(best):
         names = ' + '.join(courses)
         plain = concluded(machine.without(courses), lambda share, doing: progress(
-            0.9, f'without {names}: {doing}'), threads, settings)
+            0.9, f'without {names}: {doing}'), threads, settings, earlier)
         if plain.decision.word != 'unknown_effect':
             return replace(plain, notes=(
                 *plain.notes,

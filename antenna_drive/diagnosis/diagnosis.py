@@ -36,7 +36,7 @@ from antenna_drive.diagnosis.interventions import interventions, lines as lines_
 from antenna_drive.diagnosis.lack_of_fit import remainders, residual_tests
 from antenna_drive.diagnosis.machine import Machine
 from antenna_drive.diagnosis.noise import found_noise
-from antenna_drive.diagnosis.rivals import Findings, rivals_of
+from antenna_drive.diagnosis.rivals import Findings, Rival, rivals_of
 from antenna_drive.diagnosis.settings import DEFAULT, Settings
 
 Progress = Callable[[float, str], None]
@@ -156,7 +156,7 @@ def value_lines(parameters: Mapping[str, Any]) -> list[str]:
 
 def diagnose(machine: Machine, progress: Progress = lambda share, doing: None, threads: int = 2,
              settings: Settings = DEFAULT, limits: Mapping[str, float] | None = None,
-             ) -> Diagnosis:
+             earlier: Sequence[Rival] = ()) -> Diagnosis:
     """
     Diagnose a machine in its experiments.
 
@@ -172,6 +172,10 @@ def diagnose(machine: Machine, progress: Progress = lambda share, doing: None, t
         thresholds
     limits
         for some signals, the remainder beyond noise from which it matters, in the signal's unit
+    earlier
+        answers of a verdict on some of the tests: they are fitted to all from where they have
+        ended, beside what the search finds. One whose effects the machine does not know is left
+        out
 
     Raises
     ------
@@ -180,13 +184,13 @@ def diagnose(machine: Machine, progress: Progress = lambda share, doing: None, t
     """
     with one_blas_thread():
         check_machine(machine)
-        return _diagnose(by_label(machine), progress, threads, settings, limits or {})
+        return _diagnose(by_label(machine), progress, threads, settings, limits or {}, earlier)
 
 
 def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Settings,
-              limits: Mapping[str, float]) -> Diagnosis:
+              limits: Mapping[str, float], earlier: Sequence[Rival]) -> Diagnosis:
     began = time.monotonic()
-    found = concluded(machine, progress, threads, settings)
+    found = concluded(machine, progress, threads, settings, earlier)
     problem, none, best, decision = found.problem, found.none, found.best, found.decision
     places: Sequence[unknown_input.Place] = ()
     located: Sequence[localisation.Located] = ()

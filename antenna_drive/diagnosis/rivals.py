@@ -90,6 +90,14 @@ class Rival:
         return [machine.form_named(machine.effects[effect], form)
                 for effect, form in zip(self.effects, self.forms, strict=True)]
 
+    def is_known_to(self, machine: Machine) -> bool:
+        """Return whether a machine has the effects in these forms."""
+        try:
+            self.forms_of(machine)
+        except KeyError:
+            return False
+        return True
+
     def deviation(self, name: str) -> float:
         """Return the standard deviation of one of the values."""
         place = self.names.index(name)

@@ -22,6 +22,9 @@ The search for effects: from the nuisances alone over single effects to pairs.
    noise is lowered to what it leaves, and the best are fitted again.
 4. Several of the best are given partners, and the pairs are fitted.
 
+The answers of an earlier verdict on some of the tests are fitted as well, each from where it has
+ended there.
+
 All this is done with coarser steps of the simulation. The best are then fitted to the whole tests
 and compared (`full_fits`).
 """
@@ -35,12 +38,14 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, TypeVar
 
+from antenna_drive.diagnosis.continued import continued
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.least_squares import (
     FitState, Jacobian, LeastSquares, led, settled, with_initial_conditions,
 )
 from antenna_drive.diagnosis.machine import Effect, Form, Point
 from antenna_drive.diagnosis.refitting import dropped, refitted, shared_jacobian
+from antenna_drive.diagnosis.rivals import Rival
 from antenna_drive.diagnosis.screening import (
     jacobian_of_form, rescaled, scan, screened, sensitivities, Sensitivity,
 )
@@ -71,11 +76,13 @@ class Search:
         called with the share that is done, 0 to 1, and what is being done
     threads
         how many hypotheses are fitted at once
+    earlier
+        answers of a verdict on some of the tests
 
     """
 
     def __init__(self, problem: LeastSquares, progress: Callable[[float, str], None],
-                 threads: int = 1) -> None:
+                 threads: int = 1, earlier: Sequence[Rival] = ()) -> None:
         """Prepare to search."""
         self._pool = ThreadPoolExecutor(threads)
         self.settings = problem.settings.search
@@ -83,6 +90,7 @@ class Search:
         self.problem = LeastSquares(self.machine, settings=problem.settings)
         self.progress = progress
         self.sensitivities: list[Sensitivity] = []
+        self._known = continued(self.problem, earlier, self._pool.map)
 
     def run(self) -> tuple[Hypothesis, list[Hypothesis], list[Hypothesis]]:
         """Return the nuisances alone, and what one effect and two can do, each the best first."""
@@ -113,17 +121,31 @@ class Search:
             none, singles = freed, self._singles(freed)
         return none, singles
 
+    def _earlier(self, wanted: Callable[[int], bool]) -> list[Hypothesis]:
+        """Return what an earlier verdict has left open, with some numbers of effects."""
+        return [replace(h, state=self.problem.rescaled(h.state, 1.0))
+                for h in self._known if wanted(len(h.effects))]
+
     # -- the nuisances, and the noise ------------------------------------------------------------
 
     def _nuisances_alone(self) -> Hypothesis:
         """Fit the nuisances alone; the misfit counts as noise."""
         iterations = self.settings.iterations
-        point = with_initial_conditions(self.problem, {})
+        point = self._beginning()
         first = self.problem.start(self.machine.nuisances, point)
         self.problem = self._at_noise(self.problem.noise_level(first.residual))
         state = self.problem.start(self.machine.nuisances, point,
                                    first.jacobian / self.problem.scale)
         return Hypothesis((), (), self._at_falling_noise(self.problem.fit(state, iterations)))
+
+    def _beginning(self) -> dict[str, float]:
+        """Return the nuisances as configured, or as the earlier answer has them that fits best."""
+        names = {p.name for p in self.machine.nuisances}
+        begins: list[Point] = [{}, *(
+            {name: value for name, value in known.state.point().items() if name in names}
+            for known in self._known)]
+        return min((with_initial_conditions(self.problem, dict(begin)) for begin in begins),
+                   key=lambda point: self.problem.loss(self.problem.residuals(point)))
 
     def _at_falling_noise(self, state: FitState) -> FitState:
         """Go on with a fit of the nuisances alone, with the noise that it leaves."""
@@ -219,6 +241,7 @@ class Search:
         if self.problem.leaves_much(leading[0].state):
             leading = self._with_better(leading, self._led_by_tests(
                 none, [h.effects[0] for h in leading[:options.bases]]))
+        leading = self._with_better(leading, self._earlier(lambda count: count == 1))
         leading[:2] = self._sorted(self._settled, leading[:2])
         leading = self._with_relatives(leading)
         return [*leading[:options.bases], *(h.without_jacobian() for h in leading[options.bases:])]
@@ -377,7 +400,8 @@ class Search:
         if self.problem.leaves_much(best.state):
             self._take_sensitivities(best.state)
         worth = max(options.partner_gain, options.partner_gain_share * best.cost)
-        found: dict[tuple[str, ...], Hypothesis] = {}
+        found = {tuple(sorted(pair.effects)): pair
+                 for pair in self._earlier(lambda count: count > 1)}
         for i, base in enumerate(singles[:options.bases]):
             self.progress(0.5 + 0.2 * i / options.bases, 'pairs of effects')
             far = self._priced(base) > options.base_ratio * self._priced(best) + options.reach

@@ -122,6 +122,9 @@ class SearchSettings:
     wanting: float = _setting(
         1.03, 'noise sigma', 'residual level above which sensitivities are taken anew for pairs, '
         'and fits are led by one test')
+    continued_noise: float = _setting(
+        3.0, 'noise sigma', 'noise at which an answer of an earlier verdict is first fitted to '
+        'more tests, if it leaves more')
     settled: float = _setting(
         4.0, 'half chi-square', 'gain of a pass below which the fits have ended')
     settled_share: float = _setting(1e-3, '1', 'the same as a share of the cost')

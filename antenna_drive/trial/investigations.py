@@ -132,7 +132,8 @@ def _standard(case: Path, truth: Truth, limit: float, options: Sequence[str]) ->
         sealing.write_whole(case / f'{name}.yaml', yaml.safe_dump(sheet, sort_keys=False))
         so_far = list(STANDARD)[:len(answers) + 1]
         verdict = f'standard_{len(so_far)}.json'
-        said = diagnose_recordings(case, so_far, verdict, limit, options)
+        after = ('--after', str(case / f'standard_{len(answers)}.json')) if answers else ()
+        said = diagnose_recordings(case, so_far, verdict, limit, (*after, *options))
         answer = answer_of(case / verdict, truth)
         if not answer:
             return {'failure': one_line(said, 300), 'answers': answers}

@@ -194,7 +194,8 @@ def _third_test(case: Path, truth: Truth, rule: str, limit: float,
     record_test(whole, number, case / f'{name}.csv')
     sealing.write_whole(case / f'{name}.yaml', yaml.safe_dump(
         {key: value for key, value in sheet.items() if key != 'sensors'}, sort_keys=False))
-    said = diagnose_recordings(case, (*FIRST, name), f'three_{rule}.json', limit, options)
+    said = diagnose_recordings(case, (*FIRST, name), f'three_{rule}.json', limit,
+                               ('--after', str(case / TWO), *options))
     answer = answer_of(case / f'three_{rule}.json', truth)
     if not answer:
         return {'failure': one_line(said, 300)}

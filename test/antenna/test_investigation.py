@@ -64,8 +64,13 @@ class Laboratory:
         out.write_text('time_s,rate_command_rad_s,encoder_rad\n0.0,0.0,0.0\n0.01,0.0,0.0\n')
         self.note(f'test {number} for {duration:g} s')
 
-    def diagnose(self, recordings: Mapping[str, Any], *rest: Any) -> Any:
+    def diagnose(self, recordings: Mapping[str, Any], *rest: Any,
+                 earlier: Sequence[Rival]) -> Any:
         self.note(f'diagnosis of {len(recordings)}')
+        # what the test before has left open begins where it had ended
+        before = self.answers[len(recordings) - 2] if len(recordings) > 1 else {}
+        assert [rival.named for rival in earlier] == [
+            (name,) for name in before if name != 'unknown']
         # each recording comes with the sheet that was played
         assert all(item.sheet.waveform is not None for item in recordings.values())
         answers = self.answers[len(recordings) - 1]

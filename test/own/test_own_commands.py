@@ -54,11 +54,37 @@ def test_diagnose_writes_verdict_and_page(folder: Path,
     assert '<!doctype html>' in (folder / 'v.html').read_text()
 
 
+def test_diagnose_goes_on_from_a_verdict_on_the_recordings_before(
+        folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ['diagnose', '--model', f'{folder}/model.py:machine', f'{folder}/far.csv']
+    assert main([*words, '--json', f'{folder}/one.json']) == 0
+    assert main([*words, f'{folder}/near.csv', '--after', f'{folder}/one.json',
+                 '--json', f'{folder}/two.json']) == 0
+    verdict = json.loads((folder / 'two.json').read_text())
+    assert verdict['which'][0]['effects'] == ['sensor.drift']
+    assert verdict['numbers']['drift']['value'] == pytest.approx(0.01, rel=0.05)
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize(('text', 'message'), [
+    ('no JSON', 'old.json: no JSON of a diagnosis'),
+    ('{"verdict": "no_gap"}', 'old.json: no entry planning: a verdict of an earlier version'),
+    ('{"planning": {"inflation": "much"}}', 'old.json: planning: '),
+])
+def test_a_verdict_that_cannot_be_gone_on_from(folder: Path, text: str, message: str,
+                                               capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / 'old.json').write_text(text)
+    assert main(['diagnose', '--model', f'{folder}/model.py:machine', f'{folder}/far.csv',
+                 '--after', f'{folder}/old.json']) == 2
+    assert message in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(('options', 'message'), [
     (['--model', 'none.py', 'a.csv'], 'no such Python file'),
     (['--model', 'x.py', 'a.csv', '--config', 'reference'], '--config: does not go with --model'),
     (['--model', 'x.py', 'a.csv', '--corrected', 'c.yaml'], '--corrected: does not go with'),
     (['a.csv', '--map', 'none.yaml'], 'none.yaml: No such file'),
+    (['a.csv', '--after', 'none.json'], 'none.json: No such file'),
 ])
 def test_options_that_do_not_go_together(options: list[str], message: str,
                                          capsys: pytest.CaptureFixture[str]) -> None:

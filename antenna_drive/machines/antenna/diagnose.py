@@ -29,7 +29,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from antenna_drive.diagnosis import (
-    DEFAULT, diagnose, Diagnosis, Progress, Settings, without_labels,
+    DEFAULT, diagnose, Diagnosis, Progress, Rival, Settings, without_labels,
 )
 from antenna_drive.errors import UserError
 from antenna_drive.machines.antenna.corrected import correct, Corrected
@@ -41,7 +41,8 @@ from antenna_drive.recording.recording import Recording
 def diagnose_recordings(recordings: Mapping[str, Recording], drive: Drive,
                         progress: Progress = lambda share, doing: None, threads: int = 2,
                         settings: Settings = DEFAULT, without: Sequence[str] = (),
-                        limits: Mapping[str, float] | None = None) -> Diagnosis:
+                        limits: Mapping[str, float] | None = None,
+                        earlier: Sequence[Rival] = ()) -> Diagnosis:
     """
     Say where a real drive and its model part, which effect is behind it, and how far it goes.
 
@@ -61,6 +62,8 @@ def diagnose_recordings(recordings: Mapping[str, Recording], drive: Drive,
         effects that the catalogue shall lack
     limits
         for some signals, the remainder beyond noise from which it matters
+    earlier
+        answers of a verdict on some of the recordings, see `diagnosis.diagnose`
 
     Raises
     ------
@@ -75,7 +78,7 @@ def diagnose_recordings(recordings: Mapping[str, Recording], drive: Drive,
         if signal not in machine.experiments[0].channels:
             raise UserError(f'{signal}: no such signal; there are '
                             + ', '.join(machine.experiments[0].channels))
-    return diagnose(machine.without(without), progress, threads, settings, limits)
+    return diagnose(machine.without(without), progress, threads, settings, limits, earlier)
 
 
 def corrected(drive: Drive, diagnosis: Diagnosis) -> Corrected:

@@ -192,13 +192,17 @@ class Investigation:
         if number == 1 and self._first is not None:
             return {'objective': 'given', 'family': 'given',
                     'test': self._space.as_data(self._first)}
-        verdict = _read(self._path('verdict', number - 1, '.json'))
-        findings = Findings.of_data(verdict['planning']) if verdict else Findings()
+        findings = self._findings(number - 1)
         found = TestDesign(
             self._space, findings, objective_for(findings, self._settings), threads=self._threads,
             settings=self._settings, effort=self._effort, seed=self._plan.seed + number).run(
                 lambda share, doing: progress(f'design of test {number}', share))
         return as_data(found, self._space, self._settings)
+
+    def _findings(self, number: int) -> Findings:
+        """Return what the verdict after a test has told; nothing before the first one."""
+        verdict = _read(self._path('verdict', number, '.json'))
+        return Findings.of_data(verdict['planning']) if verdict else Findings()
 
     def _record(self, number: int, sheet: TestSheet, progress: Progress) -> None:
         """Run a test; the recording gets its name once it is whole."""
@@ -241,7 +245,7 @@ class Investigation:
         diagnosis: Diagnosis = diagnose_recordings(
             recordings, self._drive,
             lambda share, doing: progress(f'diagnosis after test {number}', share),
-            self._threads, self._settings)
+            self._threads, self._settings, earlier=self._findings(number - 1).rivals)
         _write(path, diagnosis.result)
         return json.loads(path.read_text(encoding='utf-8'))  # type: ignore[no-any-return]
 

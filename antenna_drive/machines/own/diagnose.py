@@ -29,8 +29,8 @@ from dataclasses import replace
 from typing import Any
 
 from antenna_drive.diagnosis import (
-    ByLabel, DEFAULT, diagnose, Diagnosis, LeastSquares, Machine, Point, Progress, Settings,
-    without_labels,
+    ByLabel, DEFAULT, diagnose, Diagnosis, LeastSquares, Machine, Point, Progress, Rival,
+    Settings, without_labels,
 )
 from antenna_drive.errors import UserError
 from antenna_drive.machines.own.declaration import Model
@@ -49,7 +49,8 @@ _LEAST_ERROR = 0.01
 def diagnose_logs(model: Model, logs: Sequence[Log],
                   progress: Progress = lambda share, doing: None, threads: int = 2,
                   settings: Settings = DEFAULT, without: Sequence[str] = (),
-                  limits: Mapping[str, float] | None = None) -> Diagnosis:
+                  limits: Mapping[str, float] | None = None,
+                  earlier: Sequence[Rival] = ()) -> Diagnosis:
     """
     Say where a machine and its model part, which effect is behind it, and how far it goes.
 
@@ -69,6 +70,8 @@ def diagnose_logs(model: Model, logs: Sequence[Log],
         effects that the catalogue shall lack
     limits
         for some readings, the remainder beyond noise from which it matters
+    earlier
+        answers of a verdict on some of the logs, see `diagnosis.diagnose`
 
     Returns
     -------
@@ -91,7 +94,7 @@ def diagnose_logs(model: Model, logs: Sequence[Log],
             raise UserError(f'{name}: no such reading{nearest(name, model.readings)}; there are '
                             f'{", ".join(model.readings)}')
     found = diagnose(machine.without(without), progress, threads,
-                     _for_derivatives_of(machine, settings), limits)
+                     _for_derivatives_of(machine, settings), limits, earlier)
     found.result['numbers'] = numbers_as_fitted(found.machine, found.best.state.point())
     found.result['pushes'] = pushes_found(found, settings)
     return found

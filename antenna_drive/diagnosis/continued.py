@@ -1,0 +1,69 @@
+# Copyright 2026 The antenna_drive authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Answers of an earlier verdict, fitted to more tests than it has seen.
+
+A test in which motors creep and stick may hold every fit that begins at the model as configured in
+a wrong minimum. An answer of the earlier tests begins near its optimum. Where the new test leaves
+much at first, the noise counts as louder for one fit: the hills between the minima are lower then
+(graduated non-convexity: A. Blake, A. Zisserman, Visual Reconstruction, 1987).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+from antenna_drive.diagnosis.hypothesis import Hypothesis
+from antenna_drive.diagnosis.least_squares import LeastSquares, settled, with_initial_conditions
+from antenna_drive.diagnosis.rivals import Rival
+
+
+def continued(problem: LeastSquares, rivals: Sequence[Rival],
+              concurrently: Callable[..., Iterable[Any]] = map) -> list[Hypothesis]:
+    """
+    Return answers of an earlier verdict as they fit all tests, at the sensors' own noise.
+
+    Two answers of the same fit are one. One whose effects the machine does not know is left out.
+
+    Parameters
+    ----------
+    problem
+        all tests, those of the earlier verdict and others
+    rivals
+        its answers
+    concurrently
+        maps a function over them
+
+    """
+    unique = {(rival.effects, rival.forms): rival for rival in rivals
+              if rival.is_known_to(problem.machine)}
+    return list(concurrently(lambda rival: _continued(problem, rival), unique.values()))
+
+
+def _continued(problem: LeastSquares, rival: Rival) -> Hypothesis:
+    machine, options = problem.machine, problem.settings.search
+    forms = tuple(rival.forms_of(machine))
+    parameters = (*machine.nuisances, *(p for form in forms for p in form.parameters))
+    names = {p.name for p in parameters}
+    point = {name: value for name, value in rival.point.items() if name in names}
+    point = with_initial_conditions(problem, point)
+    state = problem.start(parameters, point)
+    if problem.noise_level(state.residual) > options.continued_noise:
+        noisy = problem.at_scale(options.continued_noise)
+        state = noisy.fit(noisy.start(parameters, point), options.settling_iterations)
+        state = problem.start(parameters, with_initial_conditions(problem, state.point()))
+    state = settled(problem, problem.fit(state, options.settling_iterations), options,
+                    options.settling_passes, options.settling_iterations)
+    return Hypothesis(rival.effects, forms, state)
