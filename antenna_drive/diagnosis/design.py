@@ -69,7 +69,7 @@ Progress = Callable[[float, str], None]
 
 def objective_for(findings: Findings, settings: Settings = DEFAULT) -> str:
     """Return what the next test is for: a single answer, or a sure one, is to be contradicted."""
-    return SEPARATE if findings.are_open(settings.planning) else DETECT
+    return SEPARATE if findings.are_open(settings) else DETECT
 
 
 class TestSpace(ABC):

@@ -204,7 +204,7 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
                   found.doubted), found.evidence.inflation, found_noise(problem.experiments))
     healthy = decision.word == 'no_gap'
     hidden = could_hide(problem, (none if healthy else best).state, findings.inflated) if (
-        healthy or not findings.are_open(settings.planning)) else []
+        healthy or not findings.are_open(settings)) else []
     result = {
         'verdict': decision.word,
         'statements': verdict.statements(decision, best),

@@ -35,7 +35,7 @@ from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.intervals import covariance
 from antenna_drive.diagnosis.least_squares import LeastSquares
 from antenna_drive.diagnosis.machine import FloatArray, Form, Machine, Parameter, Point
-from antenna_drive.diagnosis.settings import PlanningSettings
+from antenna_drive.diagnosis.settings import PlanningSettings, Settings
 from antenna_drive.diagnosis.verdict import Answer
 import numpy as np
 from scipy.stats import truncnorm
@@ -162,10 +162,16 @@ class Findings:
     noise: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     shown: Mapping[str, float] = field(default_factory=dict)
 
-    def are_open(self, settings: PlanningSettings) -> bool:
-        """Return whether there are answers to tell apart: several, and none of them sure."""
-        return len(self.rivals) > 1 and all(
-            rival.probability < settings.sure for rival in self.rivals)
+    def are_open(self, settings: Settings) -> bool:
+        """
+        Return whether there are answers to tell apart: several, and none of them sure.
+
+        Nor is there anything to tell apart if all others have less than `unknown` has at least.
+        What is open then is whether any effect of the catalogue is true.
+        """
+        known = [rival.probability for rival in self.rivals]
+        return len(known) > 1 and max(known) < min(
+            settings.planning.sure, (1.0 - settings.verdict.least_unknown) * sum(known))
 
     def as_data(self) -> dict[str, Any]:
         """Return the findings as plain data: the entry `planning` of a verdict."""

@@ -15,7 +15,9 @@
 
 from __future__ import annotations
 
-from antenna_drive.diagnosis import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
+from antenna_drive.diagnosis import (
+    Effect, Experiment, Findings, FloatArray, Form, Machine, objective_for, Parameter, Point,
+)
 from antenna_drive.diagnosis.discrimination import separation
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.least_squares import LeastSquares
@@ -98,3 +100,16 @@ def test_bounds_far_away_or_next_to_each_other_leave_a_covariance(
     assert values[1] == pytest.approx(-3.0 + 0.5 * (values[0] - 1.0))
     assert (np.linalg.eigvalsh(covariance) > 0.0).all()
     assert covariance[0, 0] < 1e-5
+
+
+@pytest.mark.parametrize(('known', 'objective'), [
+    ([], 'detect'), ([0.64], 'detect'), ([0.95], 'detect'),
+    ([0.5, 0.45], 'separate'), ([0.89, 0.06], 'separate'), ([0.4, 0.3], 'separate'),
+    ([0.92, 0.03], 'detect'),
+    # one answer and `unknown`: the rest has next to nothing
+    ([0.64, 0.012], 'detect'), ([0.012, 0.64], 'detect')])
+def test_the_next_test_looks_beyond_what_is_as_good_as_one_answer(
+        known: list[float], objective: str) -> None:
+    rivals = [Rival((), (), (), probability, (), np.zeros(0), np.zeros((0, 0)))
+              for probability in known]
+    assert objective_for(Findings(rivals)) == objective
