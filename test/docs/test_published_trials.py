@@ -15,6 +15,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import json
 from pathlib import Path
 import re
@@ -69,21 +70,27 @@ def test_figures_of_a_wild_trial_are_those_of_its_cases(
             assert float(stated.group()) == pytest.approx(figures[key], abs=0.005001), title
 
 
-def results_of(folder: Path, name: str) -> TrialResults:
-    """Return the results of a trial that goes on, as they are published."""
-    lines = (DOCS / 'trials' / f'{name}.jsonl').read_text(encoding='utf-8')
-    (folder / FILE).write_text(lines, encoding='utf-8')
-    cases = [json.loads(line) for line in lines.splitlines()]
+def results_of(folder: Path, name: str, wanted: Callable[[str], bool] = lambda case: True,
+               ) -> TrialResults:
+    """Return the results of some cases of a trial that goes on, as they are published."""
+    cases = [case for line in (DOCS / 'trials' / f'{name}.jsonl').read_text(
+        encoding='utf-8').splitlines() if wanted((case := json.loads(line))['case'])]
+    (folder / FILE).write_text(''.join(f'{json.dumps(case)}\n' for case in cases),
+                               encoding='utf-8')
     return TrialResults(folder, {'settings': {'seed': cases[0]['seed']},
                                  'seals': [case['case'] for case in cases]})
 
 
-@pytest.mark.parametrize('trial', [1, 2, 3, 4, 5])
-def test_figures_of_third_tests_are_those_of_their_cases(trial: int, tmp_path: Path) -> None:
-    rules = third_tests.summary(results_of(tmp_path, f'next_test_{trial}'))['rules']
+def table_of(title: str, place: int = 1) -> list[list[str]]:
+    """Return the rows of a table of the page of trials, by its first title and its place."""
     text = (DOCS / 'next-test-trials.md').read_text(encoding='utf-8')
-    table = text.split('| third test |')[trial].split('\n\n')[0].splitlines()[2:]
-    rows = [[cell.strip() for cell in line.strip('|').split('|')] for line in table]
+    table = text.split(f'| {title} |')[place].split('\n\n')[0].splitlines()[2:]
+    return [[cell.strip() for cell in line.strip('|').split('|')] for line in table]
+
+
+def check_third_tests(rows: list[list[str]], results: TrialResults) -> None:
+    """Compare the rows of a table of third tests with the cases."""
+    rules = third_tests.summary(results)['rules']
     assert len(rows) == len(rules)
     for name, share, *_, left in rows:
         found = rules['best_built_in' if name.startswith('best') else name.lower()]
@@ -91,12 +98,21 @@ def test_figures_of_third_tests_are_those_of_their_cases(trial: int, tmp_path: P
         assert float(left) == found['median_set'], name
 
 
+@pytest.mark.parametrize('trial', [1, 2, 3, 4, 5])
+def test_figures_of_third_tests_are_those_of_their_cases(trial: int, tmp_path: Path) -> None:
+    check_third_tests(table_of('third test', trial),
+                      results_of(tmp_path, f'next_test_{trial}'))
+
+
+def test_figures_of_third_tests_after_a_verdict_are_those_of_their_cases(tmp_path: Path) -> None:
+    check_third_tests(table_of('third test, from case 82 on'), results_of(
+        tmp_path, 'next_test_5', lambda case: case >= 'case_0082'))
+
+
 @pytest.mark.parametrize('number', [1, 2])
 def test_figures_of_investigations_are_those_of_their_cases(number: int, tmp_path: Path) -> None:
     found = investigations.summary(results_of(tmp_path, f'investigate_{number}'))
-    text = (DOCS / 'next-test-trials.md').read_text(encoding='utf-8')
-    table = text.split('| tests of an investigation |')[number].split('\n\n')[0].splitlines()[2:]
-    rows = [[cell.strip() for cell in line.strip('|').split('|')] for line in table]
+    rows = table_of('tests of an investigation', number)
     assert {row[0].removesuffix(', confirmed') for row in rows} == set(found)
     for name, right, interval, wrong, tests, seconds in rows:
         way = name.removesuffix(', confirmed')
