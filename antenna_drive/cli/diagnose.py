@@ -29,9 +29,9 @@ For example:
 --corrected writes a configuration with the effects and the tolerances in it, as fitted;
 `antenna-drive predict` shows how well it predicts a recording that was not used here.
 
---after takes the verdict on the recordings before. What it left open is fitted to all of them
-from where it had ended, beside what is found afresh. A test in which motors creep may hide it
-otherwise.
+--after takes a verdict on some of the recordings. Its answers are fitted to all of them, each
+from where its fit had ended, beside what is found afresh. Otherwise a test in which motors creep
+may hide the true one.
 
 --model diagnoses a machine of your own, see docs/own-machine.md; `antenna-drive check-model` tells
 beforehand what is wrong with it.

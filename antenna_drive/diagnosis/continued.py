@@ -59,11 +59,10 @@ def _continued(problem: LeastSquares, rival: Rival) -> Hypothesis:
     names = {p.name for p in parameters}
     point = {name: value for name, value in rival.point.items() if name in names}
     point = with_initial_conditions(problem, point)
-    state = problem.start(parameters, point)
-    if problem.noise_level(state.residual) > options.continued_noise:
+    if problem.noise_level(problem.residuals(point)) > options.continued_noise:
         noisy = problem.at_scale(options.continued_noise)
         state = noisy.fit(noisy.start(parameters, point), options.settling_iterations)
-        state = problem.start(parameters, with_initial_conditions(problem, state.point()))
-    state = settled(problem, problem.fit(state, options.settling_iterations), options,
-                    options.settling_passes, options.settling_iterations)
-    return Hypothesis(rival.effects, forms, state)
+        point = with_initial_conditions(problem, state.point())
+    state = problem.fit(problem.start(parameters, point), options.settling_iterations)
+    return Hypothesis(rival.effects, forms, settled(
+        problem, state, options, options.settling_passes, options.settling_iterations))

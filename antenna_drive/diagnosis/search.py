@@ -84,17 +84,19 @@ class Search:
     def __init__(self, problem: LeastSquares, progress: Callable[[float, str], None],
                  threads: int = 1, earlier: Sequence[Rival] = ()) -> None:
         """Prepare to search."""
-        self._pool = ThreadPoolExecutor(threads)
+        self._pool, self._earlier = ThreadPoolExecutor(threads), earlier
         self.settings = problem.settings.search
         self.machine = problem.machine.truncated()
         self.problem = LeastSquares(self.machine, settings=problem.settings)
         self.progress = progress
         self.sensitivities: list[Sensitivity] = []
-        self._known = continued(self.problem, earlier, self._pool.map)
+        # what the earlier answers do for all tests, at the sensors' own noise
+        self._earlier_fits: list[Hypothesis] = []
 
     def run(self) -> tuple[Hypothesis, list[Hypothesis], list[Hypothesis]]:
         """Return the nuisances alone, and what one effect and two can do, each the best first."""
         self.progress(0.0, 'nuisances')
+        self._earlier_fits = continued(self.problem, self._earlier, self._pool.map)
         none, singles = self._none_and_singles()
         singles = self._at_lower_noise(singles)
         singles = self._leading_settled(singles, self._to_settle(singles[0]))
@@ -121,10 +123,9 @@ class Search:
             none, singles = freed, self._singles(freed)
         return none, singles
 
-    def _earlier(self, wanted: Callable[[int], bool]) -> list[Hypothesis]:
-        """Return what an earlier verdict has left open, with some numbers of effects."""
-        return [replace(h, state=self.problem.rescaled(h.state, 1.0))
-                for h in self._known if wanted(len(h.effects))]
+    def _earlier_answers(self) -> list[Hypothesis]:
+        """Return the earlier answers as they fit all tests, with costs at the present noise."""
+        return [replace(h, state=self.problem.rescaled(h.state, 1.0)) for h in self._earlier_fits]
 
     # -- the nuisances, and the noise ------------------------------------------------------------
 
@@ -143,7 +144,7 @@ class Search:
         names = {p.name for p in self.machine.nuisances}
         begins: list[Point] = [{}, *(
             {name: value for name, value in known.state.point().items() if name in names}
-            for known in self._known)]
+            for known in self._earlier_fits)]
         return min((with_initial_conditions(self.problem, dict(begin)) for begin in begins),
                    key=lambda point: self.problem.loss(self.problem.residuals(point)))
 
@@ -241,7 +242,8 @@ class Search:
         if self.problem.leaves_much(leading[0].state):
             leading = self._with_better(leading, self._led_by_tests(
                 none, [h.effects[0] for h in leading[:options.bases]]))
-        leading = self._with_better(leading, self._earlier(lambda count: count == 1))
+        leading = self._with_better(
+            leading, (h for h in self._earlier_answers() if len(h.effects) == 1))
         leading[:2] = self._sorted(self._settled, leading[:2])
         leading = self._with_relatives(leading)
         return [*leading[:options.bases], *(h.without_jacobian() for h in leading[options.bases:])]
@@ -401,7 +403,7 @@ class Search:
             self._take_sensitivities(best.state)
         worth = max(options.partner_gain, options.partner_gain_share * best.cost)
         found = {tuple(sorted(pair.effects)): pair
-                 for pair in self._earlier(lambda count: count > 1)}
+                 for pair in self._earlier_answers() if len(pair.effects) > 1}
         for i, base in enumerate(singles[:options.bases]):
             self.progress(0.5 + 0.2 * i / options.bases, 'pairs of effects')
             far = self._priced(base) > options.base_ratio * self._priced(best) + options.reach

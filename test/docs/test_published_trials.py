@@ -104,9 +104,13 @@ def test_figures_of_third_tests_are_those_of_their_cases(trial: int, tmp_path: P
                       results_of(tmp_path, f'next_test_{trial}'))
 
 
-def test_figures_of_third_tests_after_a_verdict_are_those_of_their_cases(tmp_path: Path) -> None:
-    check_third_tests(table_of('third test, from case 82 on'), results_of(
-        tmp_path, 'next_test_5', lambda case: case >= 'case_0082'))
+@pytest.mark.parametrize(('title', 'wanted'), [
+    ('from case 82 on', lambda case: case >= 'case_0082'),
+    ('after four cases', lambda case: case <= 'case_0027')])
+def test_figures_of_a_part_of_the_fifth_trial_are_those_of_its_cases(
+        title: str, wanted: Callable[[str], bool], tmp_path: Path) -> None:
+    check_third_tests(table_of(f'third test, {title}'),
+                      results_of(tmp_path, 'next_test_5', wanted))
 
 
 @pytest.mark.parametrize('number', [1, 2])
