@@ -119,11 +119,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _of_rules(found: Mapping[str, Any]) -> list[str]:
     lines = [f'{found["diagnosed"]} cases diagnosed, {found["open"]} of them open',
-             'rule            cases  exact top-1         set before, after  rivals  '
-             'limits exceeded']
+             'rule            cases  exact top-1         0.9 sure and right, wrong  '
+             'set before, after  rivals  limits exceeded']
     for rule, item in found['rules'].items():
         if item['cases']:
             lines.append(f'{rule:15s} {item["cases"]:5d}  {_share(item["top1"], item["ci95"])}    '
+                         f'{item["sure"]["right"]}, {item["sure"]["wrong"]}{"":22s}'
                          f'{item["median_set_before"]:g}, {item["median_set"]:g}               '
                          f'{item["median_rivals_before"]:g}, {item["median_rivals"]:g}    '
                          f'{item["violations"]}')

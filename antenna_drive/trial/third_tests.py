@@ -49,6 +49,7 @@ FIRST = ('rec_a', 'rec_b')
 # An answer is open below the first probability. Answers with the second one or more are left: no
 # verdict gives 'unknown' less than 0.05, and that alone is no second answer.
 OPEN, IN_SET = 0.7, 0.06
+SURE = 0.9
 DESIGNED: Mapping[str, Sequence[str]] = {
     'proposed': (), 'd-optimal': ('--rule', 'd-optimal'), 'random': ('--rule', 'random')}
 BUILT_IN: Mapping[str, Callable[[np.random.Generator], dict[str, Any]]] = {
@@ -223,9 +224,10 @@ def summary(results: TrialResults) -> dict[str, Any]:
     """
     Return what the third tests of a trial told, as far as it has got.
 
-    For each rule: `cases`, exact `top1` with `ci95`, the `median_set` before and after, with
-    'unknown' as an answer, the same without it as `median_rivals` (NaN for trials that did not
-    count them), and `violations`, tests that exceeded a limit on the independent antenna.
+    For each rule: `cases`, exact `top1` with `ci95`, how many first answers of 0.9 or more were
+    right and how many wrong (`sure`), the `median_set` before and after, with 'unknown' as an
+    answer, the same without it as `median_rivals` (NaN for trials that did not count them), and
+    `violations`, tests that exceeded a limit on the independent antenna.
     `best_built_in` takes in each case the best of the standard kinds, in hindsight. `before` says
     of how many of the cases with third tests the first answer was right without one. `promise`
     compares what a proposal expected for the true answer with the share that it got of what
@@ -252,6 +254,9 @@ def summary(results: TrialResults) -> dict[str, Any]:
         found['rules'][rule] = {
             'cases': share.cases, 'failures': len(items) - len(judged),
             'top1': share.value, 'ci95': [share.low, share.high],
+            'sure': {key: sum(item['right'] == right and item['probability'] >= SURE
+                              for _, item in judged)
+                     for key, right in (('right', True), ('wrong', False))},
             'violations': sum(any(item['reached'][key] > limit for key, limit in item.get(
                 'limits', {}).items() if key in item['reached'])
                 for _, item in judged if 'reached' in item)}

@@ -128,6 +128,16 @@ def test_open_cases_get_third_tests_on_the_independent_antenna_and_a_trial_goes_
     assert len(commands.words) == asked + 2  # the verdict on two recordings, and that on three
 
 
+def test_sure_answers_are_counted_by_whether_they_are_right(tmp_path: Path) -> None:
+    manifest = batch.prepare(tmp_path, **SETTINGS, wild=True)  # type: ignore[arg-type]
+    results = TrialResults(tmp_path, manifest)
+    for name, right, probability in (
+            ('case_0001', True, 0.95), ('case_0002', True, 0.89), ('case_0003', False, 0.9)):
+        results.put(name, open=True, tests={'random': {
+            'right': right, 'set': 2, 'probability': probability, 'kind': 'single'}})
+    assert summary(results)['rules']['random']['sure'] == {'right': 1, 'wrong': 1}
+
+
 def test_a_promise_is_compared_with_what_unknown_has_left(tmp_path: Path) -> None:
     manifest = batch.prepare(tmp_path, **SETTINGS, wild=True)  # type: ignore[arg-type]
     results = TrialResults(tmp_path, manifest)
