@@ -17,12 +17,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from antenna_drive.diagnosis import LeastSquares
+from antenna_drive.diagnosis import LeastSquares, with_initial_conditions
 from antenna_drive.machines.antenna.field_test import BIAS
 from antenna_drive.machines.antenna.machine import AntennaMachine
 from antenna_drive.machines.antenna.planned_tests import BUILT_IN, planned
 from antenna_drive.parameters import load
-from antenna_drive.recording.sheet import FixedStepBias
+from antenna_drive.recording.sheet import FixedBias, FixedStepBias
 import numpy as np
 import pytest
 
@@ -90,6 +90,20 @@ def test_a_source_of_bias_that_is_off_gives_as_much_more() -> None:
         expected = np.where(drive.experiments[0].time < 1.0, 0.0, 6.0 * (1.0 + share))
         away = np.abs(drive.experiments[0].time - 1.0) > 1e-9
         assert shown[away, BIAS] == pytest.approx(expected[away], abs=1e-12)
+
+
+@pytest.mark.parametrize('places', [(0.1, -0.9), (-0.6, -0.6), (0.3, 0.9)])
+def test_both_motors_are_found_where_they_start_when_a_bias_closes_their_gaps_at_once(
+        places: tuple[float, float]) -> None:
+    sheet = replace(BUILT_IN['square'], bias=FixedBias(voltage_V=8.5))
+    drive = AntennaMachine({'biased': planned(sheet, 2.0, 200.0)}, load(), threads=1)
+    names = [f'start:biased.{motor}' for motor in ('motor_1', 'motor_2')]
+    shown = drive.simulate([dict(zip(names, places, strict=True))])[0][0]
+    assert shown is not None
+    drive.experiments = (replace(drive.experiments[0], measured=shown),)
+    found = with_initial_conditions(LeastSquares(drive), {})
+    # to a step between the places that are tried
+    assert [found.get(name, 0.0) for name in names] == pytest.approx(list(places), abs=0.16)
 
 
 def test_an_effect_takes_over_the_tolerance_of_its_own_number(model: AntennaMachine) -> None:

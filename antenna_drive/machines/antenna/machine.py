@@ -20,6 +20,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 import copy
 from dataclasses import dataclass, replace
+from itertools import product
 import math
 from statistics import fmean
 from threading import Lock
@@ -261,10 +262,16 @@ class AntennaMachine(Machine):
                       load_limit=2.0 * limit)
 
     def initial_conditions(self, experiment: int) -> Sequence[Sequence[Point]]:
-        """Return starting places of each motor inside its gap, and of the first one again."""
+        """
+        Return starting places of both motors inside their gaps.
+
+        All combinations: where a bias closes both gaps at once, each motor's place looks right
+        or wrong by the other's. One after the other they end in a wrong pair.
+        """
         first, second = (item.name for item in starting_places(
             experiment, self._tests[experiment]))
-        return [[{name: place} for place in _STARTS.tolist()] for name in (first, second, first)]
+        return [[{first: one, second: other}
+                 for one, other in product(_STARTS.tolist(), repeat=2)]]
 
     # -- effects -------------------------------------------------------------------------------
 
