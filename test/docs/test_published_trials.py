@@ -92,10 +92,13 @@ def check_third_tests(rows: list[list[str]], results: TrialResults) -> None:
     """Compare the rows of a table of third tests with the cases."""
     rules = third_tests.summary(results)['rules']
     assert len(rows) == len(rules)
-    for name, share, *_, left in rows:
+    for name, share, *between, left in rows:
         found = rules['best_built_in' if name.startswith('best') else name.lower()]
         assert share == f'{round(found["top1"] * found["cases"])} of {found["cases"]}', name
         assert float(left) == found['median_set'], name
+        if len(between) > 1:
+            assert between[1] == '{right}, {wrong}'.format(**found['sure']), name
+            assert float(between[2]) == found['median_rivals'], name
 
 
 @pytest.mark.parametrize('trial', [1, 2, 3, 4, 5])
@@ -105,11 +108,13 @@ def test_figures_of_third_tests_are_those_of_their_cases(trial: int, tmp_path: P
 
 
 @pytest.mark.parametrize(('title', 'wanted'), [
-    ('from case 82 on', lambda case: case >= 'case_0082'),
-    ('after four cases', lambda case: case <= 'case_0027')])
+    ('third test, from case 82 on', lambda case: case >= 'case_0082'),
+    ('third test, after 16 cases', lambda case: case <= 'case_0089'),
+    ('third test, cases 82 to 89', lambda case: 'case_0082' <= case <= 'case_0089'),
+    ('third test, after four cases', lambda case: case <= 'case_0027')])
 def test_figures_of_a_part_of_the_fifth_trial_are_those_of_its_cases(
         title: str, wanted: Callable[[str], bool], tmp_path: Path) -> None:
-    check_third_tests(table_of(f'third test, {title}'),
+    check_third_tests(table_of(title),
                       results_of(tmp_path, 'next_test_5', wanted))
 
 
