@@ -124,7 +124,7 @@ def _of_rules(found: Mapping[str, Any]) -> list[str]:
     for rule, item in found['rules'].items():
         if item['cases']:
             lines.append(f'{rule:15s} {item["cases"]:5d}  {_share(item["top1"], item["ci95"])}    '
-                         f'{item["sure"]["right"]}, {item["sure"]["wrong"]}{"":22s}'
+                         f'{"{right}, {wrong}".format(**item["sure"]):27s}'
                          f'{item["median_set_before"]:g}, {item["median_set"]:g}               '
                          f'{item["median_rivals_before"]:g}, {item["median_rivals"]:g}    '
                          f'{item["violations"]}')

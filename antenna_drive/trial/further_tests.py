@@ -27,6 +27,8 @@ from antenna_drive.trial.sensors import COLUMNS
 import numpy as np
 
 DURATION_S = 30.0
+# probability from which an answer is sure
+SURE = 0.9
 
 
 def known(truth: Truth) -> dict[str, Any]:

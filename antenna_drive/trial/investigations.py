@@ -36,7 +36,7 @@ from antenna_drive.subcommand import run_command
 from antenna_drive.trial import programme, sealing
 from antenna_drive.trial.batch import diagnose_recordings, Done
 from antenna_drive.trial.cases import Truth
-from antenna_drive.trial.further_tests import DURATION_S, known, record_test, with_test
+from antenna_drive.trial.further_tests import DURATION_S, known, record_test, SURE, with_test
 from antenna_drive.trial.results import TrialResults
 from antenna_drive.trial.scorecard import Case, rate
 from antenna_drive.trial.third_tests import answer_of, RULES
@@ -46,7 +46,7 @@ import yaml
 
 STANDARD = {'square': programme.slow_square, 'triangle': programme.fast_triangle,
             'multisine': programme.multisine}
-MOST_TESTS, UNTIL = 4, 0.9
+MOST_TESTS = 4
 WAYS = ('designed', 'standard')
 _FIRST_PLACE = len(RULES)
 
@@ -109,7 +109,7 @@ def _designed(folder: Path, truth: Truth, limit: float) -> dict[str, Any]:
           '--sheet', '{sheet}', '--out', '{out}', '--duration', '{duration}',
           '--number', '{number}']
     said = run_command(['investigate', '--out', str(out), '--sheet', str(sheet), '--by',
-                        shlex.join(by), '--max-tests', str(MOST_TESTS), '--until', f'{UNTIL:g}',
+                        shlex.join(by), '--max-tests', str(MOST_TESTS), '--until', f'{SURE:g}',
                         '--duration', f'{DURATION_S:g}', '--jobs', '1', '--quiet', '--json',
                         str(case / 'story.json')], 2.0 * MOST_TESTS * limit)
     if not (case / 'story.json').exists():
@@ -155,7 +155,7 @@ def until_sure(answers: Sequence[Mapping[str, Any]], alike: int = 1) -> tuple[fl
     """
     for number, answer in enumerate(answers, 1):
         last = answers[max(number - alike, 0):number]
-        if answer['probability'] >= UNTIL and len(last) == alike and all(
+        if answer['probability'] >= SURE and len(last) == alike and all(
                 other['first'] == answer['first'] for other in last):
             return float(number), bool(answer['right'])
     return math.inf, False

@@ -34,7 +34,7 @@ from antenna_drive.trial import programme, sealing
 from antenna_drive.trial.batch import diagnose_recordings, Done, make_case
 from antenna_drive.trial.cases import Truth
 from antenna_drive.trial.further_tests import (
-    DURATION_S, known, reached, record_test, with_test,
+    DURATION_S, known, reached, record_test, SURE, with_test,
 )
 from antenna_drive.trial.results import TrialResults
 from antenna_drive.trial.scorecard import Case, rate
@@ -49,7 +49,6 @@ FIRST = ('rec_a', 'rec_b')
 # An answer is open below the first probability. Answers with the second one or more are left: no
 # verdict gives 'unknown' less than 0.05, and that alone is no second answer.
 OPEN, IN_SET = 0.7, 0.06
-SURE = 0.9
 DESIGNED: Mapping[str, Sequence[str]] = {
     'proposed': (), 'd-optimal': ('--rule', 'd-optimal'), 'random': ('--rule', 'random')}
 BUILT_IN: Mapping[str, Callable[[np.random.Generator], dict[str, Any]]] = {
@@ -224,8 +223,8 @@ def summary(results: TrialResults) -> dict[str, Any]:
     """
     Return what the third tests of a trial told, as far as it has got.
 
-    For each rule: `cases`, exact `top1` with `ci95`, how many first answers of 0.9 or more were
-    right and how many wrong (`sure`), the `median_set` before and after, with 'unknown' as an
+    For each rule: `cases`, exact `top1` with `ci95`, how many of the sure first answers were right
+    and how many wrong (`sure`), the `median_set` before and after, with 'unknown' as an
     answer, the same without it as `median_rivals` (NaN for trials that did not count them), and
     `violations`, tests that exceeded a limit on the independent antenna.
     `best_built_in` takes in each case the best of the standard kinds, in hindsight. `before` says

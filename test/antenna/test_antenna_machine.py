@@ -102,7 +102,7 @@ def test_both_motors_are_found_where_they_start_when_a_bias_closes_their_gaps_at
     assert shown is not None
     drive.experiments = (replace(drive.experiments[0], measured=shown),)
     found = with_initial_conditions(LeastSquares(drive), {})
-    # to a step between the places that are tried
+    # within one step of the places that are tried
     assert [found.get(name, 0.0) for name in names] == pytest.approx(list(places), abs=0.16)
 
 

@@ -114,8 +114,7 @@ def test_figures_of_third_tests_are_those_of_their_cases(trial: int, tmp_path: P
     ('third test, after four cases', lambda case: case <= 'case_0027')])
 def test_figures_of_a_part_of_the_fifth_trial_are_those_of_its_cases(
         title: str, wanted: Callable[[str], bool], tmp_path: Path) -> None:
-    check_third_tests(table_of(title),
-                      results_of(tmp_path, 'next_test_5', wanted))
+    check_third_tests(table_of(title), results_of(tmp_path, 'next_test_5', wanted))
 
 
 @pytest.mark.parametrize('number', [1, 2])
