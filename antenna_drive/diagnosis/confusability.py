@@ -24,10 +24,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 import math
 from typing import Any
 
-from antenna_drive.diagnosis.box_qp import box_constrained_step
+from antenna_drive.diagnosis.box_qp import BoxQuadratic
 from antenna_drive.diagnosis.cholesky import factored, ROUNDING, solved
 from antenna_drive.diagnosis.least_squares import (
     FitState, LeastSquares, prior_precision, proper_precision,
@@ -40,8 +41,6 @@ from scipy.optimize import brentq
 
 # a size is told to this share of itself
 _SHARE = 0.01
-# nothing that is left, for its logarithm [half chi-square]
-_LEAST_LEFT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -165,26 +164,9 @@ class _Imitation:
     def __init__(self, state: FitState, derivative_error: float) -> None:
         self._error = derivative_error
         self._hessian = state.hessian + np.diag(prior_precision(state.parameters))
-        self._low = np.array([p.low for p in state.parameters]) - state.x
-        self._high = np.array([p.high for p in state.parameters]) - state.x
-
-    def left(self, size: float, power: float, cross: FloatArray) -> float:
-        """
-        Return what is surely left of an effect, in halves of a chi-square.
-
-        Parameters
-        ----------
-        size
-            of the effect
-        power, cross
-            products of its column with itself and with those of the nuisances, shape (m,)
-
-        """
-        gradient = -size * cross
-        step = box_constrained_step(self._hessian, gradient, self._low, self._high)
-        whole = 0.5 * size ** 2 * power
-        imitated = float(gradient @ step - 0.5 * step @ self._hessian @ step)
-        return whole * (1.0 - self._error ** 2) - imitated
+        self._programme = BoxQuadratic(
+            self._hessian, np.array([p.low for p in state.parameters]) - state.x,
+            np.array([p.high for p in state.parameters]) - state.x)
 
     def least_visible(self, number: Parameter, power: float, cross: FloatArray,
                       price: float) -> float:
@@ -192,28 +174,54 @@ class _Imitation:
         Return the size from which an effect is named, whichever sign it has.
 
         It is then larger than its tolerance, and more than its price is left of it.
+
+        Parameters
+        ----------
+        number
+            the effect's first
+        power, cross
+            products of its column with itself and with those of the nuisances, shape (m,)
+        price
+            in halves of a chi-square
+
         """
         # where nothing imitates it; a little less, so that rounding does not make it visible
         least = (1.0 - _SHARE) * math.sqrt(2.0 * price / power) if power > 0.0 else math.inf
         least = max(least, number.tolerance)
 
         def of_sign(sign: float, bound: float) -> float:
-            def surplus(log_size: float) -> float:
-                left = self.left(sign * math.exp(log_size), power, cross)
-                return math.log(max(left, _LEAST_LEFT) / price)
+            step: FloatArray | None = None
+
+            @cache
+            def surplus(size: float) -> float:
+                nonlocal step
+                left, step = self._left(sign * size, power, cross, step)
+                return left - price
 
             if bound <= least:
                 return math.inf
-            low, high = math.log(least), math.log(bound)
-            if surplus(low) >= 0.0:
+            if surplus(least) >= 0.0:
                 return least
-            if surplus(high) < 0.0:
-                return math.inf
-            # what is left over the square of the size grows with it, so there is one such size
-            return math.exp(brentq(surplus, low, high, xtol=_SHARE))
+            # What is left over the square of the size grows with it, so there is one such size. It
+            # is approached from below in small steps, each of which helps with the next.
+            low, high = least, least
+            while surplus(high) < 0.0:
+                if high >= bound:
+                    return math.inf
+                low, high = high, min(2.0 * high, bound)
+            return float(brentq(surplus, low, high, xtol=_SHARE * low))
 
         return max(of_sign(sign, bound)
                    for sign, bound in ((-1.0, -number.low), (1.0, number.high)) if bound > 0.0)
+
+    def _left(self, size: float, power: float, cross: FloatArray,
+              near: FloatArray | None) -> tuple[float, FloatArray]:
+        """Return what is surely left of a size, in halves of a chi-square, and who imitates it."""
+        gradient = -size * cross
+        step = self._programme.step(gradient, near)
+        whole = 0.5 * size ** 2 * power
+        imitated = float(gradient @ step - 0.5 * step @ self._hessian @ step)
+        return whole * (1.0 - self._error ** 2) - imitated, step
 
 
 def could_hide(problem: LeastSquares, state: FitState,

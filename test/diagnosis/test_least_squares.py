@@ -22,7 +22,7 @@ from typing import Any
 from antenna_drive.diagnosis import (
     Effect, Experiment, FloatArray, Form, LeastSquares, Machine, Parameter, Point,
 )
-from antenna_drive.diagnosis.box_qp import box_constrained_step
+from antenna_drive.diagnosis.box_qp import box_constrained_step, BoxQuadratic
 from antenna_drive.diagnosis.least_squares import led, robust_loss, robust_weight, settled
 from antenna_drive.diagnosis.settings import DEFAULT
 from hypothesis import given, settings
@@ -202,6 +202,18 @@ def test_box_constrained_step_agrees_with_an_independent_solver(m: Any, seed: An
 
     assert np.all(step >= low) and np.all(step <= high)
     assert cost(step) <= cost(best.x) + 1e-6 * (1.0 + cost(best.x))
+
+
+@given(st.integers(1, 12), st.integers(0, 10_000), st.floats(-3.0, 3.0))
+@settings(max_examples=60, deadline=None)
+def test_a_step_is_the_same_wherever_its_search_begins(m: Any, seed: Any, size: Any) -> None:
+    random = np.random.default_rng(seed)
+    matrix, target = random.normal(size=(3 * m, m)), random.normal(size=3 * m) * 3.0
+    programme = BoxQuadratic(matrix.T @ matrix, -random.uniform(0.0, 1.0, m),
+                             random.uniform(0.01, 1.0, m))
+    near = programme.step(matrix.T @ target)
+    gradient = size * (matrix.T @ (target + random.normal(size=3 * m)))
+    assert programme.step(gradient, near) == pytest.approx(programme.step(gradient), abs=1e-5)
 
 
 @given(st.integers(2, 12), st.integers(0, 10_000))
