@@ -296,7 +296,8 @@ class TestDesign:
                     refused[test.tightest[0]] = refused.get(test.tightest[0], 0) + 1
             allowed = [test for test in screened if self._allowed(test)]
             if self._objective == RANDOM:
-                return self._proposal(allowed[:1], refused, (), len(drawn))
+                chosen = self._random.permutation(len(allowed))[:1]
+                return self._proposal([allowed[i] for i in chosen], refused, (), len(drawn))
             progress(0.3, 'the best with all tolerances free')
             judged = self._compared(pool.map(self._judge, _of_each_family(
                 allowed, effort.judged)))

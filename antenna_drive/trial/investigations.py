@@ -110,6 +110,8 @@ def _designed(folder: Path, truth: Truth, limit: float) -> dict[str, Any]:
           '--number', '{number}']
     said = run_command(['investigate', '--out', str(out), '--sheet', str(sheet), '--by',
                         shlex.join(by), '--max-tests', str(MOST_TESTS), '--until', f'{SURE:g}',
+                        # an investigation adds the number of the test
+                        '--seed', str(10 * truth['seed'][-1]),
                         '--duration', f'{DURATION_S:g}', '--jobs', '1', '--quiet', '--json',
                         str(case / 'story.json')], 2.0 * MOST_TESTS * limit)
     if not (case / 'story.json').exists():

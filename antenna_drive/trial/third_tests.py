@@ -182,7 +182,8 @@ def _third_test(case: Path, truth: Truth, rule: str, limit: float,
         proposal: dict[str, Any] = {}
     else:
         said = run_command(['propose', str(case / TWO), '--duration', f'{DURATION_S:g}',
-                            '--jobs', '1', '--out', str(case / f'{name}.yaml'),
+                            '--jobs', '1', '--seed', str(truth['seed'][-1]),
+                            '--out', str(case / f'{name}.yaml'),
                             '--json', str(case / f'{rule}.json'), *DESIGNED[rule]], limit)
         if not (case / f'{rule}.json').exists():
             return {'failure': one_line(said, 300)}

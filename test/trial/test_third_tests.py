@@ -116,6 +116,9 @@ def test_open_cases_get_third_tests_on_the_independent_antenna_and_a_trial_goes_
     healthy = not sealing.open_truth(tmp_path, 'case_0002', manifest)['effects']
     assert found['before'] == {'cases': 1, 'right': healthy}, 'after two it is called healthy'
     assert (tmp_path / 'case_0002/rec_proposed.csv').exists()
+    # tests of another case are drawn anew
+    assert {words[words.index('--seed') + 1] for words in commands.words
+            if words[0] == 'propose'} == {'2'}
     asked = len(commands.words)
     assert run_trial(tmp_path, manifest, 2, 1, 60.0, rules=rules) == found
     assert len(commands.words) == asked
