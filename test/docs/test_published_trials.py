@@ -107,6 +107,15 @@ def test_figures_of_third_tests_are_those_of_their_cases(trial: int, tmp_path: P
                       results_of(tmp_path, f'next_test_{trial}'))
 
 
+def test_the_random_tests_of_five_trials_were_of_the_kind_that_the_page_says(
+        tmp_path: Path) -> None:
+    kinds = [case['tests']['random']['family'] for trial in range(1, 6)
+             for results in [results_of(tmp_path, f'next_test_{trial}')]
+             for case in map(results.__getitem__, results) if 'random' in case.get('tests', {})]
+    text = ' '.join((DOCS / 'next-test-trials.md').read_text(encoding='utf-8').split())
+    assert f'a triangle in {kinds.count("triangle")} of {len(kinds)} cases' in text
+
+
 @pytest.mark.parametrize(('title', 'wanted'), [
     ('third test, from case 82 on', lambda case: case >= 'case_0082'),
     ('third test, after 16 cases', lambda case: case <= 'case_0089'),
