@@ -47,6 +47,8 @@ import numpy as np
 SEPARATE, SHARPEN, DETECT = OBJECTIVES = ('separate', 'sharpen', 'detect')
 # Rules to compare with: all numbers of the likeliest rival sharpened alike, and none at all.
 D_OPTIMAL, RANDOM = 'd-optimal', 'random'
+# in which the sizes count at which effects show
+_BY_SIZES = (SEPARATE, DETECT)
 CRITERIA: Mapping[str, str] = {
     SEPARATE: 'T-optimality with prior probabilities: expected information between the rivals, '
               'all tolerances free (Atkinson and Fedorov 1975; Ponce de Leon and Atkinson 1991); '
@@ -220,6 +222,7 @@ class Proposal:
     alike : pairs of rivals that no judged test tells apart, with what no sensor reads in which
         they differ, the greatest difference first
     tried : number of tests that were simulated
+    unnamed : where something without a name may act, see `Findings`
 
     """
 
@@ -231,6 +234,7 @@ class Proposal:
     beyond: Sequence[Judged] = ()
     alike: Sequence[tuple[int, int, Mapping[str, float]]] = ()
     tried: int = 0
+    unnamed: Mapping[str, float] = field(default_factory=dict)
 
 
 class TestDesign:
@@ -323,7 +327,8 @@ class TestDesign:
                   beyond: Sequence[Judged], tried: int, judged: Sequence[Judged] = (),
                   ) -> Proposal:
         return Proposal(self._objective, CRITERIA[self._objective], self._rivals, tests, refused,
-                        beyond, self._alike(judged), tried)
+                        beyond, self._alike(judged), tried,
+                        self._findings.unnamed if self._objective in _BY_SIZES else {})
 
     def _allowed(self, test: Judged) -> bool:
         return test.tightest[1] <= self._effort.margin
@@ -440,10 +445,26 @@ class TestDesign:
     def _compared(self, tests: Iterable[Judged]) -> list[Judged]:
         """Return judged tests by their scores, the best first."""
         found = list(tests)
-        if self._objective in (SEPARATE, DETECT):
+        if self._objective in _BY_SIZES:
             found = [replace(test, coarseness=coarseness, score=self._compound(test, coarseness))
-                     for test, coarseness in zip(found, _coarseness(found), strict=True)]
+                     for test, coarseness in zip(
+                         found, _coarseness(found, self._weights(found)), strict=True)]
         return sorted(found, key=lambda test: -test.score)
+
+    def _weights(self, tests: Sequence[Judged]) -> FloatArray:
+        """Return how likely each effect is what has no name yet, as far as the verdict says."""
+        names = list(tests[0].sizes) if tests else []
+        weight = np.ones(len(names)) / max(len(names), 1)
+        if not self._findings.unnamed or not names:
+            return weight
+        effects = self._space.machine(tests[0].test).effects
+        own = {part: np.array([effects[name].component == part for name in names])
+               for part in self._findings.unnamed}
+        known = {part: share for part, share in self._findings.unnamed.items() if own[part].any()}
+        weight *= 1.0 - sum(known.values())
+        for part, share in known.items():
+            weight += share * own[part] / np.count_nonzero(own[part])
+        return weight
 
     def _compound(self, test: Judged, coarseness: float) -> float:
         """
@@ -482,16 +503,17 @@ class TestDesign:
         return dict(sorted(unread.items(), key=lambda item: -item[1]))
 
 
-def _coarseness(tests: Sequence[Judged]) -> list[float]:
+def _coarseness(tests: Sequence[Judged], weights: FloatArray) -> list[float]:
     """Return for each test the sizes that show, over the least of all, in the geometric mean."""
     if not tests:
         return []
     sizes = np.array([[size for size, _ in test.sizes.values()] for test in tests])
-    shown = sizes[:, np.isfinite(sizes).any(axis=0)]
-    if not shown.size:
+    seen = np.isfinite(sizes).any(axis=0)
+    if not seen.any():
         return [1.0] * len(tests)
+    shown = sizes[:, seen]
     over = np.minimum(shown / shown.min(axis=0), _NEVER)
-    return np.exp(np.mean(np.log(over), axis=1)).tolist()
+    return np.exp(np.average(np.log(over), axis=1, weights=weights[seen])).tolist()
 
 
 def _of_each_family(tests: Sequence[Judged], most: int) -> list[Judged]:

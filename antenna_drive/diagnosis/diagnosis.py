@@ -194,14 +194,18 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
     problem, none, best, decision = found.problem, found.none, found.best, found.decision
     places: Sequence[unknown_input.Place] = ()
     located: Sequence[localisation.Located] = ()
+    parts: Mapping[str, float] = {}
     if decision.word in ('unknown_effect', 'partly_explained'):
         progress(0.95, 'where an unknown input may act')
-        located, places = localisation.of_the_unknown(problem, none.state, decision.lack)
+        located, places, parts = localisation.of_the_unknown(
+            problem, none.state, decision.lack)
     if decision.word in ('explained', 'partly_explained'):
         located = localisation.of_effects(problem, decision.answers, none.state, best.state)
     findings = Findings(
         rivals_of(problem, decision.answers, found.evidence.inflation, settings.planning,
-                  found.doubted), found.evidence.inflation, found_noise(problem.experiments))
+                  found.doubted), found.evidence.inflation, found_noise(problem.experiments),
+        unnamed={part: decision.unknown * share for part, share in parts.items()
+                 if share >= settings.localisation.least_share})
     healthy = decision.word == 'no_gap'
     hidden = could_hide(problem, (none if healthy else best).state, findings.inflated) if (
         healthy or not findings.are_open(settings)) else []

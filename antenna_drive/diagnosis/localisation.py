@@ -58,9 +58,10 @@ def of_effects(problem: LeastSquares, answers: Sequence[Answer], none: FitState,
 
 
 def of_the_unknown(problem: LeastSquares, none: FitState,
-                   lack: LackOfFit) -> tuple[list[Located], list[unknown_input.Place]]:
+                   lack: LackOfFit) -> tuple[
+                       list[Located], list[unknown_input.Place], dict[str, float]]:
     """
-    Return where something lies that no effect names, and where it may act.
+    Return where something lies that no effect names, where it may act, and in which parts.
 
     Parameters
     ----------
@@ -71,6 +72,10 @@ def of_the_unknown(problem: LeastSquares, none: FitState,
     lack
         what the best hypothesis leaves: what is too fast for a pulse, or repeats itself, shows
         in one reading, and is put there
+
+    Returns
+    -------
+    where, as in a verdict; the places, the likeliest first; and how likely each part is
 
     """
     settings = problem.settings
@@ -83,8 +88,9 @@ def of_the_unknown(problem: LeastSquares, none: FitState,
     elif lack.regular > settings.verdict.regular:
         parts = {lack.most_regular: 1.0}
     else:
-        return [], found
-    return _located(problem, parts, lambda k: problem.residuals_of(none, k) ** 2 - 1.0), found
+        return [], found, {}
+    located = _located(problem, parts, lambda k: problem.residuals_of(none, k) ** 2 - 1.0)
+    return located, found, parts
 
 
 def _located(problem: LeastSquares, parts: Mapping[str, float],

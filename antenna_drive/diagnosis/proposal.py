@@ -58,7 +58,8 @@ def as_data(proposal: Proposal, space: TestSpace, settings: Settings = DEFAULT) 
         'rivals': [{'effects': list(rival.named) or ['none'], 'probability': rival.probability}
                    for rival in rivals],
         'tried': proposal.tried, 'refused': dict(proposal.refused),
-        'limits': dict(space.limits), 'helps': bool(proposal.tests), 'test': None}
+        'unnamed': dict(proposal.unnamed), 'limits': dict(space.limits),
+        'helps': bool(proposal.tests), 'test': None}
     if proposal.tests:
         best = proposal.tests[0]
         found |= {'family': best.family, 'test': space.as_data(best.test),
@@ -161,6 +162,11 @@ def _promises(data: Mapping[str, Any]) -> list[str]:
         found.append('  if none of them is true: it shows other effects from '
                      f'{data["sizes_over_least"]:.1f} times the least size of all tests that were '
                      'judged (in the mean)')
+    parts = sorted(data.get('unnamed', {}).items(), key=lambda item: -item[1])
+    if parts:
+        found.append('  what has no name yet may lie in ' + ', '.join(
+            f'{part} ({100.0 * share:.0f} %)' for part, share in parts)
+            + '; effects there count most')
     for name, item in list(data.get('deviations', {}).items())[:_SIZES]:
         found.append(f'  {name}: standard deviation {item["before"]:.3g} now, '
                      f'{item["after"]:.3g} after')

@@ -154,6 +154,8 @@ class Findings:
     noise : of each sensor, see `noise.found_noise`; by default that of its data sheet
     shown : smallest size at which an effect shows in these tests, in the unit of its first
         parameter, by effect; where answers are open nobody asks for it
+    unnamed : probability that something without a name acts in a part of the machine, by part;
+        what they leave of 1 is spread over the whole catalogue
 
     """
 
@@ -161,6 +163,7 @@ class Findings:
     inflated: float = 1.0
     noise: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     shown: Mapping[str, float] = field(default_factory=dict)
+    unnamed: Mapping[str, float] = field(default_factory=dict)
 
     def are_open(self, settings: Settings) -> bool:
         """
@@ -176,6 +179,7 @@ class Findings:
     def as_data(self) -> dict[str, Any]:
         """Return the findings as plain data: the entry `planning` of a verdict."""
         return {'inflation': self.inflated, 'noise': dict(self.noise), 'shown': dict(self.shown),
+                'unnamed': dict(self.unnamed),
                 'rivals': [rival.as_data() for rival in self.rivals]}
 
     @classmethod
@@ -183,7 +187,8 @@ class Findings:
         """
         Take the findings from the entry `planning` of a verdict.
 
-        A verdict of an earlier version lacks noise, doubts or what has shown, which is no error.
+        A verdict of an earlier version lacks noise, doubts, what has shown or where something
+        unnamed may be, which is no error.
 
         Raises
         ------
@@ -192,7 +197,8 @@ class Findings:
         """
         return cls([Rival.of_data(item) for item in planning['rivals']],
                    float(planning['inflation']), dict(planning.get('noise', {})),
-                   {effect: float(size) for effect, size in planning.get('shown', {}).items()})
+                   {effect: float(size) for effect, size in planning.get('shown', {}).items()},
+                   {part: float(share) for part, share in planning.get('unnamed', {}).items()})
 
 
 def rivals_of(problem: LeastSquares, answers: Sequence[Answer], inflated: float,

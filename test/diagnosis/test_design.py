@@ -292,12 +292,36 @@ def test_what_the_tests_so_far_have_shown_counts_for_no_further_test() -> None:
     assert found({'lever.expansion': 9.0}).test[1]
 
 
+@pytest.mark.parametrize(('unnamed', 'share'), [
+    ({}, 0.25), ({'lever': 0.8}, 0.2 / 4), ({'hinge': 0.8}, 0.25), ({'oven': 0.8}, 0.8 + 0.2 / 4)])
+def test_the_next_test_shows_the_part_where_something_without_a_name_may_lie(
+        unnamed: Mapping[str, float], share: float) -> None:
+    class Faint(Heated):
+        """An oven with hardly any load: a hot test shows the expansion, and little else."""
+
+        def machine(self, test: Any) -> Lever:
+            load, hot = test
+            lever = super().machine((load / 50.0 if hot else load, hot))
+            lever.effects = {**lever.effects, EXPANSION.id: replace(EXPANSION, component='oven')}
+            return lever
+
+    found = TestDesign(Faint(1.6), Findings(unnamed=unnamed), 'detect', effort=SMALL).run()
+    asked = 'oven' in unnamed
+    assert found.tests[0].test[1] == asked
+    cold = next(test for test in found.tests if not test.test[1])
+    # the expansion, one effect of four, counts as a thousand times too large in the cold
+    assert cold.coarseness == pytest.approx(1000.0 ** share, rel=0.3)
+    said = lines(as_data(found, Faint(1.6)))
+    assert any('may lie in oven (80 %)' in line for line in said) == asked
+
+
 def test_findings_come_back_from_the_file_of_a_verdict() -> None:
-    findings = Findings(HARD, 2.5, {'y': {'white': 0.1}}, {'lever.copy': 0.3})
+    findings = Findings(HARD, 2.5, {'y': {'white': 0.1}}, {'lever.copy': 0.3}, {'lever': 0.4})
     again = Findings.of_data(json.loads(json.dumps(findings.as_data())))
     assert again.as_data() == findings.as_data()
     assert again.shown == {'lever.copy': 0.3} and again.inflated == 2.5
-    # an earlier version wrote neither noise nor what has shown
+    assert again.unnamed == {'lever': 0.4}
+    # an earlier version wrote no noise, nor what has shown, nor where the unnamed may lie
     assert Findings.of_data({'rivals': [], 'inflation': 1.0}) == Findings([])
 
 

@@ -97,10 +97,11 @@ def test_an_unknown_force_lies_where_it_acts(side: str) -> None:
     machine = (TwoLags(course, 0.0 * TIME) if side == 'left' else TwoLags(0.0 * TIME, course))
     problem = LeastSquares(machine)
     none = problem.fit(problem.start(machine.nuisances, {}), 10)
-    found, places = of_the_unknown(problem, none, LackOfFit(9.0, 1.0))
+    found, places, parts = of_the_unknown(problem, none, LackOfFit(9.0, 1.0))
     assert places[0].name == f'force on the {side}'
     assert places[0].explained > 0.9
     assert found[0]['component'] == side and found[0]['signal'] == f'seen {side}'
+    assert sum(parts.values()) == pytest.approx(1.0) and max(parts, key=parts.__getitem__) == side
 
 
 def test_the_course_of_an_unknown_force_is_the_force() -> None:
@@ -121,19 +122,19 @@ def test_what_is_too_fast_for_a_pulse_lies_in_its_reading() -> None:
     machine.experiments[0].measured[:, 1] += hum
     problem = LeastSquares(machine)
     none = problem.fit(problem.start(machine.nuisances, {}), 10)
-    found, places = of_the_unknown(problem, none, LackOfFit(
+    found, places, _ = of_the_unknown(problem, none, LackOfFit(
         0.0, 1.0, fast=50.0, loudest='seen right'))
     assert places[0].evidence < 20.0
     assert {item['component'] for item in found} == {'seen right'}
     # no louder than noise, but regular
-    found, _ = of_the_unknown(problem, none, LackOfFit(
+    found, _, parts = of_the_unknown(problem, none, LackOfFit(
         0.0, 1.0, regular=0.9, most_regular='seen left'))
-    assert {item['component'] for item in found} == {'seen left'}
+    assert {item['component'] for item in found} == {'seen left'} == set(parts)
 
 
 def test_where_nothing_is_nothing_is_located() -> None:
     machine = TwoLags(0.0 * TIME, 0.0 * TIME)
     problem = LeastSquares(machine)
     none = problem.fit(problem.start(machine.nuisances, {}), 10)
-    found, _ = of_the_unknown(problem, none, LackOfFit(0.0, 1.0))
-    assert found == []
+    found, _, parts = of_the_unknown(problem, none, LackOfFit(0.0, 1.0))
+    assert found == [] and not parts
