@@ -195,11 +195,14 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
     places: Sequence[unknown_input.Place] = ()
     located: Sequence[localisation.Located] = ()
     parts: Mapping[str, float] = {}
-    if decision.word in ('unknown_effect', 'partly_explained'):
+    if decision.word == 'unknown_effect' or decision.unknown >= settings.verdict.partly:
         progress(0.95, 'where an unknown input may act')
         located, places, parts = localisation.of_the_unknown(
             problem, none.state, decision.lack)
-    if decision.word in ('explained', 'partly_explained'):
+    if decision.word in ('no_gap', 'too_few_to_judge'):
+        # no gap lies anywhere, but the next test looks where something may be all the same
+        located, places = (), ()
+    elif decision.word != 'unknown_effect':
         located = localisation.of_effects(problem, decision.answers, none.state, best.state)
     findings = Findings(
         rivals_of(problem, decision.answers, found.evidence.inflation, settings.planning,

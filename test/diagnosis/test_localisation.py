@@ -16,7 +16,7 @@
 from __future__ import annotations
 
 from antenna_drive.diagnosis import (
-    Course, courses, DisturbanceInput, Effect, Experiment, FloatArray, Form, Hypothesis,
+    Course, courses, diagnose, DisturbanceInput, Effect, Experiment, FloatArray, Form, Hypothesis,
     LeastSquares, Machine, Parameter, Point, Regimes, TimeScales,
 )
 from antenna_drive.diagnosis.localisation import of_effects, of_the_unknown
@@ -138,3 +138,22 @@ def test_where_nothing_is_nothing_is_located() -> None:
     none = problem.fit(problem.start(machine.nuisances, {}), 10)
     found, _, parts = of_the_unknown(problem, none, LackOfFit(0.0, 1.0))
     assert found == [] and not parts
+
+
+@pytest.mark.parametrize('side', ['left', 'right'])
+@pytest.mark.parametrize(('size', 'word'), [
+    (0.0, 'no_gap'), (0.3, 'no_gap'), (1.0, 'unknown_effect')])
+def test_the_next_test_is_told_where_something_without_a_name_may_act(
+        size: float, word: str, side: str) -> None:
+    forces = {'left': 0.0 * TIME, 'right': 0.0 * TIME, side: size * smooth(1)}
+    found = diagnose(TwoLags(**forces)).result
+    assert found['verdict'] == word
+    unnamed = found['planning']['unnamed']
+    if not size:
+        assert not unnamed
+        return
+    [unknown] = [item['probability'] for item in found['which'] if item['effects'] == ['unknown']]
+    assert max(unnamed, key=unnamed.__getitem__) == side
+    assert sum(unnamed.values()) == pytest.approx(unknown, abs=0.02)
+    # a verdict without a gap names no place
+    assert bool(found['where']) == bool(found['may_enter_at']) == (word == 'unknown_effect')
