@@ -126,6 +126,27 @@ def test_figures_of_a_part_of_the_fifth_trial_are_those_of_its_cases(
     check_third_tests(table_of(title), results_of(tmp_path, 'next_test_5', wanted))
 
 
+def test_the_first_figures_of_the_sixth_trial_are_those_of_its_first_cases(tmp_path: Path) -> None:
+    results = results_of(tmp_path, 'next_test_6', lambda case: case <= 'case_0040')
+    for case in results:
+        if 'tests' in results[case]:
+            tests = dict(results[case]['tests'])
+            results.put(case, tests={**tests, 'random': tests['first_drawn']})
+    check_third_tests(table_of('third test, after four cases of trial 6'), results)
+
+
+def test_figures_of_both_trials_with_after_are_those_of_their_cases(tmp_path: Path) -> None:
+    cases = [{**case, 'case': f'case_{number:04d}'} for number, case in enumerate(
+        (json.loads(line) for trial, first in ((5, 'case_0082'), (6, ''))
+         for line in (DOCS / 'trials' / f'next_test_{trial}.jsonl').read_text(
+            encoding='utf-8').splitlines() if json.loads(line)['case'] >= first), 1)]
+    (tmp_path / FILE).write_text(''.join(
+        f'{json.dumps({**case, "seed": 0})}\n' for case in cases), encoding='utf-8')
+    results = TrialResults(tmp_path, {'settings': {'seed': 0},
+                                      'seals': [case['case'] for case in cases]})
+    check_third_tests(table_of('third test, trials 5 and 6 with `--after`'), results)
+
+
 @pytest.mark.parametrize('number', [1, 2])
 def test_figures_of_investigations_are_those_of_their_cases(number: int, tmp_path: Path) -> None:
     found = investigations.summary(results_of(tmp_path, f'investigate_{number}'))
@@ -148,11 +169,13 @@ def test_the_summary_of_next_tests_is_that_of_all_their_cases(tmp_path: Path) ->
              for trial in (1, 2, 3, 4, 5, 6)]
     for rule, words in (('proposed', 'proposed tests'), ('square', 'square waves'),
                         ('chirp', 'chirps'), ('triangle', 'triangles'),
-                        ('multisine', 'multisines'), ('d-optimal', 'D-optimal tests'),
-                        ('random', 'random ones')):
+                        ('multisine', 'multisines'), ('d-optimal', 'D-optimal tests')):
         cases = sum(rules[rule]['cases'] for rules in found)
         right = sum(round(rules[rule]['top1'] * rules[rule]['cases']) for rules in found)
         assert f'{right} of {cases} {words}' in text
+    random = found[-1]['random']
+    assert (f'{round(random["top1"] * random["cases"])} of {random["cases"]} random ones in '
+            'trial 6') in text
     ways = investigations.summary(results_of(tmp_path, 'investigate_2'))
     right_of = {way: round(item['until_sure']['right'] * item['cases'])
                 for way, item in ways.items()}
