@@ -192,6 +192,7 @@ class _Imitation:
         def of_sign(sign: float, bound: float) -> float:
             step: FloatArray | None = None
 
+            # the root finder asks for both ends again
             @cache
             def surplus(size: float) -> float:
                 nonlocal step

@@ -19,6 +19,7 @@ from collections.abc import Callable
 import json
 from pathlib import Path
 import re
+from typing import Any
 
 from antenna_drive.cli.twin_trial import of_onsets, of_verdicts
 from antenna_drive.trial import investigations, third_tests
@@ -73,8 +74,17 @@ def test_figures_of_a_wild_trial_are_those_of_its_cases(
 def results_of(folder: Path, name: str, wanted: Callable[[str], bool] = lambda case: True,
                ) -> TrialResults:
     """Return the results of some cases of a trial that goes on, as they are published."""
-    cases = [case for line in (DOCS / 'trials' / f'{name}.jsonl').read_text(
+    return results_from(folder, cases_of(name, wanted))
+
+
+def cases_of(name: str, wanted: Callable[[str], bool] = lambda case: True) -> list[dict[str, Any]]:
+    """Return some cases of a trial that goes on, as they are published."""
+    return [case for line in (DOCS / 'trials' / f'{name}.jsonl').read_text(
         encoding='utf-8').splitlines() if wanted((case := json.loads(line))['case'])]
+
+
+def results_from(folder: Path, cases: list[dict[str, Any]]) -> TrialResults:
+    """Return cases as the results of one trial."""
     (folder / FILE).write_text(''.join(f'{json.dumps(case)}\n' for case in cases),
                                encoding='utf-8')
     return TrialResults(folder, {'settings': {'seed': cases[0]['seed']},
@@ -136,14 +146,10 @@ def test_the_first_figures_of_the_sixth_trial_are_those_of_its_first_cases(tmp_p
 
 
 def test_figures_of_both_trials_with_after_are_those_of_their_cases(tmp_path: Path) -> None:
-    cases = [{**case, 'case': f'case_{number:04d}'} for number, case in enumerate(
-        (json.loads(line) for trial, first in ((5, 'case_0082'), (6, ''))
-         for line in (DOCS / 'trials' / f'next_test_{trial}.jsonl').read_text(
-            encoding='utf-8').splitlines() if json.loads(line)['case'] >= first), 1)]
-    (tmp_path / FILE).write_text(''.join(
-        f'{json.dumps({**case, "seed": 0})}\n' for case in cases), encoding='utf-8')
-    results = TrialResults(tmp_path, {'settings': {'seed': 0},
-                                      'seals': [case['case'] for case in cases]})
+    cases = [*cases_of('next_test_5', lambda case: case >= 'case_0082'), *cases_of('next_test_6')]
+    # both trials number their cases from 1
+    results = results_from(tmp_path, [{**case, 'case': f'case_{number:04d}', 'seed': 0}
+                                      for number, case in enumerate(cases, 1)])
     check_third_tests(table_of('third test, trials 5 and 6 with `--after`'), results)
 
 
