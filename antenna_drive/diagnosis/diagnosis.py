@@ -197,13 +197,14 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
     parts: Mapping[str, float] = {}
     if decision.word == 'unknown_effect' or decision.unknown >= settings.verdict.partly:
         progress(0.95, 'where an unknown input may act')
-        located, places, parts = localisation.of_the_unknown(
-            problem, none.state, decision.lack)
-    if decision.word in ('no_gap', 'too_few_to_judge'):
-        # no gap lies anywhere, but the next test looks where something may be all the same
-        located, places = (), ()
-    elif decision.word != 'unknown_effect':
+        parts, places = localisation.parts_of_the_unknown(problem, none.state, decision.lack)
+    if decision.word == 'unknown_effect':
+        located = localisation.of_the_unknown(problem, none.state, parts)
+    elif decision.word in ('explained', 'partly_explained'):
         located = localisation.of_effects(problem, decision.answers, none.state, best.state)
+    else:
+        # a verdict without a gap names no place; the next test still looks into these parts
+        places = ()
     findings = Findings(
         rivals_of(problem, decision.answers, found.evidence.inflation, settings.planning,
                   found.doubted), found.evidence.inflation, found_noise(problem.experiments),

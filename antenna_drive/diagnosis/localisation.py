@@ -57,11 +57,10 @@ def of_effects(problem: LeastSquares, answers: Sequence[Answer], none: FitState,
                     - problem.residuals_of(best, k) ** 2)
 
 
-def of_the_unknown(problem: LeastSquares, none: FitState,
-                   lack: LackOfFit) -> tuple[
-                       list[Located], list[unknown_input.Place], dict[str, float]]:
+def parts_of_the_unknown(problem: LeastSquares, none: FitState, lack: LackOfFit,
+                         ) -> tuple[dict[str, float], list[unknown_input.Place]]:
     """
-    Return where something lies that no effect names, where it may act, and in which parts.
+    Return in which parts something may act that no effect names, and in which places.
 
     Parameters
     ----------
@@ -75,7 +74,7 @@ def of_the_unknown(problem: LeastSquares, none: FitState,
 
     Returns
     -------
-    where, as in a verdict; the places, the likeliest first; and how likely each part is
+    how likely each part is, empty if none is likely; the places, the likeliest first
 
     """
     settings = problem.settings
@@ -88,9 +87,14 @@ def of_the_unknown(problem: LeastSquares, none: FitState,
     elif lack.regular > settings.verdict.regular:
         parts = {lack.most_regular: 1.0}
     else:
-        return [], found, {}
-    located = _located(problem, parts, lambda k: problem.residuals_of(none, k) ** 2 - 1.0)
-    return located, found, parts
+        parts = {}
+    return parts, found
+
+
+def of_the_unknown(problem: LeastSquares, none: FitState,
+                   parts: Mapping[str, float]) -> list[Located]:
+    """Return where something lies that no effect names, given how likely each part is."""
+    return _located(problem, parts, lambda k: problem.residuals_of(none, k) ** 2 - 1.0)
 
 
 def _located(problem: LeastSquares, parts: Mapping[str, float],

@@ -19,7 +19,7 @@ from antenna_drive.diagnosis import (
     Course, courses, diagnose, DisturbanceInput, Effect, Experiment, FloatArray, Form, Hypothesis,
     LeastSquares, Machine, Parameter, Point, Regimes, TimeScales,
 )
-from antenna_drive.diagnosis.localisation import of_effects, of_the_unknown
+from antenna_drive.diagnosis.localisation import of_effects, of_the_unknown, parts_of_the_unknown
 from antenna_drive.diagnosis.verdict import Answer, LackOfFit
 import numpy as np
 import pytest
@@ -97,7 +97,8 @@ def test_an_unknown_force_lies_where_it_acts(side: str) -> None:
     machine = (TwoLags(course, 0.0 * TIME) if side == 'left' else TwoLags(0.0 * TIME, course))
     problem = LeastSquares(machine)
     none = problem.fit(problem.start(machine.nuisances, {}), 10)
-    found, places, parts = of_the_unknown(problem, none, LackOfFit(9.0, 1.0))
+    parts, places = parts_of_the_unknown(problem, none, LackOfFit(9.0, 1.0))
+    found = of_the_unknown(problem, none, parts)
     assert places[0].name == f'force on the {side}'
     assert places[0].explained > 0.9
     assert found[0]['component'] == side and found[0]['signal'] == f'seen {side}'
@@ -122,13 +123,15 @@ def test_what_is_too_fast_for_a_pulse_lies_in_its_reading() -> None:
     machine.experiments[0].measured[:, 1] += hum
     problem = LeastSquares(machine)
     none = problem.fit(problem.start(machine.nuisances, {}), 10)
-    found, places, _ = of_the_unknown(problem, none, LackOfFit(
+    parts, places = parts_of_the_unknown(problem, none, LackOfFit(
         0.0, 1.0, fast=50.0, loudest='seen right'))
+    found = of_the_unknown(problem, none, parts)
     assert places[0].evidence < 20.0
     assert {item['component'] for item in found} == {'seen right'}
     # no louder than noise, but regular
-    found, _, parts = of_the_unknown(problem, none, LackOfFit(
+    parts, _ = parts_of_the_unknown(problem, none, LackOfFit(
         0.0, 1.0, regular=0.9, most_regular='seen left'))
+    found = of_the_unknown(problem, none, parts)
     assert {item['component'] for item in found} == {'seen left'} == set(parts)
 
 
@@ -136,7 +139,8 @@ def test_where_nothing_is_nothing_is_located() -> None:
     machine = TwoLags(0.0 * TIME, 0.0 * TIME)
     problem = LeastSquares(machine)
     none = problem.fit(problem.start(machine.nuisances, {}), 10)
-    found, _, parts = of_the_unknown(problem, none, LackOfFit(0.0, 1.0))
+    parts, _ = parts_of_the_unknown(problem, none, LackOfFit(0.0, 1.0))
+    found = of_the_unknown(problem, none, parts)
     assert found == [] and not parts
 
 
