@@ -75,6 +75,8 @@ async def _turn_the_drive(url: str) -> None:
     client = await Client.to(url)
     await client.until(lambda: client.notices.get('drive', {}).get('ready'))
     await client.until(lambda: client.pieces)
+    # What is set before a unit has begun the run is among its settings, and no change.
+    await client.until(lambda: 'values torque_share' in client.notices)
     table = {entry['name']: entry
              for entry in client.notices['parameters torque_share']['entries']}
     pot = table['bias_pot']
