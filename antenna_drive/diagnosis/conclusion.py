@@ -31,7 +31,7 @@ from antenna_drive.diagnosis.held_out import held_out, refuted, shows_no_gap
 from antenna_drive.diagnosis.hypothesis import Hypothesis
 from antenna_drive.diagnosis.intervals import deviations, inflation, jackknife
 from antenna_drive.diagnosis.interventions import simplified
-from antenna_drive.diagnosis.lack_of_fit import lack_of_fit
+from antenna_drive.diagnosis.lack_of_fit import implausibility, lack_of_fit
 from antenna_drive.diagnosis.least_squares import LeastSquares
 from antenna_drive.diagnosis.machine import Machine
 from antenna_drive.diagnosis.rivals import Rival
@@ -91,7 +91,7 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
     found = fits.compared(*Search(whole, told, threads, earlier).run())
     hypotheses, best = backward_elimination(fits, found, settings)
     hypotheses, best = settled_rivals(fits, hypotheses, best, settings)
-    if courses := _implausible_courses(best):
+    if courses := _implausible_courses(best, settings):
         names = ' + '.join(courses)
         plain = concluded(machine.without(courses), lambda share, doing: progress(
             0.9, f'without {names}: {doing}'), threads, settings, earlier)
@@ -149,11 +149,13 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
                       evidence.decide(settings), tuple(notes))
 
 
-def _implausible_courses(best: Hypothesis) -> tuple[str, ...]:
+def _implausible_courses(best: Hypothesis, settings: Settings) -> tuple[str, ...]:
     """Return the effects whose course over time looks like no real one."""
-    point = best.state.point()
+    if not best.has_course:
+        return ()
+    found = implausibility(best, settings)
     return tuple(effect for effect, form in zip(best.effects, best.forms, strict=True)
-                 if form.is_course and form.implausibility(point) > 1.0)
+                 if form.is_course and found[effect] > 1.0)
 
 
 def _between_tests(reach: Mapping[str, Any]) -> dict[str, float]:

@@ -16,12 +16,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+import math
 from typing import Any
 
 from antenna_drive.diagnosis import residual_statistics as statistics
 from antenna_drive.diagnosis.hypothesis import Hypothesis
+from antenna_drive.diagnosis.intervals import covariance
 from antenna_drive.diagnosis.least_squares import FitState, LeastSquares
 from antenna_drive.diagnosis.machine import FloatArray
+from antenna_drive.diagnosis.settings import Settings
 from antenna_drive.diagnosis.verdict import LackOfFit
 import numpy as np
 
@@ -45,11 +48,22 @@ def lack_of_fit(problem: LeastSquares, raw: FloatArray, best: Hypothesis,
     """
     loudest, fast, fast_left = _fast(problem, raw, best)
     signal, regular = _regular(problem, best.state)
-    point = best.state.point()
-    implausibility = max((form.implausibility(point) for form in best.forms), default=0.0)
+    implausible = max(implausibility(best, problem.settings).values(), default=0.0)
     return LackOfFit(_slow_excess(problem, best.state), _left(problem, raw, best), fast,
-                     fast_left, implausibility, explained, loudest, _enough(problem),
+                     fast_left, implausible, explained, loudest, _enough(problem),
                      bool(best.named), regular, signal)
+
+
+def implausibility(hypothesis: Hypothesis, settings: Settings) -> dict[str, float]:
+    """Return how little the values of each effect look like it; above 1 is implausible."""
+    state = hypothesis.state
+    deviations = {}
+    if hypothesis.has_course and (state.kept_hessian is not None or state.base_jacobian.size):
+        variances = np.diag(covariance(state, 1.0, settings.interval))
+        deviations = {p.name: math.sqrt(variance)
+                      for p, variance in zip(state.parameters, variances.tolist(), strict=True)}
+    return {effect: form.implausibility(state.point(), deviations)
+            for effect, form in zip(hypothesis.effects, hypothesis.forms, strict=True)}
 
 
 def _slow_excess(problem: LeastSquares, state: FitState) -> float:

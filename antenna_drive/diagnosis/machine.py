@@ -136,8 +136,12 @@ class Form:
         return [{size.name: share * (size.high if share > 0.0 else -size.low)}
                 for share in _SHARES if share > 0.0 or size.low < 0.0]
 
-    def implausibility(self, point: Point) -> float:
-        """Return how little these values look like the effect; above 1 is implausible."""
+    def implausibility(self, point: Point, deviations: Point) -> float:
+        """
+        Return how little these values look like the effect; above 1 is implausible.
+
+        `deviations` has their standard deviations; it is empty where they are not known.
+        """
         return 0.0
 
 

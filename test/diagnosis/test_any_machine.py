@@ -159,7 +159,7 @@ def test_an_effect_that_the_catalogue_lacks_is_unknown() -> None:
 class Weather(Form):
     """A course over time that is so free that it may be no weather, and here it is none."""
 
-    def implausibility(self, point: Point) -> float:
+    def implausibility(self, point: Point, deviations: Point) -> float:
         """Return how little it looks like weather."""
         return 3.0
 

@@ -31,6 +31,8 @@ _LINE_S = 0.02
 # Wind has no jumps: from one knot to the next it changes by at most this many times its usual
 # change.
 _JUMP = 7.0
+# The data determine a knot whose standard deviation is below this share of that of the prior.
+_DETERMINED = 0.1
 
 
 @dataclass(frozen=True)
@@ -51,14 +53,22 @@ class _Knot(RunModifier):
 class Gust(Form):
     """A course over time in each test: so free at its knots that it may be no wind."""
 
-    def implausibility(self, point: Point) -> float:
-        """Return the greatest change between two knots, over the greatest that wind makes."""
-        courses: dict[int | None, list[float]] = {}
+    def implausibility(self, point: Point, deviations: Point) -> float:
+        """
+        Return the greatest change between two knots, over the greatest that wind makes.
+
+        Where the axis stands still, or the data end, a torque has no effect. The prior holds such
+        a knot near zero, and what is left of the fit may pull it anywhere: it tells nothing.
+        """
+        courses: dict[int | None, list[tuple[float, bool]]] = {}
         for knot in self.parameters:
-            courses.setdefault(knot.experiment, []).append(point[knot.name])
+            courses.setdefault(knot.experiment, []).append((
+                point[knot.name],
+                deviations.get(knot.name, 0.0) < _DETERMINED * knot.prior_sigma))
         found = 0.0
         for course in courses.values():
-            change = np.abs(np.diff(course))
+            values, determined = np.array(course).T
+            change = np.abs(np.diff(values))[(determined[1:] * determined[:-1]) > 0.0]
             if change.size and np.any(change):
                 found = max(found, float(change.max() / (1.4826 * np.median(change) + 1e-30)))
         return found / _JUMP
