@@ -145,12 +145,22 @@ def test_the_first_figures_of_the_sixth_trial_are_those_of_its_first_cases(tmp_p
     check_third_tests(table_of('third test, after four cases of trial 6'), results)
 
 
-def test_figures_of_both_trials_with_after_are_those_of_their_cases(tmp_path: Path) -> None:
-    cases = [*cases_of('next_test_5', lambda case: case >= 'case_0082'), *cases_of('next_test_6')]
+def test_the_later_figures_of_the_sixth_trial_are_those_of_their_cases(tmp_path: Path) -> None:
+    check_third_tests(table_of('third test, after 16 cases of trial 6'),
+                      results_of(tmp_path, 'next_test_6', lambda case: case <= 'case_0094'))
+
+
+@pytest.mark.parametrize(('title', 'last'), [
+    ('third test, trials 5 and 6 with `--after`', 'case_9999'),
+    ('third test, trials 5 and 6 with `--after`, after 32 cases', 'case_0094')])
+def test_figures_of_both_trials_with_after_are_those_of_their_cases(
+        title: str, last: str, tmp_path: Path) -> None:
+    cases = [*cases_of('next_test_5', lambda case: case >= 'case_0082'),
+             *cases_of('next_test_6', lambda case: case <= last)]
     # both trials number their cases from 1
     results = results_from(tmp_path, [{**case, 'case': f'case_{number:04d}', 'seed': 0}
                                       for number, case in enumerate(cases, 1)])
-    check_third_tests(table_of('third test, trials 5 and 6 with `--after`'), results)
+    check_third_tests(table_of(title), results)
 
 
 @pytest.mark.parametrize('number', [1, 2])
