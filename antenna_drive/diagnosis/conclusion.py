@@ -151,8 +151,6 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
 
 def _implausible_courses(best: Hypothesis, settings: Settings) -> tuple[str, ...]:
     """Return the effects whose course over time looks like no real one."""
-    if not best.has_course:
-        return ()
     found = implausibility(best, settings)
     return tuple(effect for effect, form in zip(best.effects, best.forms, strict=True)
                  if form.is_course and found[effect] > 1.0)

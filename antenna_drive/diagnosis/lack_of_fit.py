@@ -58,7 +58,7 @@ def implausibility(hypothesis: Hypothesis, settings: Settings) -> dict[str, floa
     """Return how little the values of each effect look like it; above 1 is implausible."""
     state = hypothesis.state
     deviations = {}
-    if hypothesis.has_course and (state.kept_hessian is not None or state.base_jacobian.size):
+    if hypothesis.has_course and state.has_hessian:
         variances = np.diag(covariance(state, 1.0, settings.interval))
         deviations = {p.name: math.sqrt(variance)
                       for p, variance in zip(state.parameters, variances.tolist(), strict=True)}

@@ -74,6 +74,11 @@ class FitState:
         """Return the derivative of the prediction, shape (n, m); not kept, to save memory."""
         return _updated(self.base_jacobian, self.broyden_errors, self.broyden_directions)
 
+    @property
+    def has_hessian(self) -> bool:
+        """Return whether the Hessian is known: a state may have dropped its derivatives."""
+        return self.kept_hessian is not None or self.base_jacobian.size > 0
+
     @cached_property
     def hessian(self) -> FloatArray:
         """Return the Gauss-Newton Hessian without the priors, shape (m, m)."""
@@ -303,7 +308,7 @@ class LeastSquares:
 
     def local_steps(self, state: FitState) -> dict[str, float]:
         """Return steps of difference quotients that change the prediction by little, by name."""
-        if state.kept_hessian is None and not state.base_jacobian.size:
+        if not state.has_hessian:
             return {}
         options = self.settings.fit
         visible = np.sqrt(np.maximum(np.diag(state.hessian), 1e-30))

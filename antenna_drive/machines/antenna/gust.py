@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import math
 
 from antenna_drive.diagnosis import FloatArray, Form, Point
 from antenna_drive.machines.antenna.modifiers import AntennaParameter, RunModifier, RunSetup
@@ -60,15 +61,15 @@ class Gust(Form):
         Where the axis stands still, or the data end, a torque has no effect. The prior holds such
         a knot near zero, and what is left of the fit may pull it anywhere: it tells nothing.
         """
-        courses: dict[int | None, list[tuple[float, bool]]] = {}
+        courses: dict[int | None, list[float]] = {}
         for knot in self.parameters:
-            courses.setdefault(knot.experiment, []).append((
-                point[knot.name],
-                deviations.get(knot.name, 0.0) < _DETERMINED * knot.prior_sigma))
+            determined = deviations.get(knot.name, 0.0) < _DETERMINED * knot.prior_sigma
+            courses.setdefault(knot.experiment, []).append(
+                point[knot.name] if determined else math.nan)
         found = 0.0
         for course in courses.values():
-            values, determined = np.array(course).T
-            change = np.abs(np.diff(values))[(determined[1:] * determined[:-1]) > 0.0]
+            change = np.abs(np.diff(course))
+            change = change[np.isfinite(change)]
             if change.size and np.any(change):
                 found = max(found, float(change.max() / (1.4826 * np.median(change) + 1e-30)))
         return found / _JUMP
