@@ -39,7 +39,8 @@ SLACK = MEMORY // 2
 
 # A run that goes on makes a step within this [s]; else another may take its place. The second
 # holds where somebody has spoken falsely in a peer's name in the last MEMORY steps: a node that
-# was stopped may go on, and what speaks against it may be false again.
+# was stopped may go on, and what speaks against it may be false again. It holds, too, where the
+# conductor waits for observers alone: a disk may take its time.
 STANDSTILL_S = 0.2
 DECEIVED_STANDSTILL_S = 5.0
 
@@ -444,7 +445,8 @@ class Conductor(Member):
     def patience_s(self) -> float:
         """Return how long the run must stand still before somebody is believed to be gone [s]."""
         false = any(map(self._went_on_after_hello, self._hello_at))
-        return DECEIVED_STANDSTILL_S if false else super().patience_s
+        observers_alone = bool(self.used) and not self.inbox.missing()
+        return DECEIVED_STANDSTILL_S if false or observers_alone else super().patience_s
 
     def _left(self, at: Mapping[str, int], peers: Collection[str]) -> bool:
         """Tell whether one of the peers has gone since: whoever goes on was spoken for."""
@@ -517,11 +519,12 @@ class Conductor(Member):
 
     def _somebody_left(self) -> bool:
         missing = () if self.run == NO_RUN or self.ended else self.inbox.missing()
-        # The last frame of a killed member may have reached us and not those who now wait for it:
-        # then they are missing, and it is not.
-        return (bool(missing) and self._left(self._hello_at, self.peers)
+        behind = self._behind()
+        # The last frames of a killed member may have reached us and not those who now wait for
+        # them, members or observers: then they are missing, and it is not.
+        return (bool(missing or behind) and self._left(self._hello_at, self.peers)
                 or self._left(self._elsewhere_at, missing)
-                or any(self._strayed_at.get(name) == self.used[name] for name in self._behind()))
+                or any(self._strayed_at.get(name) == self.used[name] for name in behind))
 
     def begin_again(self) -> None:
         """Leave the run in progress, if any, for a new one."""

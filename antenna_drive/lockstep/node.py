@@ -535,24 +535,25 @@ class DriveNode:
         self._tell_state(only_news=True)
         ready = self._link.wait(member.wanted(), timeout)
         for peer in ready:
-            self._take_past_refused(peer)
+            self._take_some(peer)
         self._quiet = not ready
         now = time.monotonic()
         self._stands_still = self._report.stands_still(now)
         self._report.publish_if_due(now)
 
-    def _take_past_refused(self, peer: str) -> None:
+    def _take_some(self, peer: str) -> None:
         """
-        Take frames of a peer up to the first that is not refused, or to the last.
+        Take frames of a peer up to the first that is not refused; all of an observer.
 
-        One a turn would be too few: who speaks in a peer's name may send more than that, and for
-        as long as frames come the conductor begins no new run.
+        One a turn would be too few, because for as long as frames come the conductor begins no
+        new run: who speaks in a peer's name may send more than that, and an observer has said how
+        far it is at each of the hundreds of steps that it may be behind.
         """
         member = self._member
         while (frame := self._link.take(peer)) is not None:
             refused = member.inbox.refused.total()
             member.receive(peer, frame)
-            if member.inbox.refused.total() == refused:
+            if member.inbox.steps(peer) and member.inbox.refused.total() == refused:
                 break
 
 

@@ -724,6 +724,24 @@ def test_an_observer_that_reads_on_has_not_left() -> None:
     assert conductor.new_run(20.0, stands_still=True) is None
 
 
+def test_a_node_that_was_killed_before_an_observer_had_its_frames_is_not_waited_for() -> None:
+    """The conductor has those frames; the observer never gets them, and can say nothing."""
+    conductor = waiting_for_its_recorder()
+    assert conductor.new_run(20.0, stands_still=True) is None, 'a slow observer is no reason'
+    conductor.receive('plant', (0.0, 12.0, 0.0, *[0.0] * 4))
+    assert conductor.patience_s == DECEIVED_STANDSTILL_S, 'the observer may just take its time'
+    assert conductor.new_run(20.0, stands_still=True) is not None
+
+
+def test_a_hello_is_false_if_the_observer_and_the_member_go_on() -> None:
+    conductor = waiting_for_its_recorder()
+    conductor.receive('plant', (0.0, 12.0, 0.0, *[0.0] * 4))
+    conductor.receive('recorder', (conductor.run, 5.0 + 2 * DEPTH, 1e-3))
+    step_as_far_as_possible(conductor)
+    assert 'recorder' in conductor.missing()
+    assert conductor.new_run(20.0, stands_still=True) is None
+
+
 @none_some_all
 def test_who_was_deceived_is_patient_for_a_second_of_steps(in_loops: Collection[str]) -> None:
     network = begun_network(in_loops)

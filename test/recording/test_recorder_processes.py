@@ -375,6 +375,38 @@ def test_a_good_run_does_not_make_up_for_a_bad_one(tmp_path: Path, fresh_domain:
     assert read_bag(tmp_path / 'run_run_2').start_ns == 0
 
 
+# A killed node may not have sent every frame to everybody: here what motor_1 sends after step 600
+# of its first run does not get through.
+CUT_OFF = """
+import sys
+from antenna_drive.lockstep.ros_link import FrameLink
+from antenna_drive.nodes.recorder import main
+take, runs = FrameLink.take, []
+def take_some(link, peer):
+    while (frame := take(link, peer)) is not None and peer == 'motor_1' and frame[0]:
+        runs[:] = runs or [frame[0]]
+        if frame[0] != runs[0] or frame[1] <= 600.0:
+            break
+    return frame
+FrameLink.take = take_some
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def test_a_drive_that_waits_for_frames_which_a_killed_node_has_not_sent_begins_again(
+        tmp_path: Path, fresh_domain: int) -> None:
+    with Drive(['recorder'], pace=0.0) as drive, recorder(
+            f'out:={tmp_path}/run', program=('-c', CUT_OFF)) as process:
+        drive.until(lambda: drive.step > 1000 and drive.stands_still)
+        drive.processes.kill('motor_1')
+        drive.processes.start('motor_1')
+        drive.until(lambda: process.said('run_run_2'))
+        assert process.end() == 1
+        assert process.said('or a node was killed before it had sent them')
+    assert len(read_bag(tmp_path / 'run')['plant/encoder']) == 601
+    assert read_bag(tmp_path / 'run_run_2').start_ns == 0
+
+
 def test_a_recorded_command_is_played_by_a_node_as_in_one_process(
         tmp_path: Path, fresh_domain: int) -> None:
     time = np.arange(0.0, 1.0, 0.013)
