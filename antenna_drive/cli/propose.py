@@ -23,7 +23,8 @@ that test_signal plays and `diagnose` reads:
   antenna-drive propose verdict.json --out next.yaml --report next.html
   ros2 run antenna_drive test_signal --ros-args -p sheet:=next.yaml
 
-If one answer is left or sure, the test looks for other effects, as with --objective detect.
+If one answer is left or sure, or something without a name is likelier than each answer, the test
+looks for other effects, as with --objective detect.
 --objective sharpen asks for the test that makes the numbers of the likeliest answer most certain.
 --objective detect needs no verdict: it asks for the first test, for the effects of --suspect or
 for the whole catalogue. limits.yaml may hold rate_deg_s, acceleration_deg_s2, travel_deg,
@@ -115,7 +116,7 @@ def run(arguments: argparse.Namespace) -> int:
             stream.write(render('proposal.html', **{**vars(shown), 'data': data}).encode())
     told = lines(data)
     if objective == 'detect' and not arguments.objective:
-        told.insert(0, 'one answer only, or a sure one: this test looks for other effects')
+        told.insert(0, 'no answers to tell apart: this test looks for other effects')
     give(data, arguments.json, '\n'.join(told))
     return 0 if found.tests else 1
 

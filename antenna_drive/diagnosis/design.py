@@ -474,7 +474,7 @@ class TestDesign:
         """
         if test.separation is None:
             return -math.log(coarseness)
-        unlisted = self._settings.planning.unlisted
+        unlisted = self._findings.unlisted(self._settings)
         told = test.kept * self._score(test.separation)
         return ((1.0 - unlisted) * math.log(max(told, _NOTHING))
                 - unlisted * math.log(coarseness))

@@ -169,12 +169,18 @@ class Findings:
         """
         Return whether there are answers to tell apart: several, and none of them sure.
 
-        Nor is there anything to tell apart if all others have less than `unknown` has at least.
-        What is open then is whether any effect of the catalogue is true.
+        Nor is there anything to tell apart if all others have less than `unknown` has at least,
+        or if it is likelier than each of them. What is open then is whether any effect of the
+        catalogue is true.
         """
         known = [rival.probability for rival in self.rivals]
-        return len(known) > 1 and max(known) < min(
+        return len(known) > 1 and 1.0 - sum(known) < max(known) < min(
             settings.planning.sure, (1.0 - settings.verdict.least_unknown) * sum(known))
+
+    def unlisted(self, settings: Settings) -> float:
+        """Return the probability that none of the answers is true, never less than a prior one."""
+        known = sum(rival.probability for rival in self.rivals)
+        return max(settings.planning.unlisted, 1.0 - known)
 
     def as_data(self) -> dict[str, Any]:
         """Return the findings as plain data: the entry `planning` of a verdict."""

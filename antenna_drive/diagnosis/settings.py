@@ -352,8 +352,8 @@ class PlanningSettings:
     caution: float = _setting(
         3.0, '1', 'by what promised evidence is divided where tests are compared')
     unlisted: float = _setting(
-        0.25, 'probability', 'probability that no answer of an open verdict is true: weight of '
-        'how well a test shows other effects')
+        0.25, 'probability', 'least probability that no answer of an open verdict is true: weight '
+        'of how well a test shows other effects')
     alike: float = _setting(
         1.0, 'temperature', 'lack of fit up to which a test does not tell two rivals apart')
     sure: float = _setting(0.9, 'probability', 'probability from which an answer is sure')

@@ -155,10 +155,22 @@ def test_what_is_confirmed_counts_in_full_though_its_family_broke_promises() -> 
     doubted = replace(design_of_test.run().tests[0], confirmed=None, kept=0.1)
     [found] = design_of_test._compared([design_of_test._confirmed(doubted)])
     assert found.confirmed is not None
-    told = found.confirmed.information(DEFAULT.verdict.temperature, DEFAULT.planning.caution)
-    unlisted = DEFAULT.planning.unlisted
-    assert found.score == pytest.approx(
-        (1.0 - unlisted) * np.log(told) - unlisted * np.log(found.coarseness))
+    assert found.score == pytest.approx(_compound(found, DEFAULT.planning.unlisted))
+
+
+def _compound(test: Judged, unlisted: float) -> float:
+    assert test.confirmed is not None
+    told = test.confirmed.information(DEFAULT.verdict.temperature, DEFAULT.planning.caution)
+    return (1.0 - unlisted) * np.log(told) - unlisted * np.log(test.coarseness)
+
+
+def test_other_effects_weigh_as_much_as_no_answer_is_likely() -> None:
+    """A verdict leaves 0.6 to something without a name: its answers are worth 0.4."""
+    doubted = [replace(rival, probability=0.4 * rival.probability) for rival in HARD]
+    found = TestDesign(Loads(1.6), Findings(doubted), effort=SMALL).run()
+    confirmed = [test for test in found.tests if test.confirmed is not None]
+    assert confirmed
+    assert all(test.score == pytest.approx(_compound(test, 0.6)) for test in confirmed)
 
 
 def test_where_no_load_within_the_limit_helps_the_limit_is_named() -> None:

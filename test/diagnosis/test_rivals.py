@@ -107,7 +107,9 @@ def test_bounds_far_away_or_next_to_each_other_leave_a_covariance(
     ([0.5, 0.45], 'separate'), ([0.89, 0.06], 'separate'), ([0.4, 0.3], 'separate'),
     ([0.92, 0.03], 'detect'),
     # one answer and `unknown`: the rest has next to nothing
-    ([0.64, 0.012], 'detect'), ([0.012, 0.64], 'detect')])
+    ([0.64, 0.012], 'detect'), ([0.012, 0.64], 'detect'),
+    # something without a name is likelier than each answer
+    ([0.31, 0.17], 'detect'), ([0.4, 0.21], 'separate')])
 def test_the_next_test_looks_beyond_what_is_as_good_as_one_answer(
         known: list[float], objective: str) -> None:
     rivals = [Rival((), (), (), probability, (), np.zeros(0), np.zeros((0, 0)))
