@@ -36,7 +36,8 @@ import shlex
 from antenna_drive.cli.output import check_options, give, Progress
 from antenna_drive.cli.sharing import add_batch_options
 from antenna_drive.parameters.schema import Entry
-from antenna_drive.trial.left_out import RISE, run_trial, SURE
+from antenna_drive.trial.left_out import RISE, run_trial
+from antenna_drive.trial.scorecard import OVERCONFIDENT
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,7 +66,8 @@ def run(arguments: argparse.Namespace) -> int:
         lines.append(f"probability of 'unknown' rises by {found['median_rise']:.2f} (median), "
                      f'{found["mean_rise"]:.2f} (mean)')
         for key, words in (('recognised', f'by {RISE:g} or more in'),
-                           ('named_wrongly', f'something else is named above {SURE:g} in')):
+                           ('named_wrongly',
+                            f'something else is named above {OVERCONFIDENT:g} in')):
             low, high = found[f'{key}_ci95']
             lines.append(f'{words} {found[key]:.2f} ({low:.2f} to {high:.2f}) '
                          f'of {len(found["cases"])} cases')

@@ -28,7 +28,7 @@ from typing import Any
 from antenna_drive.errors import UserError
 from antenna_drive.trial.batch import diagnose_recordings, Done, model_options
 from antenna_drive.trial.programme import RECORDINGS
-from antenna_drive.trial.scorecard import Case, rate, read_cases
+from antenna_drive.trial.scorecard import Case, OVERCONFIDENT, rate, read_cases
 from antenna_drive.trial.scored_cases import read_scored_of
 from antenna_drive.trial.verdict import read_verdict, UNKNOWN, VerdictError
 from antenna_drive.workers import workers
@@ -36,7 +36,6 @@ import numpy as np
 
 WITHOUT = 'without.json'
 RISE = 0.5                  # of the probability of 'unknown', in a case that counts as recognised
-SURE = 0.9                  # probability above which something else is named wrongly
 
 
 def run_trial(folder: Path, wanted: int, jobs: int, limit: float, options: Sequence[str] = (),
@@ -68,7 +67,7 @@ def run_trial(folder: Path, wanted: int, jobs: int, limit: float, options: Seque
     `named` with its `probability`, the first answer without the effect; `failures`;
     `median_rise` and `mean_rise` of the probability of 'unknown'; `recognised` with `ci95`, the
     share of cases in which it rises by RISE or more; `named_wrongly` with its interval, the share
-    in which something else is named above SURE
+    in which something else is named above OVERCONFIDENT
 
     Raises
     ------
@@ -92,7 +91,8 @@ def run_trial(folder: Path, wanted: int, jobs: int, limit: float, options: Seque
     rows = [row for case in cases for row in _rows(folder, case)]
     rises = [row['unknown_after'] - row['unknown_before'] for row in rows]
     recognised = rate(rise >= RISE for rise in rises)
-    wrongly = rate(row['named'] != [UNKNOWN] and row['probability'] > SURE for row in rows)
+    wrongly = rate(row['named'] != [UNKNOWN] and row['probability'] > OVERCONFIDENT
+                   for row in rows)
     return {'cases': rows, 'failures': len(cases) - len(rows),
             'median_rise': float(np.median(rises)) if rises else None,
             'mean_rise': float(np.mean(rises)) if rises else None,
