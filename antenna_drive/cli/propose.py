@@ -59,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='JSON of a diagnosis; not needed with --objective detect')
     parser.add_argument('--objective', choices=_OBJECTIVES,
                         help='tell the answers apart, make numbers more certain, or find effects '
-                             'at all (default: separate, or detect if there is one answer)')
+                             'at all (default: separate, or detect if no answers are open)')
     parser.add_argument('--suspect', nargs='+', default=[], metavar='EFFECT',
                         help='effects that --objective detect looks for (default: all)')
     parser.add_argument('--limits', type=Path, metavar='FILE',

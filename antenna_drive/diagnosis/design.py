@@ -52,7 +52,7 @@ _BY_SIZES = (SEPARATE, DETECT)
 CRITERIA: Mapping[str, str] = {
     SEPARATE: 'T-optimality with prior probabilities: expected information between the rivals, '
               'all tolerances free (Atkinson and Fedorov 1975; Ponce de Leon and Atkinson 1991); '
-              'with a smaller weight the rule of detect, in case none of them is true '
+              'weighted by how likely none of them is true, the rule of detect '
               '(compound design: Atkinson, Donev and Tobias 2007, chapter 21)',
     SHARPEN: "D_s-optimality: determinant of the covariance of the likeliest rival's effects, all "
              'tolerances free (Atkinson, Donev and Tobias 2007, section 10.3)',
@@ -70,7 +70,7 @@ Progress = Callable[[float, str], None]
 
 
 def objective_for(findings: Findings, settings: Settings = DEFAULT) -> str:
-    """Return what the next test is for: a single answer, or a sure one, is to be contradicted."""
+    """Return what the next test is for: to tell open answers apart, or to contradict them."""
     return SEPARATE if findings.are_open(settings) else DETECT
 
 
@@ -474,7 +474,7 @@ class TestDesign:
         """
         if test.separation is None:
             return -math.log(coarseness)
-        unlisted = self._findings.unlisted(self._settings)
+        unlisted = max(self._settings.planning.unlisted, self._findings.unlisted)
         told = test.kept * self._score(test.separation)
         return ((1.0 - unlisted) * math.log(max(told, _NOTHING))
                 - unlisted * math.log(coarseness))

@@ -174,13 +174,13 @@ class Findings:
         catalogue is true.
         """
         known = [rival.probability for rival in self.rivals]
-        return len(known) > 1 and 1.0 - sum(known) < max(known) < min(
+        return len(known) > 1 and self.unlisted < max(known) < min(
             settings.planning.sure, (1.0 - settings.verdict.least_unknown) * sum(known))
 
-    def unlisted(self, settings: Settings) -> float:
-        """Return the probability that none of the answers is true, never less than a prior one."""
-        known = sum(rival.probability for rival in self.rivals)
-        return max(settings.planning.unlisted, 1.0 - known)
+    @property
+    def unlisted(self) -> float:
+        """Return the probability that none of the answers is true."""
+        return 1.0 - sum(rival.probability for rival in self.rivals)
 
     def as_data(self) -> dict[str, Any]:
         """Return the findings as plain data: the entry `planning` of a verdict."""

@@ -173,10 +173,6 @@ class Inbox:
         """Return the peers that are waited for at every step, the slowest first."""
         return tuple(self._stepping)
 
-    def steps(self, peer: str) -> bool:
-        """Return whether a peer is waited for at every step."""
-        return peer in self._stepping
-
     @property
     def holds_early(self) -> bool:
         """Return whether frames of another run wait for their fate."""

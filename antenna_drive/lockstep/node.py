@@ -543,17 +543,17 @@ class DriveNode:
 
     def _take_some(self, peer: str) -> None:
         """
-        Take frames of a peer up to the first that is not refused; all of an observer.
+        Take all frames of an observer; those of a peer that steps up to the first not refused.
 
-        One a turn would be too few, because for as long as frames come the conductor begins no
-        new run: who speaks in a peer's name may send more than that, and an observer has said how
-        far it is at each of the hundreds of steps that it may be behind.
+        For as long as frames come, the conductor begins no new run. One a turn would be too few:
+        whoever speaks in a peer's name may send more than that, and an observer may have reported
+        each of hundreds of steps.
         """
         member = self._member
         while (frame := self._link.take(peer)) is not None:
             refused = member.inbox.refused.total()
             member.receive(peer, frame)
-            if member.inbox.steps(peer) and member.inbox.refused.total() == refused:
+            if peer in member.inbox.stepping and member.inbox.refused.total() == refused:
                 break
 
 
