@@ -1,22 +1,12 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Build and install antenna_drive: with pip, with or without ROS 2, or with colcon."""
 
 from pathlib import Path
 import sys
 
 from setuptools import find_packages, setup
+from setuptools.command.build_py import build_py
 
 PACKAGE = 'antenna_drive'
 # Executables whose module has another name; any other module of nodes/ with a main has its own.
@@ -28,6 +18,33 @@ NAMES = {'signal_generator': 'test_signal'}
 KILTED = ('ros-rclpy[fastrtps] ~= 9.1', 'ros-std-msgs ~= 5.5', 'ros-std-srvs ~= 5.5',
           'ros-rosgraph-msgs ~= 2.3', 'ros-diagnostic-msgs ~= 5.5', 'ros-sensor-msgs ~= 5.5')
 WHEELS_EXIST = "sys_platform == 'linux' and platform_machine == 'x86_64'"
+
+
+# The engine is a distribution of its own, simgap/pyproject.toml. A wheel cannot name a folder as a
+# dependency, so that of the drive carries the engine's package, made from the one source. There
+# it lies inside the drive's, behind whatever simgap is installed beside it.
+CARRIED = 'bdist_wheel' in sys.argv
+CARRIER = f'{PACKAGE}.carried'
+
+
+def engine(package: str) -> str:
+    """Return the name under which a package of the engine is installed."""
+    return f'{CARRIER}.{package}' if CARRIED else package
+
+
+ENGINE = {engine(package): package.replace('.', '/')
+          for package in find_packages(include=['simgap', 'simgap.*'])}
+
+
+class BuildWithEngine(build_py):
+    """Build the packages, and the line that puts a carried engine behind all other packages."""
+
+    def run(self) -> None:
+        """Build."""
+        super().run()
+        if CARRIED:
+            line = Path(self.build_lib, f'{PACKAGE}_carried.pth')
+            line.write_text(CARRIER.replace('.', '/') + '\n')
 
 
 def config_files() -> list[tuple[str, list[str]]]:
@@ -64,9 +81,12 @@ def launchers() -> list[tuple[str, list[str]]]:
 setup(
     name=PACKAGE,
     version='0.1.0',
-    packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
-    package_data={PACKAGE: ['py.typed', '**/*.yaml', '**/*.html', '**/*.js', '**/*.css',
-                            '**/LICENSE', '**/*.c']},
+    packages=[*find_packages(include=[PACKAGE, f'{PACKAGE}.*']), *ENGINE],
+    package_dir=ENGINE if CARRIED else {},
+    package_data={'': ['py.typed', '*.yaml', '*.html', '*.js', '*.css', 'LICENSE'],
+                  f'{PACKAGE}.pages': ['templates/*', 'live/*'],
+                  engine('simgap.report'): ['templates/*', 'uplot/*']},
+    cmdclass={'build_py': BuildWithEngine},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
         (f'share/{PACKAGE}', ['package.xml']),
@@ -147,6 +167,7 @@ setup(
     entry_points={
         'console_scripts': [
             f'antenna-drive = {PACKAGE}.cli:main',
+            'simgap = simgap.cli:main',
             *(f'{name} = {PACKAGE}.nodes.{module}:main' for name, module in nodes().items()),
         ],
     },

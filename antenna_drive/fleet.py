@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The diagnosis of many machines: find their recordings, diagnose each machine, keep what was found.
 
@@ -34,11 +23,11 @@ import shutil
 import tempfile
 from typing import Any
 
-from antenna_drive.drafts import drafted
-from antenna_drive.errors import one_line, UserError
 from antenna_drive.subcommand import run_command
 from antenna_drive.workers import TaskLost, Workers
 from antenna_drive.workers.cluster import fingerprint
+from simgap.drafts import drafted
+from simgap.errors import one_line, UserError
 
 MACHINES = 'machines'           # folder of what was found, one folder a machine
 VERDICT, PAGE, CORRECTED = 'verdict.json', 'verdict.html', 'corrected.yaml'

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 What of this installation is there, what works, and what to do about the rest.
 
@@ -36,8 +25,8 @@ import time
 from typing import Any
 
 from antenna_drive import __version__
-from antenna_drive.errors import one_line
-from antenna_drive.remedies import REMEDIES, ROS_REMEDY
+from simgap.command.remedies import REMEDIES, ROS_REMEDY
+from simgap.errors import one_line
 
 OK, MISSING, BROKEN, NOTE = 'ok', 'missing', 'broken', 'note'
 # How long a message may take to come back to its own process [s].
@@ -154,8 +143,8 @@ def _physics() -> Iterator[Finding]:
     yield Finding('physics', 'a run of 0.1 s', OK if finite else BROKEN,
                   f'{took:.1f} s' if finite else 'not finite',
                   '' if finite else 'run antenna-drive accuracy and report what it says')
-    from antenna_drive.physics.compiling import _cache_folder
-    folder = _cache_folder()
+    from antenna_drive.physics.compiling import KEEPING
+    folder = KEEPING.folder()
     if folder is None:
         yield Finding('physics', 'compiled physics', NOTE, 'is not kept: no folder can be written',
                       'set NUMBA_CACHE_DIR to a folder that can be written')
@@ -187,12 +176,12 @@ def _ros() -> Iterator[Finding]:
 
 def _loopback() -> Finding:
     """Send a message through ROS 2 and take it again, in a context of its own."""
+    from antenna_drive.lockstep.entry import choose_transport
+    from antenna_drive.lockstep.leaving import leave
     from rclpy.context import Context
     from rclpy.executors import SingleThreadedExecutor
     from rclpy.node import Node
     from std_msgs.msg import Float64
-    from antenna_drive.lockstep.entry import choose_transport
-    from antenna_drive.lockstep.leaving import leave
     choose_transport(os.environ)
     context = Context()
     context.init(args=[])

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Make the pictures of the live page in docs/: python test/live_pictures.py docs/figures.
 
@@ -26,10 +15,10 @@ import sys
 import tempfile
 from typing import Any
 
-from antenna_drive.campaign.domains import DomainClaim
 from antenna_drive.parameters.loading import load
 from antenna_drive.twin.growing import GrowingVerdict, look_of
 from chromium import Page
+from lab.campaign.domains import DomainClaim
 from later import Later
 from live_command import LiveCommand
 from stand_in_twin import StandInTwin
@@ -42,7 +31,7 @@ PICTURES = (('live.png', 1400, 900, False, 'tune'), ('live_768.png', 768, 1024, 
 LENGTH_S = 31.0
 
 
-TRIAL, CASE = 'docs/trials/growing_verdict_2.jsonl', 'case_0002'
+TRIAL, CASE = 'lab/notebook/growing_verdict_2.jsonl', 'case_0002'
 TEST_S = 30.0
 
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Passages in which the article disagrees with itself, and what each reading of them gives.
 
@@ -33,9 +22,9 @@ from antenna_drive.article.linear import bias_loop, growth, stability_limit
 from antenna_drive.article.measures import OLD_CIRCUIT, Results
 from antenna_drive.article.published import SIGNIFICANT_TIME
 from antenna_drive.emulator.run import simulate
-from antenna_drive.parameters.plain_yaml import read_yaml
 from antenna_drive.parameters.sets import changed
 import numpy as np
+from simgap.inputs.plain_yaml import read_yaml
 
 # Newtons per kilogram force; newton metres per pound-inch.
 STANDARD_GRAVITY = 9.80665

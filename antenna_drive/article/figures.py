@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The article's figures, drawn from new runs with the article's axes and units.
 
@@ -34,14 +23,14 @@ from antenna_drive.article.measures import NEW_CIRCUIT, OLD_CIRCUIT, Results
 from antenna_drive.article.profile_measures import loaded_axis as loop_of_load
 from antenna_drive.article.static_profile import as_in_the_text, bias_voltage, NEW_GAIN
 from antenna_drive.pages import render
-from antenna_drive.parameters.plain_yaml import read_yaml
 from antenna_drive.parameters.sets import changed, TorqueShare
-from antenna_drive.physics.backlash import dead_zone
-from antenna_drive.physics.friction import friction_torque
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 import numpy as np
+from simgap.inputs.plain_yaml import read_yaml
+from simgap.laws.backlash import dead_zone
+from simgap.laws.friction import friction_torque
 
 # Width of two columns on A4 [inch].
 _WIDTH = 6.6

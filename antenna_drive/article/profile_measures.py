@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """T5: figures of the static bias profile (Figs. 15, 16) and of the loaded axis (Figs. 2, 17)."""
 
 from __future__ import annotations
@@ -20,9 +9,7 @@ from functools import lru_cache, partial
 
 from antenna_drive.article import static_profile
 from antenna_drive.article.loaded_axis import bias_at_rest, fade_out, loaded, LoadedAxis, SHARES
-from antenna_drive.article.measures import (
-    Measure, ModelFigure, NEW_CIRCUIT, OLD_CIRCUIT, Results,
-)
+from antenna_drive.article.measures import Measure, ModelFigure, NEW_CIRCUIT, OLD_CIRCUIT, Results
 from antenna_drive.article.static_profile import (
     as_in_the_text, corners, NEW_GAIN, TEXT_FADE_OUT, TEXT_GAIN,
 )

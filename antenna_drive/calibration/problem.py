@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The definition of a fit: free parameters with bounds, targets with weights.
 
@@ -38,12 +27,12 @@ from antenna_drive.article.experiments import DriveExperiment
 from antenna_drive.article.measures import (
     article_experiments, article_measures, Measure, OLD_CIRCUIT, Readout, Results,
 )
-from antenna_drive.errors import one_line
 from antenna_drive.parameters import Drive, load, ParameterError
 from antenna_drive.parameters.loading import find, MOTOR_SECTIONS, PLACES, SECTIONS
-from antenna_drive.parameters.plain_yaml import read_yaml
-from antenna_drive.parameters.schema import Entry, mapping_of, nearest, quoted
 from antenna_drive.parameters.sets import changed, entries, values
+from simgap.errors import one_line
+from simgap.inputs.plain_yaml import read_yaml
+from simgap.inputs.schema import Entry, mapping_of, nearest, quoted
 
 # The circuit of an experiment that uses the configuration's own.
 NO_CIRCUIT = 'none'

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 How well a fit determines its parameters: sensitivity, correlation, profile, trade-off.
 
@@ -29,8 +18,8 @@ from typing import Any
 from antenna_drive.calibration.problem import CalibrationProblem
 from antenna_drive.calibration.search import FitCandidate, SearchResult
 from antenna_drive.emulator.unit import FloatArray
-from antenna_drive.parameters.schema import nearest, ParameterError
 import numpy as np
+from simgap.inputs.schema import nearest, ParameterError
 
 # Half the step of the difference quotient, as a share of the bounds; wider than the jumps of
 # settling times.

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The search for the best fit: seeded CMA-ES with a log from which it can resume.
 
@@ -32,10 +21,10 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from antenna_drive.calibration.problem import CalibrationProblem, Evaluation
-from antenna_drive.errors import UserError
 from antenna_drive.workers import workers
 import cma
 import numpy as np
+from simgap.errors import UserError
 
 # A candidate is given up once it costs more than this times the worst candidate of the better half
 # of the last generation.

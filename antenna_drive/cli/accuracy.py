@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Measure the error of the lock-step against a converged run, by macro-step.
 
@@ -24,7 +13,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from antenna_drive.cli.output import add_json_option, give, Progress
+from simgap.command.output import add_json_option, give, Progress
 
 _DEFAULT_STEPS = (5e-4, 1e-3, 2e-3, 4e-3)
 
@@ -43,8 +32,8 @@ def run(args: argparse.Namespace) -> int:
     from antenna_drive.article.experiments import experiments
     from antenna_drive.article.stability import simulated_limit
     from antenna_drive.emulator.run import FINE_STEP
-    from antenna_drive.errors import UserError
     from antenna_drive.parameters import load
+    from simgap.errors import UserError
 
     steps = args.step or list(_DEFAULT_STEPS)
     for step_s in steps:

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Repeat the article's experiments and compare every published figure with the model's.
 
@@ -39,11 +28,11 @@ from antenna_drive.article.contradictions import Contradiction, contradictions
 from antenna_drive.article.experiments import DriveExperiment
 from antenna_drive.article.measures import Results, with_circuits
 from antenna_drive.article.rows import Row, rows
-from antenna_drive.cli.output import add_json_option, give, Progress, replaced
 from antenna_drive.emulator.run import MACRO_STEP, Run, simulate
 from antenna_drive.parameters import Drive
-from antenna_drive.programs import NEGATIVE, OK
 import numpy as np
+from simgap.command.output import add_json_option, give, Progress, replaced
+from simgap.command.programs import NEGATIVE, OK
 
 # The default parameter set.
 CONFIGURATION = 'dss26'

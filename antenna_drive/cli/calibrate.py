@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Fit parameters to published or measured figures, and report how well these determine them.
 
@@ -33,11 +22,11 @@ from antenna_drive.calibration.configuration import configuration
 from antenna_drive.calibration.problem import read_problem
 from antenna_drive.calibration.report import report
 from antenna_drive.calibration.search import read_log, search
-from antenna_drive.cli.output import add_json_option, check_options, give, Progress, replaced
 from antenna_drive.cli.sharing import add_worker_options
 from antenna_drive.parameters.files import config_dir
-from antenna_drive.parameters.schema import Entry
-from antenna_drive.programs import NEGATIVE, OK
+from simgap.command.output import add_json_option, check_options, give, Progress, replaced
+from simgap.command.programs import NEGATIVE, OK
+from simgap.inputs.schema import Entry
 
 COUNT = 2000
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Predict which effects a planned test can separate, before going to the antenna.
 
@@ -30,10 +19,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from antenna_drive.cli.output import add_json_option, check_options, give, Progress
-from antenna_drive.errors import UserError
-from antenna_drive.parameters.schema import Entry
 import numpy as np
+from simgap.command.output import add_json_option, check_options, give, Progress
+from simgap.errors import UserError
+from simgap.inputs.schema import Entry
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -54,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyse the tests and print which effects they separate."""
-    from antenna_drive.machines.antenna.planned_tests import BUILT_IN, confusability_of, planned
+    from antenna_drive.diagnosis.planned_tests import BUILT_IN, confusability_of, planned
     from antenna_drive.parameters.loading import load
     from antenna_drive.recording.sheet import load_sheet
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Run the saw-tooth test on the old and on the new torque-share circuit, in five ROS 2 processes.
 
@@ -29,7 +18,7 @@ from pathlib import Path
 import tempfile
 from typing import Any, TYPE_CHECKING
 
-from antenna_drive.cli.output import Progress, write_json
+from simgap.command.output import Progress, write_json
 
 if TYPE_CHECKING:  # the nodes' library is missing on some machines, which is said in one line
     from antenna_drive.article.readings import BiasRange

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 r"""
 Say where a real drive and the model part, which effect is behind it, and how far it goes.
 
@@ -44,17 +33,19 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from antenna_drive.cli.large_arrays import give_back_large_arrays
-from antenna_drive.cli.output import add_json_option, check_options, give, Progress, replaced
 from antenna_drive.cli.reading import warnings_in_one_line
 from antenna_drive.cli.verdict_file import findings_of, planning_of
-from antenna_drive.errors import UserError
-from antenna_drive.parameters.schema import Entry
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.import_map import import_file, load_map
+from simgap.command.large_arrays import give_back_large_arrays
+from simgap.command.output import add_json_option, check_options, give, Progress, replaced
+from simgap.errors import UserError
+from simgap.inputs.schema import Entry
 
 if TYPE_CHECKING:
-    from antenna_drive.diagnosis import Diagnosis, Rival, Settings
+    from simgap.next_test.rivals import Rival
+    from simgap.settings import Settings
+    from simgap.verdict.diagnosis import Diagnosis
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -95,7 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.model:
         return _own_machine(arguments)
     # the compiled physics takes a while to load: not before it is needed
-    from antenna_drive.machines.antenna.diagnose import corrected, diagnose_recordings
+    from antenna_drive.diagnosis.diagnose import corrected, diagnose_recordings
     from antenna_drive.parameters.loading import load
 
     drive = load(*arguments.config)
@@ -133,7 +124,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _own_machine(arguments: argparse.Namespace) -> int:
     """Diagnose a machine of the user's own."""
-    from antenna_drive.machines.own import diagnose_logs, load_model, read_logs, summary_of
+    from simgap.model import diagnose_logs, load_model, read_logs, summary_of
 
     for option in ('config', 'corrected'):
         if getattr(arguments, option):
@@ -159,8 +150,8 @@ def _earlier(path: Path | None) -> Sequence[Rival]:
 def _report(path: str | None, diagnosis: Diagnosis) -> None:
     """Write the page about a diagnosis, if one was asked for."""
     if path:
-        from antenna_drive.diagnosis.page import contents
-        from antenna_drive.pages import render
+        from simgap.report.render import render
+        from simgap.report.page import contents
         with replaced(Path(path)) as stream:
             stream.write(render('verdict.html', **vars(contents(diagnosis))).encode())
 
@@ -177,7 +168,7 @@ def _numbers(option: str, texts: Sequence[str]) -> Iterator[tuple[str, float]]:
 
 def _settings(changes: Sequence[str]) -> Settings:
     """Return the thresholds with what was given changed."""
-    from antenna_drive.diagnosis.settings import DEFAULT
+    from simgap.settings import DEFAULT
     settings = DEFAULT
     known = {name: value for name, _, value in DEFAULT.entries()}
     for name, value in _numbers('--threshold', changes):

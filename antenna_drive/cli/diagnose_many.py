@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 r"""
 Diagnose many machines: one row a machine, a table, and a page of the fleet.
 
@@ -42,12 +31,12 @@ import os
 from pathlib import Path
 import shlex
 
-from antenna_drive.cli.output import (
+from antenna_drive.cli.sharing import add_diagnosis_options, add_worker_options
+from simgap.command.output import (
     add_json_option, check_options, give, Progress, replaced, write_json,
 )
-from antenna_drive.cli.sharing import add_diagnosis_options, add_worker_options
-from antenna_drive.parameters.schema import Entry
-from antenna_drive.programs import NEGATIVE, OK
+from simgap.command.programs import NEGATIVE, OK
+from simgap.inputs.schema import Entry
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

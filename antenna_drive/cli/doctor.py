@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Say what of this installation is there, what works, and what to do about the rest.
 
@@ -31,10 +20,10 @@ from __future__ import annotations
 import argparse
 import sys
 
-from antenna_drive.cli.output import add_json_option, give
-from antenna_drive.errors import UserError
 from antenna_drive.health import as_data, BROKEN, examine, Finding, MISSING, NEEDED, OK, PARTS
-from antenna_drive.programs import NEGATIVE, NOT_INSTALLED, OK as DONE
+from simgap.command.output import add_json_option, give
+from simgap.command.programs import NEGATIVE, NOT_INSTALLED, OK as DONE
+from simgap.errors import UserError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Test a drive until it is clear what is wrong with it: test, verdict, better test.
 
@@ -44,14 +33,14 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING
 
-from antenna_drive.cli.output import add_json_option, check_options, give, Progress, replaced
 from antenna_drive.cli.settings import add_settings_option, parse_settings
-from antenna_drive.errors import UserError
-from antenna_drive.parameters.schema import Entry
-from antenna_drive.programs import PARENT
+from simgap.command.output import add_json_option, check_options, give, Progress, replaced
+from simgap.command.programs import PARENT
+from simgap.errors import UserError
+from simgap.inputs.schema import Entry
 
 if TYPE_CHECKING:
-    from antenna_drive.machines.antenna.investigation import RunTest
+    from antenna_drive.diagnosis.investigation import RunTest
     from antenna_drive.recording.sheet import TestSheet
 
 PAGE = 'story.html'
@@ -95,13 +84,13 @@ def run(arguments: argparse.Namespace) -> int:
                   until=Entry('', 0.5, 1.0), duration=Entry('s', 5.0, 600.0),
                   seed=Entry('', 0, whole=True))
     run_test = _run_test(arguments)
-    from antenna_drive.machines.antenna.drive_limits import DriveLimits, read_limits
-    from antenna_drive.machines.antenna.investigation import (
+    from antenna_drive.diagnosis.drive_limits import DriveLimits, read_limits
+    from antenna_drive.diagnosis.investigation import (
         DECIDED, headline, Investigation, InvestigationPlan, lines,
     )
-    from antenna_drive.machines.antenna.planned_tests import BUILT_IN
-    from antenna_drive.machines.antenna.sensors import SensorModel
-    from antenna_drive.pages import render
+    from antenna_drive.diagnosis.planned_tests import BUILT_IN
+    from antenna_drive.diagnosis.sensors import SensorModel
+    from simgap.report.render import render
     from antenna_drive.parameters.loading import load
     from antenna_drive.recording.sheet import load_sheet
     drive = load(*arguments.config)

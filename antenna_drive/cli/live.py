@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Open a page in the browser to see and turn the drive while it runs.
 
@@ -37,10 +26,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from antenna_drive.cli.output import check_options
 from antenna_drive.cli.settings import add_config_option, add_settings_option, parse_settings
-from antenna_drive.errors import UserError
-from antenna_drive.parameters.schema import Entry
+from simgap.command.output import check_options
+from simgap.errors import UserError
+from simgap.inputs.schema import Entry
 
 _PORT = 8034
 # that of Foxglove's own servers

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 r"""
 Predict a recording from its rate command and test sheet, and say how far off the prediction is.
 
@@ -40,14 +29,14 @@ from pathlib import Path
 import sys
 from typing import Any, TYPE_CHECKING
 
-from antenna_drive.cli.output import add_json_option, STANDARD_OUTPUT, write_json
 from antenna_drive.cli.reading import warnings_in_one_line
-from antenna_drive.errors import UserError
 from antenna_drive.recording.atomic import refuse_existing
 from antenna_drive.recording.files import read_recording
+from simgap.command.output import add_json_option, STANDARD_OUTPUT, write_json
+from simgap.errors import UserError
 
 if TYPE_CHECKING:
-    from antenna_drive.machines.antenna.prediction import RecorderErrors
+    from antenna_drive.diagnosis.prediction import RecorderErrors
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -70,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Predict, write what was asked for; 1 if the prediction is worse than --against."""
     # the compiled physics takes a while to load: not before it is needed
-    from antenna_drive.machines.antenna.prediction import predict, RecorderErrors
+    from antenna_drive.diagnosis.prediction import predict, RecorderErrors
     from antenna_drive.parameters.loading import load
     from antenna_drive.recording.csv_format import write_csv
 
@@ -118,7 +107,7 @@ def _mean_ratio(signals: dict[str, dict[str, Any]]) -> float:
 
 
 def _recorder(path: Path) -> RecorderErrors:
-    from antenna_drive.machines.antenna.prediction import RecorderErrors
+    from antenna_drive.diagnosis.prediction import RecorderErrors
     try:
         content = json.loads(path.read_text(encoding='utf-8'))
     except (ValueError, RecursionError) as error:

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Design the next test: the one that tells the answers of a verdict apart.
 
@@ -41,13 +30,13 @@ from pathlib import Path
 import time
 from typing import Any, TYPE_CHECKING
 
-from antenna_drive.cli.output import add_json_option, check_options, give, Progress, replaced
 from antenna_drive.cli.verdict_file import findings_of, planning_of
-from antenna_drive.errors import UserError
-from antenna_drive.parameters.schema import Entry
+from simgap.command.output import add_json_option, check_options, give, Progress, replaced
+from simgap.errors import UserError
+from simgap.inputs.schema import Entry
 
 if TYPE_CHECKING:
-    from antenna_drive.diagnosis import Proposal, TestSpace
+    from simgap.next_test.design import Proposal, TestSpace
 
 _OBJECTIVES = ('separate', 'sharpen', 'detect')
 _RULES = ('d-optimal', 'random')
@@ -90,8 +79,9 @@ def run(arguments: argparse.Namespace) -> int:
     check_options(arguments, jobs=Entry('', 1, whole=True), duration=Entry('s', 5.0, 600.0),
                   rate=Entry('Hz', 20.0, 10000.0), seed=Entry('', 0, whole=True))
     planning = _planning(arguments)
-    from antenna_drive.diagnosis import Findings, objective_for, TestDesign
-    from antenna_drive.diagnosis.proposal import as_data, contents, lines
+    from simgap.next_test.design import objective_for, TestDesign
+    from simgap.next_test.proposal import as_data, contents, lines
+    from simgap.next_test.rivals import Findings
     findings = findings_of(arguments.verdict, planning) if planning else Findings()
     objective = arguments.rule or arguments.objective or objective_for(findings)
     space = (_tests_of_own if arguments.model else _tests_of_drive)(arguments, planning)
@@ -110,7 +100,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.out and found.tests:
         _write(arguments.out, found, space, data)
     if arguments.report:
-        from antenna_drive.pages import render
+        from simgap.report.render import render
         with replaced(arguments.report) as stream:
             shown = contents(found, space)
             stream.write(render('proposal.html', **{**vars(shown), 'data': data}).encode())
@@ -132,9 +122,9 @@ def _planning(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def _tests_of_drive(arguments: argparse.Namespace, planning: dict[str, Any]) -> TestSpace:
-    from antenna_drive.machines.antenna.drive_limits import DriveLimits, read_limits
-    from antenna_drive.machines.antenna.planned_tests import BUILT_IN
-    from antenna_drive.machines.antenna.allowed_tests import AntennaTests
+    from antenna_drive.diagnosis.allowed_tests import AntennaTests
+    from antenna_drive.diagnosis.drive_limits import DriveLimits, read_limits
+    from antenna_drive.diagnosis.planned_tests import BUILT_IN
     from antenna_drive.parameters.loading import load
     from antenna_drive.recording.sheet import load_sheet, parse_sheet
     drive = load(*arguments.config)
@@ -153,7 +143,7 @@ def _tests_of_drive(arguments: argparse.Namespace, planning: dict[str, Any]) -> 
 
 
 def _tests_of_own(arguments: argparse.Namespace, planning: dict[str, Any]) -> TestSpace:
-    from antenna_drive.machines.own import load_model, own_tests
+    from simgap.model import load_model, own_tests
     for option in ('config', 'limits', 'sheet'):
         if getattr(arguments, option):
             raise UserError(f'--{option}: does not go with --model; a model declares its own '
@@ -163,7 +153,7 @@ def _tests_of_own(arguments: argparse.Namespace, planning: dict[str, Any]) -> Te
 
 def _write(path: Path, found: Proposal, space: TestSpace, data: dict[str, Any]) -> None:
     """Write the test that was found: a test sheet, or a table of commands."""
-    from antenna_drive.diagnosis.proposal import lines
+    from simgap.next_test.proposal import lines
     best = found.tests[0]
     heading = [f'{data["duration_s"]:g} s, at least {data["sample_rate_hz"]:g} samples per second',
                *(line.strip() for line in lines(data))]

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Start a drive in its five processes and record it: every signal at every macro-step.
 
@@ -34,15 +23,13 @@ from pathlib import Path
 import time
 from typing import Any
 
-from antenna_drive.cli.output import check_options, Progress
-from antenna_drive.cli.settings import (
-    add_config_option, add_settings_option, parse_settings,
-)
+from antenna_drive.cli.settings import add_config_option, add_settings_option, parse_settings
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
-from antenna_drive.errors import UserError
-from antenna_drive.parameters.schema import Entry
 from antenna_drive.recording.recorder import RunRecorder
 from antenna_drive.recording.sheet import load_sheet, TestSheet
+from simgap.command.output import check_options, Progress
+from simgap.errors import UserError
+from simgap.inputs.schema import Entry
 
 _NAME = 'recorder'
 
@@ -83,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
 def _played(path: Path, sheet: TestSheet | None,
             config: Sequence[str]) -> Mapping[str, Mapping[str, Any]]:
     """Return what a sheet sets on each node."""
-    from antenna_drive.machines.antenna.played import parameters_of
+    from antenna_drive.diagnosis.played import parameters_of
     from antenna_drive.parameters.loading import load
     assert sheet is not None
     try:

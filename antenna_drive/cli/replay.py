@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Drive the emulator with a recorded command, and write its recording beside the real one.
 
@@ -28,13 +17,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from antenna_drive.cli.output import add_json_option, check_options, give
 from antenna_drive.cli.reading import add_recording_options, read
 from antenna_drive.cli.settings import add_config_option
-from antenna_drive.parameters.schema import Entry
 from antenna_drive.recording.atomic import refuse_existing
 from antenna_drive.recording.bag_writer import write_bag
 from antenna_drive.recording.replay import distances, twin
+from simgap.command.output import add_json_option, check_options, give
+from simgap.inputs.schema import Entry
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

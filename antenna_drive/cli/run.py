@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 r"""
 Run the drive in one process and write every signal.
 
@@ -26,11 +15,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from antenna_drive.cli.output import check_options, Progress
-from antenna_drive.cli.settings import (
-    add_config_option, add_settings_option, parse_settings,
-)
-from antenna_drive.parameters.schema import Entry
+from antenna_drive.cli.settings import add_config_option, add_settings_option, parse_settings
+from simgap.command.output import check_options, Progress
+from simgap.inputs.schema import Entry
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Read what the JSON of a diagnosis says for whatever comes after it."""
 
 from __future__ import annotations
@@ -19,10 +8,10 @@ import json
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
-from antenna_drive.errors import UserError
+from simgap.errors import UserError
 
 if TYPE_CHECKING:
-    from antenna_drive.diagnosis import Findings
+    from simgap.next_test.rivals import Findings
 
 
 def planning_of(path: Path) -> dict[str, Any]:
@@ -54,7 +43,7 @@ def findings_of(path: Path, planning: dict[str, Any]) -> Findings:
     UserError : the entry is damaged
 
     """
-    from antenna_drive.diagnosis import Findings
+    from simgap.next_test.rivals import Findings
     try:
         return Findings.of_data(planning)
     except (KeyError, TypeError, ValueError, AttributeError) as error:

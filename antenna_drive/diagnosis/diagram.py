@@ -1,88 +1,31 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
-"""The picture of a machine as blocks and lines, on which a verdict marks the suspected parts."""
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""The picture of the drive: from the rate command on the left to the encoder on the right."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import ClassVar
+from simgap.machine.diagram import Diagram, DiagramBlock
 
-# The default layout: number of blocks in a row, their width and the gap between them.
-_IN_A_ROW, _WIDTH, _GAP = 4, 170, 20
-
-
-@dataclass(frozen=True)
-class DiagramBlock:
-    """
-    A part of the machine.
-
-    Attributes
-    ----------
-    component : as the effects of the catalogue name it
-    label : for people
-    x, y : its upper left corner
-    width : of the block
-
-    """
-
-    component: str
-    label: str
-    x: float
-    y: float
-    width: float
-
-
-@dataclass(frozen=True)
-class Diagram:
-    """
-    Blocks and the lines between them.
-
-    Attributes
-    ----------
-    blocks : in the order in which they are drawn
-    lines : x and y of their two ends
-    height : of a block
-    several : components that are no block but several, with the components of those blocks
-
-    """
-
-    height: ClassVar[int] = 26
-    blocks: tuple[DiagramBlock, ...]
-    lines: tuple[tuple[float, float, float, float], ...] = ()
-    several: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, components: Iterable[str]) -> Diagram:
-        """Return the diagram of a machine that gives none: a block for each component, in rows."""
-        return cls(tuple(
-            DiagramBlock(component, component.replace('_', ' '),
-                         _GAP + i % _IN_A_ROW * (_WIDTH + _GAP),
-                         _GAP + i // _IN_A_ROW * (cls.height + _GAP), _WIDTH)
-            for i, component in enumerate(dict.fromkeys(components))))
-
-    @property
-    def box(self) -> tuple[float, float, float, float]:
-        """Return x, y, width and height of what holds all blocks, with a margin."""
-        left, top = (min(b.x for b in self.blocks) - 2, min(b.y for b in self.blocks) - 2)
-        return (left, top, max(b.x + b.width for b in self.blocks) + 2 - left,
-                max(b.y for b in self.blocks) + self.height + 2 - top)
-
-    def shares(self, suspicion: Mapping[str, float]) -> dict[str, float]:
-        """Return the share of each component that has a block, from those of all components."""
-        found: dict[str, float] = {}
-        for component, share in suspicion.items():
-            for one in self.several.get(component, (component,)):
-                found[one] = found.get(one, 0.0) + share
-        return found
+DIAGRAM = Diagram(
+    blocks=(
+        DiagramBlock('loop', 'rate command', 10, 95, 120),
+        DiagramBlock('current_1', 'ammeter 1', 170, 2, 175),
+        DiagramBlock('motor_1', 'motor 1, amplifiers', 170, 30, 175),
+        DiagramBlock('torque_share', 'torque share, Filter 1', 170, 95, 175),
+        DiagramBlock('motor_2', 'motor 2, amplifiers', 170, 160, 175),
+        DiagramBlock('current_2', 'ammeter 2', 170, 188, 175),
+        DiagramBlock('tach_1', 'tach 1', 380, 2, 100),
+        DiagramBlock('gearbox_1', 'gearbox 1', 380, 30, 100),
+        DiagramBlock('bias_voltage', 'voltmeter', 380, 95, 100),
+        DiagramBlock('gearbox_2', 'gearbox 2', 380, 160, 100),
+        DiagramBlock('tach_2', 'tach 2', 380, 188, 100),
+        DiagramBlock('axis', 'axis and dish', 530, 95, 130),
+        DiagramBlock('encoder', 'encoder', 700, 95, 100),
+    ),
+    lines=(
+        (130, 104, 170, 44), (130, 112, 170, 172), (345, 43, 380, 43), (345, 173, 380, 173),
+        (480, 43, 530, 102), (480, 173, 530, 114), (660, 108, 700, 108), (255, 95, 255, 56),
+        (255, 121, 255, 160), (345, 108, 380, 108),
+    ),
+    several={'motors': ('motor_1', 'motor_2')},
+)

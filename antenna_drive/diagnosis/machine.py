@@ -1,553 +1,570 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
-"""
-The seam between the diagnosis and the machine: what a diagnosis asks of a machine.
-
-A machine of your own needs two things: a simulation (`Machine.predict`) and the numbers that may
-differ from your model (`nuisances` and `effects`). Everything else has a default that you may
-override, for speed or because you know your machine better.
-"""
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""The antenna drive of a configuration, in the tests that were recorded, as a `Machine`."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from copy import copy
-from dataclasses import dataclass, field
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+import copy
+from dataclasses import dataclass, replace
+from itertools import product
 import math
-from types import MappingProxyType
-from typing import Any
+from statistics import fmean
+from threading import Lock
+from typing import Any, TypeAlias
 
-from antenna_drive.diagnosis.diagram import Diagram
+from antenna_drive.diagnosis import gust
+from antenna_drive.diagnosis.advice import ADVICE
+from antenna_drive.diagnosis.catalogue import catalogue, DIGITS_SEEN, EXTRA_MODE
+from antenna_drive.diagnosis.diagram import DIAGRAM
+from antenna_drive.diagnosis.disturbances import DISTURBANCES, DriveDisturbance
+from antenna_drive.diagnosis.excitation import (
+    Bias, Longest, schedule, with_bias, with_torque,
+)
+from antenna_drive.diagnosis.field_test import (
+    CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, prepared, TACH_1, TACH_2, UNITS,
+)
+from antenna_drive.diagnosis.late_readings import read_at, RipplingTachometer
+from antenna_drive.diagnosis.modifiers import (
+    ADD, AntennaParameter, change, Modifier, ReadingModifier, RunModifier, RunSetup,
+    SensorReadings,
+)
+from antenna_drive.diagnosis.recorded_command import RecordedCommand
+from antenna_drive.diagnosis.sensors import digit_of
+from antenna_drive.diagnosis.tolerances import nuisances, starting_places
+from antenna_drive.diagnosis.wave_orders import likely_orders
+from antenna_drive.diagnosis.waves import fastest_wave, is_there, Wave
+from antenna_drive.emulator import batch
+from antenna_drive.parameters.records import place_of
+from antenna_drive.parameters.sets import Drive
+from antenna_drive.recording.recording import Recording
+from antenna_drive.recording.sheet import CircuitBias, sheet_tree, TestSheet
 import numpy as np
-from numpy.typing import NDArray
+from simgap.machine.contract import (
+    Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point,
+    Regimes, TimeScales,
+)
+from simgap.machine.motion import Motion
 
-FloatArray = NDArray[np.float64]
-Point = Mapping[str, float]
-# An input over time: from times [s] to values, shape (n,) each.
-Course = Callable[[FloatArray], FloatArray]
-
-# Sizes that may be tried out before a fit: of a single number as shares of its bounds; of a wave
-# the least amplitude in steps, the factor to the next one, and the phases [rad].
-_SHARES = (-0.9, -0.6, -0.4, -0.25, -0.15, -0.08, 0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 0.9)
-_LEAST_AMPLITUDE = 2.5
-_GROWTH = 2.5
-_PHASES = tuple(2.0 * math.pi * k / 6 for k in range(6))
+_TIME_SCALES = TimeScales(start_s=1.5, scan_s=8.0, pulse_s=0.15, response_s=1.5, block_s=1.0)
+LONGEST_STEP = 2.65e-3
+# A search looks at this much of a test [s]. It and derivatives take longer steps, whose error is
+# a tenth of the noise.
+TRUNCATED_S = 15.0
+LOW_FIDELITY_STEP = 5.6e-3
+# A wave of the motors' angle turns by at most this much in a step [rad], down to a shortest
+# step [s].
+WAVE_STEP = 0.9
+SHORTEST_STEP = 7e-4
+# An encoder's digit differs from the sheet's if it is larger by this factor.
+COARSER = 1.3
+# Numbers of cycles per revolution that are tried of each wave.
+_ORDERS = 3
+# Hysteresis settles too fast for long steps.
+_STIFF = ('hysteresis', 'hysteresis_share')
+# Places inside the gap, as shares of half the gap, at which each motor may start.
+_STARTS = np.linspace(-0.95, 0.95, 13)
+# Runs that are kept, and tables of steps: a test has one for each bias voltage and each wave.
+_KEPT_RUNS = 24
+_KEPT_PLANS = 24
+# By number: late jumps of the command [s], or other means in its holes [rad/s].
+_Numbered: TypeAlias = tuple[tuple[int, float], ...]
+# Test, longest step, delay of the command [s], what it did unrecorded, source of the bias.
+_PlanKey: TypeAlias = tuple[int, Longest, float, tuple[_Numbered, _Numbered], Bias]
 
 
 @dataclass(frozen=True)
-class Parameter:
+class _Job:
+    """A run that is wanted: the parameters that act on it, by name and value, and its end [s]."""
+
+    experiment: int
+    items: tuple[tuple[str, float], ...]
+    until: float
+
+
+@dataclass(frozen=True)
+class _Outputs:
     """
-    A number in which the machine may differ from its model; zero is the model as configured.
+    What a run gives at the output times.
 
     Attributes
     ----------
-    name : unique in its machine
-    unit : of the value
-    low, high : hard bounds, with zero between them
-    step : of the difference quotient, in the unit of the value
-    prior_sigma : standard deviation of a Gaussian prior about zero; 0 for no prior
-    experiment : index of the one experiment that it acts on; None for all
-    start : where a fit begins
-    is_shape : True for a shape parameter, which has no meaning while its effect is absent
-    tolerance : size up to which the model's number may be off without being wrong
-    label : key and value of the label of the tests that it acts on; None for all
-    least_step : least step of a difference quotient, for a prediction that is a staircase in the
-        value, such as a delay in samples; 0 for none
+    values : and slopes of n channels, shape (times, n, 2)
+    rippling : tachometers with a ripple, by their channel
 
     """
 
-    name: str
-    unit: str
-    low: float
-    high: float
-    step: float
-    prior_sigma: float = 0.0
-    experiment: int | None = None
-    start: float = 0.0
-    is_shape: bool = False
-    tolerance: float = 0.0
-    label: tuple[str, str] | None = field(default=None, kw_only=True)
-    least_step: float = field(default=0.0, kw_only=True)
+    values: FloatArray
+    rippling: Mapping[int, RipplingTachometer]
 
 
-@dataclass(frozen=True)
-class Form:
+class AntennaMachine(Machine):
     """
-    One mathematical form of an effect.
-
-    Attributes
-    ----------
-    name : for people
-    parameters : those that are no shape parameters are zero where the effect is absent
-    scanned : True if the form was chosen by a scan of many, such as the orders of a ripple
-    is_course : True for a course over time that is free at every moment, such as a gust
-    is_wave : True if its two sizes are the sine and the cosine part of a wave
-
-    """
-
-    name: str
-    parameters: tuple[Parameter, ...]
-    scanned: bool = field(default=False, kw_only=True)
-    is_course: bool = field(default=False, kw_only=True)
-    is_wave: bool = field(default=False, kw_only=True)
-
-    @property
-    def sizes(self) -> list[Parameter]:
-        """Return the parameters that vanish with the effect."""
-        return [p for p in self.parameters if not p.is_shape]
-
-    @property
-    def start(self) -> dict[str, float]:
-        """Return the point at which a fit of this form begins."""
-        return {p.name: p.start for p in self.parameters}
-
-    @property
-    def trials(self) -> list[dict[str, float]]:
-        """
-        Return sizes, far from zero, that may be tried out before a fit.
-
-        Of a single size these are shares of its bounds, denser near zero. Of a wave they are
-        amplitudes that grow from a few steps to the bound, each in several phases. Other forms
-        have none.
-        """
-        if self.is_wave and len(self.sizes) == 2:  # with labels there are more
-            sine, cosine = self.sizes
-            least = _LEAST_AMPLITUDE * sine.step
-            amplitudes = [least * _GROWTH ** k for k in range(
-                1 + int(math.log(max(sine.high / least, 1.0), _GROWTH)))]
-            return [{sine.name: amplitude * math.sin(phase),
-                     cosine.name: amplitude * math.cos(phase)}
-                    for amplitude in amplitudes for phase in _PHASES]
-        if len(self.sizes) != 1:
-            return []
-        [size] = self.sizes
-        return [{size.name: share * (size.high if share > 0.0 else -size.low)}
-                for share in _SHARES if share > 0.0 or size.low < 0.0]
-
-    def implausibility(self, point: Point, deviations: Point) -> float:
-        """
-        Return how little these values look like the effect; above 1 is implausible.
-
-        `deviations` has their standard deviations; it is empty where they are not known.
-        """
-        return 0.0
-
-
-@dataclass(frozen=True)
-class Effect:
-    """
-    Something that the model may lack.
-
-    Attributes
-    ----------
-    id : 'component.effect'
-    component : the part of the machine that it sits in
-    cause : its physical cause, one sentence
-    look : what it looks like in the signals, one sentence
-    forms : alternatives; the best one counts
-    parts : ids of the effects that act together in it, each in its own place
-    simpler : ids of the effects that it becomes at an end of its range
-
-    """
-
-    id: str  # noqa: A003: the word of the verdict's format
-    component: str
-    cause: str
-    look: str
-    forms: tuple[Form, ...]
-    parts: tuple[str, ...] = ()
-    simpler: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class DisturbanceInput:
-    """
-    A place where an unknown input may act on the machine.
-
-    Attributes
-    ----------
-    name : unique in its machine, for people
-    component : the part of the machine that it acts on
-
-    """
-
-    name: str
-    component: str
-
-
-@dataclass(frozen=True)
-class Colour:
-    """
-    The colour of noise: a filter whose output is white, see `noise`.
-
-    Attributes
-    ----------
-    pole : of the slow part, for one sample; 0 if there is none
-    gain : share of an innovation that stays in the slow part
-    level : standard deviation of the innovations, in units of the stated noise
-
-    """
-
-    pole: float = 0.0
-    gain: float = 0.0
-    level: float = 1.0
-
-
-@dataclass(frozen=True)
-class Experiment:
-    """
-    What was measured in one test.
-
-    Attributes
-    ----------
-    name : for people
-    time : shape (n,) [s]
-    channels : names of the c signals
-    units : of the signals
-    measured : shape (n, c); NaN where there is no sample
-    noise : standard deviation of the residuals of a perfect model, shape (n, c)
-    quantised : names of signals whose residual at rest is a fraction of a digit, not noise
-    model_error : slow error that the model may have in each signal however right it is, shape
-        (c,), in the signals' units; None for a usual share of the motion
-    colours : of the noise, one for each signal, as a diagnosis finds it; empty for white noise
-    labels : what was different in this test, such as load: A; see `interventions`
-
-    """
-
-    name: str
-    time: FloatArray
-    channels: tuple[str, ...]
-    units: tuple[str, ...]
-    measured: FloatArray
-    noise: FloatArray
-    quantised: tuple[str, ...] = ()
-    model_error: FloatArray | None = None
-    colours: tuple[Colour, ...] = ()
-    labels: Mapping[str, str] = field(default_factory=dict)
-
-    def model_error_of(self, channel: int, share: float) -> float:
-        """Return the model's error in a signal; by default a share of the signal's spread."""
-        if self.model_error is not None:
-            return float(self.model_error[channel])
-        values = self.measured[:, channel]
-        return share * float(np.nanstd(values)) if np.isfinite(values).any() else 0.0
-
-
-@dataclass(frozen=True)
-class Regimes:
-    """The regime of motion of each sample: `labels`, shape (n,), are indices into `names`."""
-
-    names: tuple[str, ...]
-    labels: NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-class TimeScales:
-    """
-    How fast the machine is, which the search and the localisation need to know.
-
-    Attributes
-    ----------
-    start_s : time within which the effect of the initial conditions shows [s]
-    scan_s : length of the part of a test that a scan of parameter values looks at [s]
-    pulse_s : rise time of the pulses of an unknown input [s]
-    response_s : time after which the response to such a pulse has ended [s]
-    block_s : time beyond which residuals are independent, for the bootstrap [s]
-
-    """
-
-    start_s: float
-    scan_s: float
-    pulse_s: float
-    response_s: float
-    block_s: float
-
-    @classmethod
-    def of_duration(cls, duration_s: float) -> TimeScales:
-        """Return usual scales for tests of a duration [s]."""
-        return cls(start_s=0.05 * duration_s, scan_s=0.27 * duration_s,
-                   pulse_s=0.005 * duration_s, response_s=0.05 * duration_s,
-                   block_s=0.03 * duration_s)
-
-
-class Machine(ABC):
-    """
-    A machine that can be simulated, and the experiments that were made with it.
+    The antenna drive of a configuration, in the tests that were recorded.
 
     Parameters
     ----------
-    experiments
-        what was measured
-    nuisances
-        numbers that are known only within a tolerance; they are fitted beside any effect
-    effects
-        the catalogue of what the model may lack
+    recordings
+        of one machine, by name
+    drive
+        the configuration
+    threads
+        how many runs at once
+    tolerance
+        of the parameters, where no sheet gives it
 
-    Attributes
-    ----------
-    experiments, nuisances, effects : as given; the effects by id
-    disturbance_inputs : where an unknown input may act; readings need not be listed
-    notes : what the machine inferred or missed, for people
-    diagram : picture of the machine for the page; None for a block for each component
-    advice : tests that settle what is open: names of effects without their component (empty for
-        any), and what to record
-    planning : what the design of a further test must know of the tests, as plain data
+    Raises
+    ------
+    UserError : a recording lacks its rate command or has no reading to compare
 
     """
 
-    experiments: Sequence[Experiment]
-    nuisances: Sequence[Parameter]
-    effects: Mapping[str, Effect]
-    disturbance_inputs: Sequence[DisturbanceInput] = ()
-    notes: Sequence[str] = ()
-    diagram: Diagram | None = None
-    advice: Sequence[tuple[Sequence[str], str]] = ()
-    planning: Mapping[str, Any] = MappingProxyType({})
+    disturbance_inputs: Sequence[DisturbanceInput] = DISTURBANCES
+    time_scales = _TIME_SCALES
+    diagram = DIAGRAM
+    advice = ADVICE
 
-    def __init__(self, experiments: Iterable[Experiment], nuisances: Iterable[Parameter] = (),
-                 effects: Iterable[Effect] = ()) -> None:
-        """Keep what was measured and what may differ."""
-        self.experiments = tuple(experiments)
-        self.nuisances = tuple(nuisances)
-        self.effects = {effect.id: effect for effect in effects}
-
-    # -- what a machine must give --------------------------------------------------------------
-
-    @abstractmethod
-    def predict(self, point: Point, experiment: int) -> FloatArray:
-        """
-        Return the readings of one experiment, had the machine these parameter values.
-
-        Parameters
-        ----------
-        point
-            parameter values by name; a parameter that is not named is zero, a shape parameter
-            that is not named has no effect
-        experiment
-            its index
-
-        Returns
-        -------
-        array of shape (n, c), as `Experiment.measured`; NaN or infinite where the run diverged
-
-        """
-
-    # -- what it may override for speed --------------------------------------------------------
-
-    def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
-                 until: float = math.inf) -> list[list[FloatArray | None]]:
-        """
-        Return the readings of several variants.
-
-        Parameters
-        ----------
-        points
-            parameter values by name, one mapping for each variant
-        only
-            for each variant the index of the one experiment that is wanted, None for all
-        until
-            end of the simulation after an experiment's first sample [s]; later readings are NaN
-
-        Returns
-        -------
-        for each variant and experiment an array of shape (n, c), or None where not wanted
-
-        """
-        results: list[list[FloatArray | None]] = []
-        for point, one in zip(points, only or [None] * len(points), strict=True):
-            row: list[FloatArray | None] = [None] * len(self.experiments)
-            for k in range(len(row)) if one is None else (one,):
-                readings = self.predict(point, k)
-                if math.isfinite(until):
-                    time = self.experiments[k].time
-                    readings = np.where((time - time[0] > until)[:, np.newaxis], np.nan, readings)
-                row[k] = readings
-            results.append(row)
-        return results
-
-    def truncated(self) -> Machine:
-        """Return the machine with as much of each test as a search needs."""
-        return self
-
-    def low_fidelity(self) -> Machine:
-        """Return a faster machine with nearly the same readings, for derivatives."""
-        return self
-
-    # -- what it may know better ---------------------------------------------------------------
+    def __init__(self, recordings: Mapping[str, Recording], drive: Drive, threads: int = 2,
+                 tolerance: float = 0.02) -> None:
+        """Prepare the tests and take the sensors' noise from a first run."""
+        self._executor = ThreadPoolExecutor(threads)
+        self._runs: OrderedDict[_Job, _Outputs] = OrderedDict()
+        self._plans: OrderedDict[_PlanKey, batch.Schedule] = OrderedDict()
+        self._lock = Lock()
+        self._longest_step = LONGEST_STEP
+        self._low_fidelity: AntennaMachine | None = None
+        notes: list[str] = []
+        self._tests = prepared(recordings, drive, notes.append)
+        for test in self._tests:
+            frequencies = test.record['plant']['axis']['mode_frequencies']
+            if frequencies[0, EXTRA_MODE] == 0.0:
+                frequencies[0, EXTRA_MODE] = 1.0
+        given = [recording.sheet.parameter_tolerance for recording in recordings.values()
+                 if recording.sheet.parameter_tolerance is not None]
+        if not given:
+            notes.append(f'no sheet gives parameter_tolerance: {tolerance:g} assumed')
+        self.notes = notes
+        self.tolerance = max(given, default=tolerance)
+        self._digit = _coarser_digit(self._tests)
+        tolerances = nuisances(self._tests, self.tolerance)
+        effects = catalogue([float(test.time[-1]) for test in self._tests], self._digit)
+        # the nuisance that changes the same number in the same way, by field
+        self._tolerance_of = {(item.modifier.fields[0], item.modifier.how): item
+                              for item in tolerances
+                              if item.experiment is None and item.modifier.fields}
+        # a point is plain numbers: what they do, and in which test alone, is looked up by name
+        self._run_modifiers: dict[str, tuple[RunModifier, int | None]] = {}
+        self._reading_modifiers: dict[str, tuple[ReadingModifier, int | None]] = {}
+        super().__init__((), tolerances, [
+            _tolerated(effect, tolerances) for effect in effects.values()])
+        for item in (*tolerances, *(p for effect in effects.values()
+                                    for form in effect.forms for p in form.parameters)):
+            self._register(item)
+        self.experiments = self._experiments({})
+        self._drive = drive
+        self._in_common = _in_common(test.sheet for test in self._tests)
+        self.planning = {'sheet': sheet_tree(self._in_common)}
 
     @property
-    def time_scales(self) -> TimeScales:
-        """Return how fast the machine is; by default in proportion to the longest test."""
-        return TimeScales.of_duration(max(
-            float(e.time[-1] - e.time[0]) for e in self.experiments))
+    def records(self) -> Sequence[np.ndarray[Any, np.dtype[Any]]]:
+        """Return the drive's record in each test: as configured and as the sheet says."""
+        return [test.record for test in self._tests]
 
-    def with_experiments(self, experiments: Sequence[Experiment]) -> Machine:
-        """Return the machine with the same experiments, of which more is known."""
-        other = copy(self)
-        other.experiments = tuple(experiments)
+    def _register(self, item: Parameter) -> None:
+        assert isinstance(item, AntennaParameter)
+        if isinstance(item.modifier, RunModifier):
+            self._run_modifiers[item.name] = item.modifier, item.experiment
+        else:
+            assert isinstance(item.modifier, ReadingModifier)
+            self._reading_modifiers[item.name] = item.modifier, item.experiment
+
+    def _experiments(self, point: Point) -> tuple[Experiment, ...]:
+        """Return the tests, with the noise of readings that move as at a point."""
+        found = []
+        for k, test in enumerate(self._tests):
+            out = self._run(self._job(k, point, math.inf)).values[::test.parts]
+            # the machine may move faster than the model without effects: the readings tell
+            slope = np.fmax(np.abs(out[:, :, 1]), np.abs(test.slope))
+            noise = test.sensors.noise(out[:, :, 0], slope, test.jitter)
+            found.append(Experiment(test.name, test.time, tuple(CHANNELS.values()), UNITS,
+                                    test.measured, noise, quantised=('encoder',),
+                                    labels=test.labels))
+        return tuple(found)
+
+    # -- variants of the machine ---------------------------------------------------------------
+
+    def with_noise_at(self, point: Point) -> AntennaMachine:
+        """Return the machine with the noise of readings that move as at a point."""
+        other = copy.copy(self)
+        other.experiments = self._experiments(point)
         return other
 
-    def without(self, effects: Collection[str]) -> Machine:
-        """
-        Return the machine with a catalogue that lacks some effects.
-
-        It also lacks their parts, what they are parts of, and what becomes one of them at an end
-        of its range.
-
-        Raises
-        ------
-        KeyError : there is no effect of a name
-
-        """
-        gone = {name for effect in effects for name in (effect, *self.effects[effect].parts)}
-        other, kept = copy(self), dict(self.effects)
-        while gone.intersection(kept):
-            kept = {name: effect for name, effect in kept.items() if name not in gone}
-            gone |= {name for name, effect in kept.items()
-                     if gone.intersection((*effect.parts, *effect.simpler))}
-        other.effects = kept
+    def truncated(self) -> AntennaMachine:
+        """Return the machine with the first part of each test; a chirp stays whole."""
+        other = self._with_long_steps()
+        other._tests = [test.until(TRUNCATED_S if test.repeats else math.inf)
+                        for test in self._tests]
+        sizes = [test.time.size for test in other._tests]
+        other.experiments = tuple(
+            replace(e, time=e.time[:n], measured=e.measured[:n], noise=e.noise[:n])
+            for n, e in zip(sizes, self.experiments, strict=True))
         return other
 
-    def with_noise_at(self, point: Point) -> Machine:
-        """
-        Return the machine with the noise that its sensors have where it moves as at `point`.
+    def low_fidelity(self) -> AntennaMachine:
+        """Return the machine with longer steps."""
+        if self._longest_step >= LOW_FIDELITY_STEP:
+            return self
+        if self._low_fidelity is None:
+            self._low_fidelity = self._with_long_steps()
+        return self._low_fidelity
 
-        A jitter of the time stamps makes a fast reading noisier than a slow one.
-        """
-        return self
+    def _with_long_steps(self) -> AntennaMachine:
+        other = copy.copy(self)
+        other._runs = OrderedDict()
+        other._plans = OrderedDict()
+        other._longest_step = LOW_FIDELITY_STEP
+        return other
+
+    # -- what it knows of its motion -----------------------------------------------------------
+
+    def regimes(self, experiment: int) -> Regimes:
+        """Return the regime of motion of each sample."""
+        return self._motion(experiment).regimes()
+
+    def covariates(self, experiment: int) -> Mapping[str, FloatArray]:
+        """Return rate, direction, load, angle, time and acceleration."""
+        return self._motion(experiment).covariates()
+
+    def _motion(self, experiment: int) -> Motion:
+        """Return the motion in an experiment, as measured or else as simulated."""
+        recorded = self.experiments[experiment]
+        predicted = self.predict({}, experiment)
+
+        def signal(c: int) -> FloatArray:
+            measured = recorded.measured[:, c]
+            return np.where(np.isfinite(measured), measured, predicted[:, c])
+
+        limit = float(self._tests[experiment].record['motor_1']['motor']['current_limit'][0])
+        return Motion(recorded.time, rate=0.5 * (signal(TACH_1) + signal(TACH_2)),
+                      load=signal(CURRENT_1) + signal(CURRENT_2), angle=signal(ENCODER),
+                      load_limit=2.0 * limit)
 
     def initial_conditions(self, experiment: int) -> Sequence[Sequence[Point]]:
         """
-        Return initial conditions that are tried out before a fit, for one experiment.
+        Return starting places of both motors inside their gaps.
 
-        Gradients do not lead from one side of a gap to the other. Groups are tried one after the
-        other, each from the best of those before it: conditions that hardly depend on each other
-        need not be tried in all combinations.
+        All combinations: where a bias closes both gaps at once, each motor's place looks right
+        or wrong by the other's. One after the other they end in a wrong pair.
         """
-        return ()
+        first, second = (item.name for item in starting_places(
+            experiment, self._tests[experiment]))
+        return [[{first: one, second: other}
+                 for one, other in product(_STARTS.tolist(), repeat=2)]]
+
+    # -- effects -------------------------------------------------------------------------------
 
     def forms(self, effect: Effect, residuals: Sequence[FloatArray]) -> Sequence[Form]:
-        """
-        Return the forms of an effect that are worth a fit.
-
-        Parameters
-        ----------
-        effect
-            of the catalogue
-        residuals
-            of each experiment, measured minus predicted without the effect, shape (n, c)
-
-        """
-        return effect.forms
+        """Return an effect's forms; those of a wave with its likeliest orders."""
+        found: list[Form] = []
+        for form in effect.forms:
+            if isinstance(form, Wave):
+                found += [self._wave_at(form, order) for order in likely_orders(
+                    form, self.experiments, residuals, _ORDERS)]
+            else:
+                found.append(form)
+        return found
 
     def typical_form(self, effect: Effect) -> Form:
-        """Return the form of an effect by which planned tests are judged."""
-        return effect.forms[0]
+        """Return the first form of an effect; of a wave, one of a middle order."""
+        form = effect.forms[0]
+        if isinstance(form, Wave):
+            return self._wave_at(form, form.orders[min(11, len(form.orders) - 1)])
+        return form
 
     def form_named(self, effect: Effect, name: str) -> Form:
-        """
-        Return the form of an effect by its name.
-
-        Raises
-        ------
-        KeyError : the effect has no such form
-
-        """
-        for form in effect.forms:
-            if form.name == name:
-                return form
-        raise KeyError(f'{effect.id}: {name}')
-
-    def relatives(self, ident: str) -> Iterator[tuple[Effect, float]]:
-        """Yield an effect in other places, with the factor of its size that does as much."""
-        effect = self.effects[ident]
-        for part in effect.parts:
-            yield self.effects[part], float(len(effect.parts))
-        for whole in self.effects.values():
-            if effect.id in whole.parts:
-                yield whole, 1.0 / len(whole.parts)
-                yield from ((self.effects[part], 1.0) for part in whole.parts
-                            if part != effect.id)
+        """Return the form of an effect by its name; that of a wave says its order."""
+        form = effect.forms[0]
+        if isinstance(form, Wave):
+            return self._wave_at(form, form.order_of(name))
+        if name == DIGITS_SEEN and not self._digit:
+            return form  # a planned test has no readings to see digits in: it is rounded
+        return super().form_named(effect, name)
 
     def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
         """Return the form of an effect's part that corresponds to a form of the effect."""
-        return part.forms[effect.forms.index(form)]
+        if not isinstance(form, Wave):
+            return part.forms[effect.forms.index(form)]
+        wave = part.forms[0]
+        assert isinstance(wave, Wave)
+        return self._wave_at(wave, form.shape.order)
+
+    def _wave_at(self, form: Wave, order: float) -> Wave:
+        wave = form.at(order)
+        for item in wave.parameters:
+            self._register(item)
+        return wave
 
     def absorb(self, point: Point, removed: Point) -> dict[str, float]:
-        """
-        Return the nuisances that take over what they can of an effect that is removed.
-
-        Parameters
-        ----------
-        point
-            the nuisances
-        removed
-            the values of the effect's parameters
-
-        """
-        return dict(point)
+        """Return the tolerances that take over what they can of an effect that is removed."""
+        result = dict(point)
+        for name, value in removed.items():
+            modifier, _ = self._run_modifiers.get(name) or self._reading_modifiers[name]
+            for path in modifier.fields:
+                tolerance = self._tolerance_of.get((path, modifier.how))
+                if tolerance is None or tolerance.name not in result:
+                    continue
+                both = _together(result[tolerance.name], value, modifier.how)
+                result[tolerance.name] = min(max(both, tolerance.low), tolerance.high)
+        return result
 
     def take_over(self, point: Point, forms: Sequence[Form]) -> tuple[dict[str, float], set[str]]:
         """
         Return a point at which effects alone stand for their numbers.
 
-        A nuisance may stand for the very number that an effect changes. Both together are not
-        determined, so the nuisance is held at zero, and the effect takes over its value. Of
-        several nuisances it takes over what they have in common.
-
-        Parameters
-        ----------
-        point
-            nuisances and effects
-        forms
-            of the effects
-
-        Returns
-        -------
-        the point, and the names of the nuisances that are held at zero; by default none are
-
+        An effect of several numbers, such as one in both motors, takes over what their tolerances
+        have in common. These stay free, because the numbers may differ from each other.
         """
-        return dict(point), set()
+        result, held = dict(point), set()
+        for item in (p for form in forms for p in form.sizes):
+            assert isinstance(item, AntennaParameter)
+            how, fields = item.modifier.how, item.modifier.fields
+            same = [found for path in fields if (found := self._tolerance_of.get((path, how)))]
+            if not same or len(same) < len(fields):
+                continue
+            common = fmean(result.get(tolerance.name, 0.0) for tolerance in same)
+            together = _together(result[item.name], common, how)
+            result[item.name] = min(max(together, item.low), item.high)
+            for tolerance in same:
+                rest = _apart(result.get(tolerance.name, 0.0), common, how)
+                result[tolerance.name] = min(max(rest, tolerance.low), tolerance.high)
+            if len(same) == 1:
+                held.add(same[0].name)
+        return result, held
 
-    def regimes(self, experiment: int) -> Regimes:
-        """Return the regime of motion of each sample; by default there is one regime."""
-        return Regimes(('whole test',),
-                       np.zeros(self.experiments[experiment].time.size, np.int64))
+    # -- running -------------------------------------------------------------------------------
 
-    def covariates(self, experiment: int) -> Mapping[str, FloatArray]:
-        """Return quantities that a residual may depend on, shape (n,) each; by default time."""
-        return {'time': self.experiments[experiment].time}
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return the readings of one experiment; see `Machine.predict`."""
+        found = self.simulate([point], [experiment])[0][experiment]
+        assert found is not None
+        return found
+
+    def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
+                 until: float = math.inf) -> list[list[FloatArray | None]]:
+        """Return the readings of several variants; see `Machine.simulate`."""
+        results: list[list[FloatArray | None]] = [[None] * len(self._tests) for _ in points]
+        # what acts on readings alone shares a run
+        uses: dict[_Job, list[int]] = {}
+        for i, (point, one) in enumerate(zip(points, only or [None] * len(points), strict=True)):
+            for k in range(len(self._tests)) if one is None else (one,):
+                uses.setdefault(self._job(k, point, until), []).append(i)
+
+        def read(job: _Job) -> _Outputs | None:
+            """Read what needs a run, and return the run if it is a new one."""
+            known = self._runs.get(job)
+            out = self._run(job) if known is None else known
+            for i in uses[job]:
+                results[i][job.experiment] = self._read(job.experiment, out, points[i])
+            return out if known is None else None
+
+        for job, fresh in zip(uses, self._executor.map(read, uses), strict=True):
+            if fresh is not None:
+                with self._lock:
+                    self._runs[job] = fresh
+                    while len(self._runs) > _KEPT_RUNS:
+                        self._runs.popitem(last=False)
+        return results
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
                            course: Course) -> list[FloatArray]:
+        """Return the readings with an unknown input; see `Machine.simulate_disturbed`."""
+        assert isinstance(place, DriveDisturbance)
+
+        def run(k: int) -> FloatArray:
+            return self._read(k, self._run(self._job(k, point, math.inf), (place, course)), point)
+
+        return list(self._executor.map(run, range(len(self._tests))))
+
+    def _job(self, k: int, point: Point, until: float) -> _Job:
+        """Return the run of one test at a point: what acts on readings alone is no part of it."""
+        return _Job(k, tuple(item for item in sorted(point.items())
+                             if item[0] not in self._reading_modifiers
+                             and self._run_modifiers[item[0]][1] in (None, k)), until)
+
+    def outputs(self, point: Point, experiment: int,
+                channels: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
         """
-        Return the readings with an unknown input.
+        Return outputs of the drive in one experiment that no sensor reads.
 
         Parameters
         ----------
         point
             parameter values by name
-        place
-            where it acts, one of `disturbance_inputs`
-        course
-            the input over time, in a unit that moves the machine a little
+        experiment
+            its index
+        channels
+            names of c outputs, 'unit/signal'
 
         Returns
         -------
-        for each experiment an array of shape (n, c)
+        times, shape (n,) [s], and values and slopes, shape (n, c, 2)
 
         """
-        raise NotImplementedError(f'{type(self).__name__} names disturbance_inputs '
-                                  'and lacks simulate_disturbed')
+        job = self._job(experiment, point, math.inf)
+        return self._tests[experiment].output_times, self._run(job, channels=channels).values
+
+    def _run(self, job: _Job, disturbance: tuple[DriveDisturbance, Course] | None = None,
+             channels: tuple[str, ...] = batch.CHANNELS) -> _Outputs:
+        test = self._tests[job.experiment]
+        kind = test.record.dtype
+        run = RunSetup(test.record.view(np.float64).copy(), kind, float(test.time[-1]), test.bias,
+                       start_angle=test.start_angle)
+        for name, value in job.items:
+            self._run_modifiers[name][0].apply(run, value)
+        record = run.numbers.view(kind)
+        run.write_waves()
+        cycles = fastest_wave(test.record)
+        for shape, parts in run.waves.items():
+            if shape.angle != 'axis' and any(parts):
+                cycles = max(cycles, shape.order * float(record[shape.angle]['gear_ratio'][0]))
+        axis = record['plant']['axis']
+        if axis['mode_inertias'][0, EXTRA_MODE] > 0.0:
+            axis['mode_inertias_count'] = EXTRA_MODE + 1
+        stiff = any(record[motor]['gearbox'][name][0] > 0.0
+                    for motor in ('motor_1', 'motor_2') for name in _STIFF)
+        longest = min(self._longest_step, LONGEST_STEP) if stiff else self._longest_step
+        plan = self._plan(job.experiment, run, Longest(longest, SHORTEST_STEP, WAVE_STEP, cycles))
+        if disturbance is not None:
+            plan = _disturbed(plan, run, *disturbance)
+        rippling = {channels.index(f'{motor}/tach_rate'): motor
+                    for motor in ('motor_1', 'motor_2') if f'{motor}/tach_rate' in channels
+                    and is_there(record[motor]['tachometer'], 'ripple')}
+        wanted = (*channels, *(f'{motor}/angle' for motor in rippling.values()))
+        time = test.output_times
+        samples = int(np.count_nonzero(time - time[0] < job.until))
+        if samples == time.size:
+            out = batch.run(record, plan, channels=wanted)
+        else:
+            steps = int(np.argmax(plan.keep == samples - 1))
+            out = np.full((time.size, len(wanted), 2), np.nan)
+            out[:samples] = batch.run(record, batch.Schedule(
+                plan.steps[:steps], plan.keep[:steps + 1]), channels=wanted)
+        return _Outputs(out[:, :len(channels)], {
+            channel: RipplingTachometer(out[:, row, 0], record[motor]['tachometer'])
+            for row, (channel, motor) in enumerate(rippling.items(), len(channels))})
+
+    def _plan(self, k: int, run: RunSetup, longest: Longest) -> batch.Schedule:
+        """Return the steps of a run."""
+        test = self._tests[k]
+        unrecorded = (tuple(run.late_jumps.items()), tuple(run.hole_means.items()))
+
+        def planned() -> batch.Schedule:
+            command = test.command
+            if isinstance(command, RecordedCommand):
+                for number, later in run.late_jumps.items():
+                    command = command.with_jump(number, later)
+                for number, more in run.hole_means.items():
+                    command = command.with_mean(number, more)
+            return schedule(command, test.bias, test.output_times, longest, run.delay)
+
+        key = (k, longest, run.delay, unrecorded)
+        plan = self._kept((*key, run.bias), lambda: with_bias(
+            self._kept((*key, test.bias), planned), run.bias))
+        return plan if run.gust is None else with_torque(plan, *gust.course(run.gust))
+
+    def _kept(self, key: _PlanKey, made: Callable[[], batch.Schedule]) -> batch.Schedule:
+        """Return the table of steps of a test, made if it is not known."""
+        plan = self._plans.get(key) or made()
+        with self._lock:
+            self._plans[key] = plan
+            self._plans.move_to_end(key)
+            while len(self._plans) > _KEPT_PLANS:
+                self._plans.popitem(last=False)
+        return plan
+
+    def _read(self, k: int, out: _Outputs, point: Point) -> FloatArray:
+        """Return the readings of a run, with the errors of sensors that nothing feeds back."""
+        time = self._tests[k].time
+        readings = SensorReadings()
+        for name, value in point.items():
+            modifier, test = self._reading_modifiers.get(name, (None, None))
+            if modifier is not None and test in (None, k) and value:
+                modifier.apply_to_readings(readings, value)
+        digit = readings.digit
+        wanted = time + readings.clock_rate * (time - time[0])
+        times = self._tests[k].output_times
+        values = read_at(times, out.values, wanted, readings.late)
+        for channel, tachometer in out.rippling.items():
+            values[:, channel] = tachometer.read_at(
+                times, out.values[:, channel], wanted, float(readings.late[channel]))
+        values *= readings.gain
+        turned = self._tests[k].start_angle
+        for shape, parts in readings.waves.items():
+            values[:, ENCODER] += shape.along(values[:, ENCODER] + turned, parts)
+        values += readings.zero
+        if digit > 0.0 and self._digit:
+            # whatever lies within the digit that was read would have been read
+            shift = readings.turn * digit
+            read = self.experiments[k].measured[:, ENCODER] + shift
+            off = np.nan_to_num(values[:, ENCODER] - read)
+            values[:, ENCODER] -= np.clip(off, -0.5 * digit, 0.5 * digit) + shift
+        elif digit > 0.0:
+            values[:, ENCODER] = digit * np.floor(values[:, ENCODER] / digit + 0.5)
+        return values
+
+
+def _in_common(sheets: Iterable[TestSheet]) -> TestSheet:
+    """Return what a further test of the machine shares with those that were made."""
+    first, *others = sheets
+    bias = next((sheet.bias for sheet in (first, *others)
+                 if isinstance(sheet.bias, CircuitBias)), first.bias)
+    return replace(first, waveform=None, bias=bias, start='rest')
+
+
+def _together(one: float, other: float, how: str) -> float:
+    """Return two changes of one number as one."""
+    return one + other if how == ADD else (1.0 + one) * (1.0 + other) - 1.0
+
+
+def _apart(both: float, other: float, how: str) -> float:
+    """Return the change of a number that makes both with another one."""
+    return both - other if how == ADD else (1.0 + both) / (1.0 + other) - 1.0
+
+
+def _tolerated(effect: Effect, tolerances: Sequence[AntennaParameter]) -> Effect:
+    """Return an effect whose parameters know by how much their numbers may be off anyway."""
+    allowed = {(path, item.modifier.how): item.high for item in tolerances
+               if item.experiment is None for path in item.modifier.fields}
+
+    def tolerated(item: Parameter) -> Parameter:
+        assert isinstance(item, AntennaParameter)
+        modifier: Modifier = item.modifier
+        same_number = min(
+            (allowed.get((path, modifier.how), 0.0) for path in modifier.fields), default=0.0)
+        return replace(item, tolerance=max(item.tolerance, same_number))
+
+    return replace(effect, forms=tuple(
+        replace(form, parameters=tuple(tolerated(p) for p in form.parameters))
+        for form in effect.forms))
+
+
+def _coarser_digit(tests: Sequence[FieldTest]) -> float:
+    """Return the encoder's digit if it is coarser than its sheet says, else 0 [rad]."""
+    digits = [digit_of(test.measured[:, ENCODER]) for test in tests]
+    known = max(test.sensors.encoder_step for test in tests)
+    seen = [digit for digit in digits if digit > 0.0]
+    digit = min(seen, default=0.0)
+    return digit if len(seen) == len(tests) and digit > COARSER * known else 0.0
+
+
+def _disturbed(plan: batch.Schedule, run: RunSetup, place: DriveDisturbance,
+               course: Course) -> batch.Schedule:
+    """Return a plan that lets an input into the drive, and set the drive's record up for it."""
+    for path, how, value in place.settings:
+        change(run.numbers, place_of(run.kind, path), how, value)
+    steps = plan.steps.copy()
+    length = steps[:, batch.LENGTH]
+    steps[:, batch.CHANGE] = place.size * course(np.cumsum(length) - 0.5 * length)
+    return batch.Schedule(steps, plan.keep, place_of(run.kind, place.path))

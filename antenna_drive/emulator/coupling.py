@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The continuous coupling of a wiring's blocks: what is computed in which order, as program text.
 
@@ -26,7 +15,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 
 from antenna_drive.emulator.kernels import blocks
 from antenna_drive.emulator.wiring import Wiring
-from antenna_drive.errors import UserError
+from simgap.errors import UserError
 
 # An input's value or slope: the unit, the number of the input, 0 or 1. What feeds it: the signal.
 _Place = tuple[str, int, int]

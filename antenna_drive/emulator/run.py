@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The drive in one process: the same units in the same lock-step as the nodes, bit for bit.
 
@@ -29,10 +18,10 @@ from antenna_drive.emulator.kernels import of_drive
 from antenna_drive.emulator.unit import FloatArray, Unit
 from antenna_drive.emulator.units import BlockUnit, build, inner_steps, SourceUnit
 from antenna_drive.emulator.wiring import DRIVE, Wiring
-from antenna_drive.errors import one_line
-from antenna_drive.parameters.schema import ParameterError, Value
 from antenna_drive.parameters.sets import Drive
 import numpy as np
+from simgap.errors import one_line
+from simgap.inputs.schema import ParameterError, Value
 
 MACRO_STEP = 1e-3
 FINE_STEP = 2.5e-5

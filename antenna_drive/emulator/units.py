@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The units of a wiring: their compiled physics behind the interface of `Unit`."""
 
 from __future__ import annotations
@@ -26,12 +15,12 @@ from antenna_drive.emulator.unit import FloatArray, Unit
 from antenna_drive.emulator.wiring import DRIVE, Wired, Wiring
 from antenna_drive.parameters.loading import check_waveform
 from antenna_drive.parameters.records import record_of
-from antenna_drive.parameters.schema import check_changes, Entry, nearest, ParameterError, Value
 from antenna_drive.parameters.sets import changed, Drive, TestSignal, values
 from antenna_drive.physics import signal_generator
 from antenna_drive.physics.block import Block, Source
 from antenna_drive.physics.integrator import work_space
 import numpy as np
+from simgap.inputs.schema import check_changes, Entry, nearest, ParameterError, Value
 
 # Within a longer macro-step the fastest states are still integrated in steps of this length [s].
 INNER_STEP = 1e-3

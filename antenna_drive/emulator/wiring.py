@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The drive's units and which signal feeds which input: Figs. 4 and 5, once, as data.
 
@@ -27,11 +16,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from antenna_drive.errors import UserError
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.physics import motor_drive, signal_generator, structure, torque_share
 from antenna_drive.physics.block import Interface, Signal
+from simgap.errors import UserError
 
 
 class Wired(NamedTuple):

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The article's experiments and a preview of the test signals, for the page."""
 
 from __future__ import annotations
@@ -29,10 +18,10 @@ from antenna_drive.emulator.wiring import UNITS
 from antenna_drive.parameters import load
 from antenna_drive.parameters.loading import check_waveform
 from antenna_drive.parameters.records import record_of
-from antenna_drive.parameters.schema import check_changes, Entry, Value
 from antenna_drive.parameters.sets import Drive, entries, Waveform
 from antenna_drive.physics import signal_generator
 import numpy as np
+from simgap.inputs.schema import check_changes, Entry, Value
 
 _DEGREES = 180.0 / math.pi
 

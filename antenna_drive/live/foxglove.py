@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The live data and parameters for Foxglove and other readers of its WebSocket protocol.
 
@@ -28,13 +17,13 @@ from typing import Any
 
 from antenna_drive.emulator.unit import Signal
 from antenna_drive.emulator.wiring import OUTPUTS
-from antenna_drive.errors import UserError
 from antenna_drive.live.history import Piece
 from antenna_drive.live.own_processes import off_the_loop
 from antenna_drive.live.session import Session
 from foxglove import Channel, Context, Parameter, start_server, StatusLevel
 from foxglove.websocket import Capability, Client, ServerListener
 import numpy as np
+from simgap.errors import UserError
 
 HOST = '127.0.0.1'
 PERIOD_S = 0.05

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The drive as the page sees it: a ROS 2 node that nobody waits for.
 
@@ -29,7 +18,6 @@ import time
 from typing import Any
 
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
-from antenna_drive.errors import UserError
 from antenna_drive.live.asking import ask
 from antenna_drive.live.board import Board
 from antenna_drive.live.history import History
@@ -51,6 +39,7 @@ from rcl_interfaces.srv import (
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from simgap.errors import UserError
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The processes that the page may start: a drive of its own, and a recorder."""
 
 from __future__ import annotations
@@ -30,11 +19,11 @@ from typing import Any
 
 from antenna_drive.article.experiments import experiments
 from antenna_drive.emulator.wiring import TEST_SIGNAL
-from antenna_drive.errors import UserError
 from antenna_drive.live.experiment_buttons import start_of
 from antenna_drive.lockstep.entry import choose_transport
 from antenna_drive.lockstep.processes import DriveProcesses, Parameter
-from antenna_drive.programs import PARENT
+from simgap.command.programs import PARENT
+from simgap.errors import UserError
 
 # A recorder completes its bag within this [s]; after it, it is ended at once.
 _PATIENCE_S = 10.0

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The web server of the page: files of this package, and a WebSocket for each open page.
 
@@ -29,9 +18,10 @@ from pathlib import Path
 import socket
 from urllib.parse import urlsplit
 
-from antenna_drive.errors import UserError
 from antenna_drive.live.session import Session
 from antenna_drive.pages import FOLDER
+from simgap.errors import UserError
+from simgap.report.render import FOLDER as SHARED
 from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 from tornado.web import Application, HTTPError, RequestHandler
@@ -50,8 +40,8 @@ _KINDS = {'.html': 'text/html; charset=utf-8', '.js': 'text/javascript; charset=
 # What may be asked for, and the file that it is.
 _FILES: dict[str, Path] = {
     '/': FOLDER / 'live' / 'index.html',
-    '/uPlot.js': FOLDER / 'uplot' / 'uPlot.iife.min.js',
-    '/uPlot.css': FOLDER / 'uplot' / 'uPlot.min.css',
+    '/uPlot.js': SHARED / 'uplot' / 'uPlot.iife.min.js',
+    '/uPlot.css': SHARED / 'uplot' / 'uPlot.min.css',
     **{f'/{path.name}': path for path in sorted((FOLDER / 'live').glob('*.*'))
        if path.suffix in ('.js', '.css')},
 }

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """What a page may ask, and what is done about it."""
 
 from __future__ import annotations
@@ -22,17 +11,17 @@ from typing import Any
 
 from antenna_drive.article.experiments import experiments
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
-from antenna_drive.errors import UserError
 from antenna_drive.live.board import Board
 from antenna_drive.live.experiment_buttons import listed, plan, preview
 from antenna_drive.live.link import DriveLink
 from antenna_drive.live.loading import recordings_in, thinned
 from antenna_drive.live.own_processes import off_the_loop, OwnDrive, RecorderProcess
-from antenna_drive.parameters.schema import ParameterError
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.panels import PANELS
 from antenna_drive.recording.sheet import parse_sheet
 from antenna_drive.recording.sheet_signal import settings_for, settings_of
+from simgap.errors import UserError
+from simgap.inputs.schema import ParameterError
 
 # How often nodes are looked after [s].
 _LOOK_S = 0.5

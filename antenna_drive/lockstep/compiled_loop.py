@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The exchange of a member as one compiled loop: wait, take, check, step, pack, publish.
 
@@ -31,12 +20,12 @@ from antenna_drive.lockstep.delays import count
 from antenna_drive.lockstep.frame import HEADER, LATEST_BIRTH
 from antenna_drive.lockstep.inbox import DEPTH
 from antenna_drive.physics.block import rows
-from antenna_drive.physics.compiling import inner, shared
 from llvmlite import ir  # type: ignore[import-untyped]
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 import numpy as np
+from simgap.laws.compiling import inner, shared
 
 _HEADER = len(HEADER)
 

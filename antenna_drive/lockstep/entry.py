@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 From a command line to a running node, and back to an exit code.
 
@@ -30,15 +19,15 @@ from threading import Event
 from types import FrameType
 from typing import Any, TYPE_CHECKING
 
-from antenna_drive.errors import UserError
-from antenna_drive.programs import end_with_starter, OK, run_program
+from simgap.command.programs import end_with_starter, OK, run_program
+from simgap.errors import UserError
 
 if TYPE_CHECKING:
     from antenna_drive.emulator.unit import Unit
     from antenna_drive.emulator.wiring import Wiring
     from antenna_drive.lockstep.node import ReadSheet
-    from antenna_drive.parameters.schema import Value
     from rclpy.node import Node
+    from simgap.inputs.schema import Value
 
 # A node's parameter: a test sheet that its unit plays.
 SHEET = 'sheet'
@@ -114,7 +103,7 @@ def run_unit(unit: Unit, args: Sequence[str] | None = None, wiring: str = '') ->
 
     """
     def make(name: str, wired: Wiring, config: Sequence[str], given: Mapping[str, Any]) -> Unit:
-        from antenna_drive.parameters.schema import nearest, ParameterError
+        from simgap.inputs.schema import nearest, ParameterError
         if name not in wired.units:
             raise UserError(f'{name}: no such unit, allowed are {", ".join(wired.units)}')
         unit.name = name
@@ -227,10 +216,10 @@ def ros_node(name: str, arguments: Sequence[str], example: str,
     UserError : the command line has an argument that is none of ROS 2's, or a wrong one
 
     """
+    from antenna_drive.lockstep.leaving import leave
     import rclpy
     from rclpy.exceptions import InvalidParameterTypeException
     from rclpy.node import Node
-    from antenna_drive.lockstep.leaving import leave
     choose_transport(os.environ)
     _init_ros(name, arguments, example)
     try:

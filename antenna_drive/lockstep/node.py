@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """One node: a member of the lock-step on ROS 2, its parameters, topics and reports."""
 
 from __future__ import annotations
@@ -21,7 +10,6 @@ import time
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
-from antenna_drive.errors import one_line, UserError
 from antenna_drive.lockstep import compiled_loop, ros_parameters
 from antenna_drive.lockstep.changes import CHANGES, write_record
 from antenna_drive.lockstep.compiled_unit import form_of
@@ -31,20 +19,19 @@ from antenna_drive.lockstep.pace import LEAD_S, Pace
 from antenna_drive.lockstep.partner import ANSWER, HOLD, ON_MISS, PartnerUnit
 from antenna_drive.lockstep.partner_link import Answer, PartnerLink
 from antenna_drive.lockstep.rcl_channel import RclChannel, Unusable
-from antenna_drive.lockstep.readings import (
-    ChangeRecord, READING_OVERRIDES, READING_QOS, Readings,
-)
+from antenna_drive.lockstep.readings import ChangeRecord, READING_OVERRIDES, READING_QOS, Readings
 from antenna_drive.lockstep.realtime import lock_memory, schedule_first_in_first_out
 from antenna_drive.lockstep.report import Report
 from antenna_drive.lockstep.ros_link import FrameLink
 from antenna_drive.lockstep.run_control import PAUSED, PLAYING, RunControl, RunState, STOPPED
 from antenna_drive.lockstep.run_services import RunServices, StateReader
 from antenna_drive.lockstep.serving import Serving
-from antenna_drive.parameters.schema import Entry, Value
 from numba.core.errors import NumbaError
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from simgap.errors import one_line, UserError
+from simgap.inputs.schema import Entry, Value
 from std_msgs.msg import Float64
 
 # No wait is longer than this [s]: signals and reports are served in between.

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 A partner that does not wait: a controller or an amplifier with a clock of its own.
 
@@ -26,8 +15,8 @@ import math
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.lockstep.delays import Delays
-from antenna_drive.parameters.schema import Entry, Value
 import numpy as np
+from simgap.inputs.schema import Entry, Value
 
 # What the outputs do while an answer is overdue.
 HOLD, ZERO, STOP = ON_MISS = ('hold', 'zero', 'stop')

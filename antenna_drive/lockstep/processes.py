@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Start the drive's processes, watch over them, and end every one of them."""
 
 from __future__ import annotations
@@ -27,10 +16,10 @@ from types import TracebackType
 from typing import IO
 
 from antenna_drive.emulator.wiring import find, TEST_SIGNAL
-from antenna_drive.errors import UserError
 from antenna_drive.lockstep.entry import choose_transport
 from antenna_drive.lockstep.placement import hasten, machine_is_idle
-from antenna_drive.programs import PARENT
+from simgap.command.programs import PARENT
+from simgap.errors import UserError
 
 # Nodes end within three seconds of a signal, whatever holds them.
 END_PATIENCE_S = 5.0

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """What people and plotters read: one topic per signal at a decimated rate, clock, changes."""
 
 from __future__ import annotations
@@ -23,11 +12,11 @@ from antenna_drive.emulator.unit import FloatArray, Signal
 from antenna_drive.lockstep.changes import CHANGES, SETTINGS, write_record
 from antenna_drive.lockstep.compiled_loop import TIME
 from antenna_drive.lockstep.frame import READING_PREFIX
-from antenna_drive.parameters.schema import Value
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rosgraph_msgs.msg import Clock
+from simgap.inputs.schema import Value
 from std_msgs.msg import Float64, String
 
 READING_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)

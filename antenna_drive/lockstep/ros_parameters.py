@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 A unit's settings as ROS 2 parameters: described, checked, and changed at a step.
 
@@ -28,12 +17,12 @@ from threading import Event, Lock
 from typing import Any
 
 from antenna_drive.emulator.unit import Unit
-from antenna_drive.parameters.schema import Entry, nearest, ParameterError, Value
 from rcl_interfaces.msg import (
     FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult,
 )
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from simgap.inputs.schema import Entry, nearest, ParameterError, Value
 
 # What rclpy declares by itself.
 _RCLPY_OWN = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')

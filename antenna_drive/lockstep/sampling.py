@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """One run of the drive in its five processes, every sample of it in an array."""
 
 from __future__ import annotations
@@ -22,10 +11,10 @@ import time
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.emulator.units import home
 from antenna_drive.emulator.wiring import TEST_SIGNAL
-from antenna_drive.errors import UserError
 from antenna_drive.lockstep.observer import Observer
 from antenna_drive.lockstep.processes import DriveProcesses, Parameter
 import numpy as np
+from simgap.errors import UserError
 
 # How long the processes may take until they begin, and then from step to step [s].
 BEGIN_PATIENCE_S = 120.0

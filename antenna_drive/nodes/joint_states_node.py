@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The joints on ROS 2: frames of plant and motors in, sensor_msgs/JointState out."""
 
 from __future__ import annotations
@@ -20,7 +9,6 @@ from threading import Event
 from typing import Any
 
 from antenna_drive.emulator.wiring import MOTORS, OUTPUTS, PLANT
-from antenna_drive.errors import UserError
 from antenna_drive.lockstep.changes import read_record, SETTINGS
 from antenna_drive.lockstep.entry import ros_node, stopped_by_signals
 from antenna_drive.lockstep.frame import FrameLayout
@@ -29,10 +17,11 @@ from antenna_drive.lockstep.ros_link import FrameLink
 from antenna_drive.lockstep.ros_parameters import Overrides
 from antenna_drive.lockstep.serving import Serving
 from antenna_drive.lockstep.thinning import Thinned, Thinning
-from antenna_drive.parameters.schema import Entry
 from builtin_interfaces.msg import Time
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
+from simgap.errors import UserError
+from simgap.inputs.schema import Entry
 from std_msgs.msg import String
 
 NAME = 'joint_states'

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The recorder on ROS 2: frames and changes in, bags out."""
 
 from __future__ import annotations
@@ -25,7 +14,6 @@ from types import FrameType
 from typing import Any
 
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
-from antenna_drive.errors import UserError
 from antenna_drive.lockstep.changes import read_record
 from antenna_drive.lockstep.entry import ros_node
 from antenna_drive.lockstep.following import Follower, Step
@@ -35,10 +23,11 @@ from antenna_drive.lockstep.ros_link import FrameLink
 from antenna_drive.lockstep.serving import Serving
 from antenna_drive.recording.bag_writer import SPLIT_S
 from antenna_drive.recording.recorder import RunRecorder
-from antenna_drive.recording.recording import RecordingError
 from antenna_drive.recording.sheet import load_sheet
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
+from simgap.errors import UserError
+from simgap.logs.channel import RecordingError
 from std_msgs.msg import String
 
 NAME = 'recorder'

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The player of recordings on ROS 2: signals and rows out, at a pace."""
 
 from __future__ import annotations
@@ -21,14 +10,15 @@ import time
 
 from antenna_drive.lockstep.entry import ros_node, stopped_by_signals
 from antenna_drive.lockstep.ros_parameters import Overrides
-from antenna_drive.parameters.schema import Entry
 from antenna_drive.recording.files import read_recording
-from antenna_drive.recording.recording import NANOSECONDS, Recording
+from antenna_drive.recording.recording import Recording
 from antenna_drive.twin.intake import COMMAND, known
 import numpy as np
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
+from simgap.inputs.schema import Entry
+from simgap.logs.channel import NANOSECONDS
 from std_msgs.msg import Float64, Float64MultiArray
 
 NAME = 'recording_player'

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The twin on ROS 2: the real drive's topics in; twin, residuals, verdict and diagnostics out."""
 
 from __future__ import annotations
@@ -26,19 +15,15 @@ from threading import Event
 import time
 from typing import Any
 
-from antenna_drive.drafts import drafted
+from antenna_drive.diagnosis.tuned import loaded, tuned
 from antenna_drive.emulator.batch import CHANNELS
-from antenna_drive.errors import one_line, UserError
 from antenna_drive.lockstep.diagnostics import diagnostics
 from antenna_drive.lockstep.entry import ros_node, stopped_by_signals
 from antenna_drive.lockstep.getting_ready import told_while_compiling
 from antenna_drive.lockstep.ros_parameters import Overrides
 from antenna_drive.lockstep.run_services import STATE_QOS
 from antenna_drive.lockstep.serving import Serving
-from antenna_drive.machines.antenna.tuned import loaded, tuned
 from antenna_drive.parameters.loading import load
-from antenna_drive.parameters.schema import Entry
-from antenna_drive.recording.recording import NANOSECONDS
 from antenna_drive.recording.sheet import load_sheet, TestSheet
 from antenna_drive.twin import watch
 from antenna_drive.twin.baseline import Baseline
@@ -52,6 +37,10 @@ from antenna_drive.workers import worker_processes
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from simgap.drafts import drafted
+from simgap.errors import one_line, UserError
+from simgap.inputs.schema import Entry
+from simgap.logs.channel import NANOSECONDS
 from std_msgs.msg import Empty, Float64, Float64MultiArray, String
 from std_srvs.srv import Trigger
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 From config/*.yaml to a checked parameter set: all of it, or one line that says what is wrong.
 
@@ -29,13 +18,11 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 from antenna_drive.parameters import files
-from antenna_drive.parameters.plain_yaml import read_yaml
-from antenna_drive.parameters.schema import (
-    Entry, mapping_of, nearest, ParameterError, quoted, Value,
-)
 from antenna_drive.parameters.sets import (
     Axis, Drive, Encoder, entries, Filter1, MotorDrive, TestSignal, TorqueShare, Waveform,
 )
+from simgap.inputs.plain_yaml import read_yaml
+from simgap.inputs.schema import Entry, mapping_of, nearest, ParameterError, quoted, Value
 
 MOTOR_SECTIONS: dict[str, type] = {
     name: kind for name, kind in get_type_hints(MotorDrive).items()

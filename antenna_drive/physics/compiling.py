@@ -1,189 +1,22 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
-"""
-How the physics is compiled: once for this machine, kept on disk until any of its sources changes.
-
-numba's own disk cache looks only at the file of the function that it keeps, and so a stale
-kernel would survive a correction of a block in another file. The cache folder is therefore
-named after a digest of every source that compiled code is made from.
-
-A function is compiled, and numba itself is loaded, when the function is first called. A program
-that only asks which signals there are, to read a recording say, does not wait for a compiler.
-"""
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""The physics is compiled once for this machine, and again when one of its sources changes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import cache, cached_property, partial
-import hashlib
-import os
+from collections.abc import Mapping
 from pathlib import Path
-import sys
-import tempfile
-from types import ModuleType
-from typing import Any, cast, TypeVar
+from typing import Any
 
-Function = TypeVar('Function', bound=Callable[..., Any])
-
-# A zero divisor gives infinity, as in C, and the check for it stays out of the inner loops.
-# Compiled code allocates nothing, and so need not count who holds an array.
-# nogil: runs of several variants of a drive share the cores, see emulator/batch.py
-_OPTIONS: dict[str, Any] = {'error_model': 'numpy', '_nrt': False, 'nogil': True}
+from simgap.laws import compiling
+from simgap.laws.compiling import Keeping
 
 PHYSICS = Path(__file__).resolve().parent
-
-
-class Compiled:
-    """A function that is compiled when it is first called, by Python or by compiled code."""
-
-    def __init__(self, function: Callable[..., Any], keep: Callable[[], Path | None] | None = None,
-                 **options: Any) -> None:
-        """Take the function, numba's options, and what names the folder to keep the result in."""
-        self.function = function
-        self._keep = keep
-        self._options = options
-
-    @cached_property
-    def dispatcher(self) -> Any:
-        """Return numba's own object for the function."""
-        import numba
-        _teach_numba()
-        folder = self._keep() if self._keep else None
-        before = numba.config.CACHE_DIR
-        if folder:
-            numba.config.CACHE_DIR = str(folder)
-        try:
-            return numba.njit(cache=folder is not None, **{**_OPTIONS, **self._options})(
-                self.function)
-        finally:
-            numba.config.CACHE_DIR = before
-
-    def __call__(self, *arguments: Any) -> Any:
-        """Call the compiled function."""
-        return self.dispatcher(*arguments)
-
-
-@cache
-def _teach_numba() -> None:
-    """Tell numba what compiled code finds in place of a function that it calls."""
-    from numba import types
-    from numba.extending import typeof_impl
-    typeof_impl.register(Compiled)(lambda value, context: types.Dispatcher(value.dispatcher))
-
-
-def inner(function: Function) -> Function:
-    """Compile a function that only compiled functions call: it becomes a part of each."""
-    return cast(Function, Compiled(function, forceinline=True))
-
-
-def shared(function: Function) -> Function:
-    """Compile a larger function that compiled functions call: they share one copy of it."""
-    return cast(Function, Compiled(function))
-
-
-def compiled(function: Function) -> Function:
-    """Compile a function that Python calls, and keep the result on disk."""
-    return cast(Function, Compiled(function, _cache_folder))
-
-
-def compiled_with(function: Function, sources: frozenset[Path]) -> Function:
-    """
-    Compile a function of another room, or of a user, that Python calls, and keep it on disk.
-
-    It may allocate arrays. What is kept becomes stale with any source in the folders `sources`.
-    """
-    return cast(Function, Compiled(function, partial(_cache_folder, sources), _nrt=True))
+KEEPING = Keeping('antenna_drive', frozenset({PHYSICS}))
+compiled = KEEPING.compiled
 
 
 def generated(name: str, text: str, names: Mapping[str, Any], sources: frozenset[Path]) -> Any:
-    """
-    Compile functions that a program has written, and keep text and results on disk.
-
-    Parameters
-    ----------
-    name
-        of the file
-    text
-        functions with the decorators of this module
-    names
-        what the text refers to
-    sources
-        folders whose sources the text is compiled with, beside those of the physics
-
-    Returns
-    -------
-    the module that the text defines
-
-    """
-    digest = _digest(sources, text)
-    module = ModuleType(f'antenna_drive.generated.{name}_{digest}')
-    sys.modules[module.__name__] = module  # where numba looks for it when it loads what it kept
-    keep = partial(_cache_folder, sources, text)
-    vars(module).update(names, inner=inner, shared=shared,
-                        compiled=lambda function: Compiled(function, keep))
-    folder = keep()
-    path = folder / f'{name}.py' if folder else Path(name)
-    if folder and not path.exists():
-        with tempfile.NamedTemporaryFile('w', dir=folder, delete=False) as file:
-            file.write(text)
-        # numba compares the time of a source: it must not depend on which process wrote it
-        os.utime(file.name, (0, 0))
-        os.replace(file.name, path)
-    exec(compile(text, str(path), 'exec'), vars(module))
-    return module
-
-
-@cache
-def _cache_folder(sources: frozenset[Path] = frozenset(), text: str = '') -> Path | None:
-    """Return the folder for these sources, or None where nothing can be written."""
-    if not all(source.is_dir() for source in sources):
-        return None  # typed in by hand: nobody can tell when it changes
-    for root in _candidate_roots():
-        folder = root / 'antenna_drive' / _digest(sources, text)
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder):
-                return folder
-        except OSError:
-            continue
-    return None
-
-
-def _candidate_roots() -> list[Path]:
-    from numba import config
-    if config.CACHE_DIR:
-        return [Path(config.CACHE_DIR)]
-    cache_home = os.environ.get('XDG_CACHE_HOME')
-    roots = [Path(cache_home)] if cache_home else []
-    try:
-        roots.append(Path.home() / '.cache')
-    except RuntimeError:  # no home folder is known
-        pass
-    return [*roots, Path(tempfile.gettempdir())]
-
-
-def _digest(sources: frozenset[Path], text: str) -> str:
-    return hashlib.sha256(f'{_sources_digest(sources)}\n{text}'.encode()).hexdigest()[:16]
-
-
-@cache
-def _sources_digest(sources: frozenset[Path]) -> str:
-    # a parameter that comes or goes changes the type of a record, and numba looks at types
-    import numba
-    digest = hashlib.sha256(numba.__version__.encode())
-    for folder in sorted({PHYSICS, *sources}):
-        for source in sorted(folder.glob('*.py')):
-            digest.update(source.name.encode())
-            digest.update(source.read_bytes())
-    return digest.hexdigest()
+    """Compile functions that a program has written with the physics; see `compiling.generated`."""
+    return compiling.generated(Keeping(KEEPING.owner, KEEPING.sources | sources), name, text,
+                               names)

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 One integrator for every unit: classical Runge-Kutta between switchings, which are located in time.
 
@@ -26,8 +15,8 @@ from collections.abc import Callable
 from typing import Any
 
 from antenna_drive.physics.arrays import FloatArray, IntArray
-from antenna_drive.physics.compiling import inner
 import numpy as np
+from simgap.laws.compiling import inner
 
 # Halvings of a step in the search for a switching: 1 ms is narrowed down to less than 1 ns.
 _HALVINGS = 21

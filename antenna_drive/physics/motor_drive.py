@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 One motor with its amplifiers and its gearbox: the subsystem G_o of Figs. 6 and 7.
 
@@ -31,15 +20,15 @@ from antenna_drive.physics.amplifier import (
 )
 from antenna_drive.physics.armature import current_rate
 from antenna_drive.physics.arrays import FloatArray, IntArray
-from antenna_drive.physics.backlash import contact_side, contact_torque_rate
 from antenna_drive.physics.block import Block, Equation, held, output_rows, put, rows, Signal
-from antenna_drive.physics.compiling import inner, shared
-from antenna_drive.physics.friction import next_slip
 from antenna_drive.physics.gearbox import gear_torque, presliding_rate, twist, twist_rate
 from antenna_drive.physics.motor import (
     ammeter, driving_torque, friction_level, tachometer, tachometer_slope,
 )
 from antenna_drive.physics.rate_command import command_voltage_rate
+from simgap.laws.backlash import contact_side, contact_torque_rate
+from simgap.laws.compiling import inner, shared
+from simgap.laws.friction import next_slip
 
 STATE = rows('voltage', 'integral', 'demand', 'current', 'angle', 'rate', 'presliding', 'impulse')
 MODE = rows('slip', 'side', 'winding')

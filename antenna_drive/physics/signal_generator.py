@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The test signals: value and slope of each waveform at any time, Fig. 18 and its like.
 
@@ -26,9 +15,10 @@ from typing import Any
 from antenna_drive.parameters.sets import TestSignal, Waveform
 from antenna_drive.physics.arrays import FloatArray
 from antenna_drive.physics.block import output_rows, put, Signal, Source
-from antenna_drive.physics.compiling import compiled, inner
+from antenna_drive.physics.compiling import compiled
 import numpy as np
 from numpy.typing import NDArray
+from simgap.laws.compiling import inner
 
 OUTPUTS = (
     Signal('rate_command', 'rad/s', 'axis rate command'),

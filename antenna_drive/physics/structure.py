@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The antenna's structure: a hub on friction, with flexible modes, and all outputs of Fig. 4.
 
@@ -27,10 +16,10 @@ import math
 from antenna_drive.parameters.sets import Axis, Encoder, Plant
 from antenna_drive.physics.arrays import FloatArray, IntArray
 from antenna_drive.physics.block import Block, Equation, held, output_rows, put, rest, rows, Signal
-from antenna_drive.physics.compiling import inner, shared
-from antenna_drive.physics.friction import drag, next_slip, slip_level
 from antenna_drive.physics.harmonics import wave
 from antenna_drive.physics.trigonometry import cosine
+from simgap.laws.compiling import inner, shared
+from simgap.laws.friction import drag, next_slip, slip_level
 
 STATE = rows('axis_angle', 'axis_rate')  # and two for each mode of the structure
 MODE = rows('slip')

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The torque-share circuit, Fig. 14 and Eq. (9)-(14), with Filter 1 behind it, Fig. 5.
 
@@ -24,8 +13,8 @@ from __future__ import annotations
 from antenna_drive.parameters.sets import Share, TorqueShare
 from antenna_drive.physics.arrays import FloatArray, IntArray
 from antenna_drive.physics.block import Block, Equation, held, output_rows, put, rows, Signal
-from antenna_drive.physics.compiling import inner, shared
 from antenna_drive.physics.filter_1 import counter_torque_rate
+from simgap.laws.compiling import inner, shared
 
 STATE = rows('load', 'share', 'counter_torque')
 MODE = rows('negative_load', 'saturation')

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Reads bags: our own and those of `ros2 bag`, whole or up to where they were cut off."""
 
 from __future__ import annotations
@@ -26,18 +15,12 @@ import warnings
 import zlib
 
 from antenna_drive.emulator.wiring import signal_names
-from antenna_drive.errors import one_line
-from antenna_drive.limits import BAG, BAG_RECORD, SAMPLES, SIGNALS
-from antenna_drive.parameters.plain_yaml import parse_yaml, read_yaml
-from antenna_drive.parameters.schema import ParameterError
+from antenna_drive.limits import BAG, BAG_RECORD
 from antenna_drive.recording.bag import (
     CDR_HEADER, CHANGE, CONFIGURATION, FORMAT, FORMAT_VERSION, MESSAGE_TYPE, METADATA, NOTES,
 )
 from antenna_drive.recording.csv_format import parse_known
-from antenna_drive.recording.plain import from_json, PlainDataError
-from antenna_drive.recording.recording import (
-    make_channel, NANOSECONDS, Recording, RecordingError, RecordingWarning, unit_of,
-)
+from antenna_drive.recording.recording import Recording, unit_of
 from antenna_drive.recording.sheet import FILE_NAME, parse_sheet
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
@@ -47,6 +30,12 @@ from mcap.records import (
 from mcap.stream_reader import StreamReader
 import numpy as np
 from numpy.typing import NDArray
+from simgap.errors import one_line
+from simgap.inputs.limits import SAMPLES, SIGNALS
+from simgap.inputs.plain import from_json, PlainDataError
+from simgap.inputs.plain_yaml import parse_yaml, read_yaml
+from simgap.inputs.schema import ParameterError
+from simgap.logs.channel import make_channel, NANOSECONDS, RecordingError, RecordingWarning
 
 # A message record of Float64 as it lies in a chunk: 43 bytes, read by the thousand.
 _MESSAGE = np.dtype([

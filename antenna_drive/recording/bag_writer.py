@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Writes bags, step by step while the drive runs, or whole.
 
@@ -34,17 +23,18 @@ import time
 from types import TracebackType
 from typing import Any
 
-from antenna_drive.drafts import drafted
 from antenna_drive.recording.atomic import new_folder, refuse_existing, refuse_io, sync_folder
 from antenna_drive.recording.bag import (
     CDR_HEADER, CHANGE, CONFIGURATION, FORMAT, FORMAT_VERSION, MESSAGE_DEFINITION, MESSAGE_HASH,
     MESSAGE_TYPE, METADATA, NOTES, ROSBAG2_VERSION,
 )
-from antenna_drive.recording.plain import freeze, PlainDataError, to_json
-from antenna_drive.recording.recording import NANOSECONDS, Recording, RecordingError
+from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import dump_sheet, FILE_NAME, TestSheet
 from mcap.writer import Writer
 import numpy as np
+from simgap.drafts import drafted
+from simgap.inputs.plain import freeze, PlainDataError, to_json
+from simgap.logs.channel import NANOSECONDS, RecordingError
 import yaml
 
 FLUSH_S = 0.5

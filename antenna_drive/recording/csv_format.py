@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Recordings as CSV: the field test's columns, or every signal under its own name.
 
@@ -25,29 +14,29 @@ docs/recording.md describes the columns.
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
-import csv
 from dataclasses import replace
-from decimal import Decimal
-import math
 from pathlib import Path
 import re
-from typing import Any, IO, NamedTuple, TextIO
+from typing import Any, IO
 import warnings
 
-from antenna_drive.errors import one_line
-from antenna_drive.limits import CSV_LINE, SAMPLES, SIGNALS, TEXT
-from antenna_drive.parameters.schema import nearest
 from antenna_drive.recording.atomic import new_file, refuse_existing
-from antenna_drive.recording.plain import from_json, PlainDataError, to_json
-from antenna_drive.recording.recording import (
-    Change, Channel, check_name, IntArray, make_channel, NANOSECONDS, Recording, RecordingError,
-    RecordingWarning, unit_of,
-)
-from antenna_drive.recording.row_order import Column, sorted_rows
+from antenna_drive.recording.recording import Change, Recording, unit_of
 from antenna_drive.recording.sheet import dump_sheet, load_sheet, TestSheet
 import numpy as np
+from simgap.errors import one_line
+from simgap.inputs.limits import SAMPLES, SIGNALS
+from simgap.inputs.plain import from_json, PlainDataError, to_json
+from simgap.inputs.schema import nearest
+from simgap.logs.channel import (
+    Channel, check_name, IntArray, make_channel, RecordingError, RecordingWarning,
+)
+from simgap.logs.row_order import Column, sorted_rows
+from simgap.logs.text import (
+    Cell, format_nanoseconds, open_text, parse_nanoseconds, parse_number, read_text, rows,
+)
 
 TIME = 'time_s'
 RATE_COMMAND = 'rate_command_rad_s'
@@ -62,131 +51,8 @@ FIELD_COLUMNS = {
     'bias_voltage_V': 'torque_share/bias_voltage',
 }
 
-_NUMBER = re.compile(r'[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?', re.ASCII)
 _OWN_COLUMN = re.compile(r'(\S+) \[([^\[\]]*)\]', re.ASCII)
-_LATEST_S = 9.2e9  # what 64 bits of nanoseconds hold
 _BLOCK = 65536  # rows written at a time
-
-
-class Cell(NamedTuple):
-    """Where in a file a number stands, for the message if it is none."""
-
-    path: Path
-    line: int
-    column: str
-    counted: str = 'line'
-
-    def refuse(self, problem: str) -> RecordingError:
-        """Return the error that names the place."""
-        column = one_line(self.column, 60)
-        return RecordingError(
-            f'{self.path}: {self.counted} {self.line}, column {column}: {problem}')
-
-
-def parse_number(text: str, cell: Cell) -> float:
-    """
-    Read one number.
-
-    Raises
-    ------
-    RecordingError : no finite number; the message names file, line and column
-
-    """
-    if not _NUMBER.fullmatch(text):
-        raise cell.refuse(f'{one_line(repr(text), 40)} is no number; leave the cell empty where '
-                          'there is no sample')
-    value = float(text)
-    if not math.isfinite(value):
-        raise cell.refuse(f'{one_line(repr(text), 40)} is too large a number')
-    return value
-
-
-def parse_nanoseconds(text: str, cell: Cell, per_unit: int = NANOSECONDS) -> int:
-    """
-    Read a time stamp, exact up to the nanosecond that it is rounded to.
-
-    Parameters
-    ----------
-    text
-        decimal number
-    cell
-        where it stands
-    per_unit
-        nanoseconds in the unit of the number; seconds if not given
-
-    Raises
-    ------
-    RecordingError : no number, or beyond 9.2e9 s; the message names file, line and column
-
-    """
-    value = parse_number(text, cell)
-    if abs(value) * per_unit > _LATEST_S * NANOSECONDS:
-        raise cell.refuse(f'{one_line(repr(text), 40)} is beyond {_LATEST_S:g} s')
-    return int((Decimal(text) * per_unit).to_integral_value())
-
-
-def format_nanoseconds(stamp: int) -> str:
-    """Return a time stamp in seconds: all its nanoseconds, no idle zeros."""
-    whole, rest = divmod(abs(stamp), NANOSECONDS)
-    fraction = f'{rest:09d}'.rstrip('0') or '0'
-    return f'{"-" if stamp < 0 else ""}{whole}.{fraction}'
-
-
-def rows(path: Path, stream: TextIO, delimiter: str = ',') -> Iterator[tuple[int, list[str]]]:
-    """
-    Yield the rows of a CSV file with the number of the line that each ends on.
-
-    Empty lines are left out. Warns if the last line is not ended: it may have been cut.
-
-    Raises
-    ------
-    RecordingError : no CSV, no text or too long a line; the message names file and line
-
-    """
-    last = ''
-
-    longest = CSV_LINE.value()
-
-    def lines() -> Iterator[str]:
-        nonlocal last
-        while line := stream.readline(longest + 1):
-            if len(line) > longest:
-                raise RecordingError(f'{path}: line {reader.line_num + 1}: '
-                                     f'{CSV_LINE.exceeded()}')
-            last = line
-            yield line
-
-    reader = csv.reader(lines(), delimiter=delimiter, strict=True)
-    while True:
-        try:
-            row = next(reader)
-        except StopIteration:
-            break
-        except csv.Error as error:
-            raise RecordingError(f'{path}: line {reader.line_num}: no CSV, {error}') from None
-        except UnicodeDecodeError:
-            raise RecordingError(f'{path}: after line {reader.line_num}: no text in '
-                                 f'{stream.encoding}') from None
-        if row:
-            yield reader.line_num, row
-    if last and not last.endswith(('\n', '\r')):
-        warnings.warn(f'{path}: line {reader.line_num} is not ended; was the file cut there?',
-                      RecordingWarning, stacklevel=2)
-
-
-def open_text(path: Path, encoding: str = 'utf-8-sig') -> TextIO:
-    """
-    Open a file for the csv module.
-
-    Raises
-    ------
-    RecordingError : it cannot be opened
-
-    """
-    try:
-        return open(path, encoding=encoding, newline='')
-    except OSError as error:
-        raise RecordingError(f'{path}: {error.strerror}') from error
 
 
 def read_csv(path: str | Path) -> Recording:
@@ -303,24 +169,6 @@ def _header(path: Path, line: int, header: list[str]) -> list[str]:
 def _unit(column: str) -> str:
     own = _OWN_COLUMN.fullmatch(column.strip())
     return own.group(2) if own else ''
-
-
-def read_text(path: Path) -> bytes:
-    """
-    Read a file of text that lies beside a recording.
-
-    Raises
-    ------
-    OSError : it cannot be read
-    RecordingError : it is longer than allowed
-
-    """
-    most = TEXT.value()
-    with path.open('rb') as file:
-        text = file.read(most + 1)
-    if len(text) > most:
-        raise RecordingError(f'{path}: {TEXT.exceeded()}')
-    return text
 
 
 def meta_path(path: Path) -> Path:

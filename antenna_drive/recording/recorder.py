@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Writes the runs of a drive to bags while it runs, one bag for each run.
 
@@ -28,9 +17,9 @@ from typing import Any
 from antenna_drive.lockstep.changes import CHANGES, is_record, SETTINGS
 from antenna_drive.recording.atomic import refuse_existing
 from antenna_drive.recording.bag_writer import BagWriter, SPLIT_S
-from antenna_drive.recording.recording import nanoseconds
 from antenna_drive.recording.runs import STEP
 from antenna_drive.recording.sheet import TestSheet
+from simgap.logs.channel import nanoseconds
 
 # How many other runs, and how many records, are kept until the steps have come that far.
 _MOST_RUNS = 16

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 One recording of a drive: named signals, each with a unit and its own time stamps.
 
@@ -29,34 +18,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from antenna_drive.emulator.wiring import OUTPUTS
-from antenna_drive.errors import one_line, UserError
-from antenna_drive.parameters.schema import nearest
-from antenna_drive.recording.plain import freeze, PlainDataError, thaw
 from antenna_drive.recording.sheet import TestSheet
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-Method = Literal['linear', 'hold', 'nearest']
-
-NANOSECONDS = 1_000_000_000
-METHODS: Mapping[Method, str] = MappingProxyType({
-    'linear': 'straight line between the neighbouring samples',
-    'hold': 'the last sample before (zero-order hold)',
-    'nearest': 'the nearest sample, the later one in the middle',
-})
-
-
-class RecordingError(UserError, ValueError):
-    """A recording cannot be made, read or written as asked; one line says where and why."""
-
-
-class RecordingWarning(UserWarning):
-    """A recording was read, but something about it must be known; one line says what."""
+from numpy.typing import ArrayLike
+from simgap.errors import one_line
+from simgap.inputs.plain import freeze, PlainDataError, thaw
+from simgap.inputs.schema import nearest
+from simgap.logs.channel import (
+    Channel, check_name, FloatArray, make_channel, Method, METHODS, NANOSECONDS, nanoseconds,
+    RecordingError,
+)
 
 
 def unit_of(name: str) -> str:
@@ -66,146 +40,6 @@ def unit_of(name: str) -> str:
         if signal.name == signal_name:
             return signal.unit
     return ''
-
-
-def nanoseconds(seconds: ArrayLike) -> Any:
-    """
-    Return seconds as whole nanoseconds, rounded to the nearest.
-
-    Raises
-    ------
-    RecordingError : not finite, or beyond the 292 years that 64 bits hold
-
-    """
-    scaled = np.asarray(seconds, dtype=np.float64)
-    # whole seconds and the rest apart: one product would lose bits of long stamps
-    if not np.all(np.isfinite(scaled)) or np.any(np.abs(scaled) > 9.2e9):
-        raise RecordingError('a time is not finite or beyond 9.2e9 s')
-    whole = np.floor(scaled)
-    result = whole.astype(np.int64) * NANOSECONDS + np.rint(
-        (scaled - whole) * NANOSECONDS).astype(np.int64)
-    return int(result) if result.ndim == 0 else result
-
-
-def _frozen(array: ArrayLike, dtype: Any) -> Any:
-    given = np.asarray(array)
-    if given.dtype == dtype and given.base is None and not given.flags.writeable:
-        return given
-    copy = np.array(given, dtype=dtype)
-    copy.flags.writeable = False
-    return copy
-
-
-@dataclass(frozen=True, eq=False)
-class Channel:
-    """
-    The samples of one signal.
-
-    Attributes
-    ----------
-    unit : SI unit, as in emulator/wiring.py; '' if unknown
-    time_ns : array of shape (n,), int64 [ns]; strictly increasing, spacing as uneven as it was
-    values : array of shape (n,), float64 [unit]; finite: where there is no sample there is none
-
-    Raises
-    ------
-    RecordingError : the shapes differ, a time stamp is not later than the one before, or a
-        value is not finite
-
-    """
-
-    unit: str
-    time_ns: IntArray
-    values: FloatArray
-
-    def __post_init__(self) -> None:
-        """Check the samples, and keep read-only copies of them."""
-        if np.asarray(self.time_ns).dtype.kind not in 'iu' and len(self.time_ns):
-            raise RecordingError('time stamps must be whole nanoseconds')
-        object.__setattr__(self, 'time_ns', _frozen(self.time_ns, np.int64))
-        object.__setattr__(self, 'values', _frozen(self.values, np.float64))
-        if self.time_ns.ndim != 1 or self.time_ns.shape != self.values.shape:
-            raise RecordingError(f'time stamps of shape {self.time_ns.shape} for values of shape '
-                                 f'{self.values.shape}')
-        early = np.flatnonzero(self.time_ns[1:] <= self.time_ns[:-1])
-        if len(early):
-            k = int(early[0])
-            raise RecordingError(
-                f'sample {k + 1} at {self.time_ns[k + 1] / NANOSECONDS:.9f} s is not later than '
-                f'the one before at {self.time_ns[k] / NANOSECONDS:.9f} s')
-        broken = np.flatnonzero(~np.isfinite(self.values))
-        if len(broken):
-            k = int(broken[0])
-            raise RecordingError(f'sample {k} at {self.time_ns[k] / NANOSECONDS:.9f} s is '
-                                 f'{self.values[k]}, no finite number')
-
-    def __repr__(self) -> str:
-        """Return a line instead of the arrays."""
-        unit = f' [{self.unit}]' if self.unit else ''
-        if not len(self):
-            return f'Channel{unit}: no sample'
-        first, last = self.time_ns[0] / NANOSECONDS, self.time_ns[-1] / NANOSECONDS
-        return (f'Channel{unit}: {len(self)} samples from {first:g} to {last:g} s, '
-                f'{self.values.min():g} to {self.values.max():g}')
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Give another process what is checked and kept read-only there, too."""
-        return Channel, (self.unit, self.time_ns, self.values)
-
-    def __len__(self) -> int:
-        """Return the number of samples."""
-        return len(self.values)
-
-    def __eq__(self, other: object) -> bool:
-        """Compare to the last bit: 0.0 and -0.0 differ."""
-        return (isinstance(other, Channel) and self.unit == other.unit
-                and np.array_equal(self.time_ns, other.time_ns)
-                and self.values.tobytes() == other.values.tobytes())
-
-    @property
-    def time_s(self) -> FloatArray:
-        """Return the time stamps in seconds, each the nearest double; shape (n,)."""
-        result: FloatArray = self.time_ns / NANOSECONDS
-        return result
-
-    def at(self, time_ns: IntArray, method: Method = 'linear') -> FloatArray:
-        """
-        Return the values at other times; see METHODS for what each method does.
-
-        Parameters
-        ----------
-        time_ns
-            array of shape (m,), int64 [ns]; inside the span of the samples
-        method
-            one of METHODS
-
-        Returns
-        -------
-        array of shape (m,) [unit]
-
-        Raises
-        ------
-        RecordingError : no such method, or a time outside the span: nothing is extrapolated
-
-        """
-        if method not in METHODS:
-            raise RecordingError(f'no method {method!r}: choose one of {", ".join(METHODS)}')
-        if len(time_ns) == 0:
-            return np.empty(0)
-        if not len(self) or time_ns.min() < self.time_ns[0] or time_ns.max() > self.time_ns[-1]:
-            raise RecordingError('a time lies outside the samples; nothing is extrapolated')
-        before = np.searchsorted(self.time_ns, time_ns, side='right') - 1
-        if method == 'hold':
-            return self.values[before]
-        after = np.minimum(before + 1, len(self) - 1)
-        # differences of whole nanoseconds are exact however large the stamps are
-        past = (time_ns - self.time_ns[before]).astype(np.float64)
-        width = (self.time_ns[after] - self.time_ns[before]).astype(np.float64)
-        share = np.divide(past, width, out=np.zeros_like(past), where=width > 0)
-        if method == 'nearest':
-            return self.values[np.where(share >= 0.5, after, before)]
-        result: FloatArray = (1.0 - share) * self.values[before] + share * self.values[after]
-        return result
 
 
 class Change(NamedTuple):
@@ -589,33 +423,3 @@ class Recording:
                     for name in wanted}
         how = f'{METHODS[method]}, every 1/{rate_hz:g} s, unfiltered'
         return replace(self, channels=channels, notes={**self.notes, 'resampled': how})
-
-
-def check_name(name: str) -> None:
-    """
-    Check that a name can be a ROS 2 topic; the drive's own read 'unit/signal'.
-
-    Raises
-    ------
-    RecordingError : it cannot
-
-    """
-    parts = name.split('/') if isinstance(name, str) else []
-    if not parts or not all(part.isascii() and part.isidentifier() for part in parts):
-        raise RecordingError(f'{one_line(repr(name))}: no name of a signal, such as '
-                             "'motor_1/current', of letters, digits and underscores")
-
-
-def make_channel(name: str, unit: str, time_ns: ArrayLike, values: ArrayLike) -> Channel:
-    """
-    Make a channel, and name the signal when its samples are refused.
-
-    Raises
-    ------
-    RecordingError : see Channel; the message begins with `name`
-
-    """
-    try:
-        return Channel(unit, time_ns, values)  # type: ignore[arg-type]
-    except (RecordingError, TypeError, ValueError) as error:
-        raise RecordingError(f'{one_line(name)}: {error}') from None

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The twin of a recording: the emulator, driven by the command that was recorded.
 
@@ -25,21 +14,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
-from antenna_drive.emulator import units as drive_units
-from antenna_drive.emulator import wiring
+from antenna_drive.emulator import units as drive_units, wiring
 from antenna_drive.emulator.run import Emulator, MACRO_STEP
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.parameters.loading import load
-from antenna_drive.parameters.schema import Value
 from antenna_drive.parameters.sets import changed, Drive
-from antenna_drive.recording.plain import thaw
-from antenna_drive.recording.recording import (
-    Channel, NANOSECONDS, nanoseconds, Recording, RecordingError,
-)
+from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.runs import record, STEP
 from antenna_drive.recording.sheet import CircuitBias, FixedBias, FixedStepBias, TestSheet
 import numpy as np
 from scipy.ndimage import median_filter
+from simgap.inputs.plain import thaw
+from simgap.inputs.schema import Value
+from simgap.logs.channel import Channel, NANOSECONDS, nanoseconds, RecordingError
 
 _OUTPUTS = wiring.OUTPUTS[wiring.TEST_SIGNAL]
 COMMAND, TORQUE = (f'{wiring.TEST_SIGNAL}/{signal.name}' for signal in _OUTPUTS)

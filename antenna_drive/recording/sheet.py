@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The test sheet: what the tester knows of a recording and no sensor shows.
 
@@ -27,14 +16,14 @@ import math
 from pathlib import Path
 from typing import Any, ClassVar, get_args, get_type_hints
 
-from antenna_drive.errors import one_line
-from antenna_drive.parameters.plain_yaml import read_yaml
-from antenna_drive.parameters.schema import Entry, mapping_of, ParameterError
 from antenna_drive.parameters.sets import KNOTS_LIMIT, SINES_LIMIT
+from simgap.errors import one_line
+from simgap.inputs.labels import parse_labels, plain_value
+from simgap.inputs.plain_yaml import read_yaml
+from simgap.inputs.schema import Entry, mapping_of, ParameterError
 import yaml
 
 FILE_NAME = 'test_sheet.yaml'
-LONGEST_LABEL = 60
 
 
 def _entry(unit: str, description: str, low: float = -math.inf, high: float = math.inf,
@@ -265,40 +254,6 @@ def _parse(key: str, tree: object, classes: tuple[type, ...]) -> Any:
         raise ParameterError(f'{key}.times_s: a time before the one that precedes it, allowed are '
                              'times in their order')
     return chosen(**content)
-
-
-def parse_labels(key: str, tree: object) -> tuple[tuple[str, str], ...]:
-    """
-    Read the labels of a test: what was different in it, such as load: A.
-
-    YAML reads on and off as truth values; here they are words again.
-
-    Raises
-    ------
-    ParameterError : no mapping from short names to short texts or numbers
-
-    """
-    found = {}
-    for name, given in mapping_of(key, tree).items():
-        value = {True: 'on', False: 'off'}[given] if isinstance(given, bool) else str(
-            plain_value(given))
-        if not (isinstance(name, str) and isinstance(given, (str, int, float)) and all(
-                0 < len(text) <= LONGEST_LABEL for text in (name, value))):
-            raise ParameterError(f'{key}.{one_line(name)}: {one_line(repr(value), 40)} given, '
-                                 f'allowed is a text of up to {LONGEST_LABEL} characters')
-        found[one_line(name)] = value
-    return tuple(found.items())
-
-
-def plain_value(value: object) -> object:
-    """Return a value that can be shown in one line: a short text for what can be no value."""
-    if isinstance(value, str):
-        return one_line(value)
-    if isinstance(value, (bool, float)) or value is None:
-        return value
-    if isinstance(value, int) and abs(value) < 2**64:
-        return value
-    return f'a {type(value).__name__}'
 
 
 def sheet_tree(sheet: Any) -> dict[str, Any]:

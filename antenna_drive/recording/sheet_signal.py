@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The drive's test signal for the waveform of a test sheet."""
 
 from __future__ import annotations
@@ -18,10 +7,10 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from antenna_drive.errors import UserError
-from antenna_drive.parameters.schema import Value
 from antenna_drive.parameters.sets import values, Waveform
 from antenna_drive.recording import sheet as sheets
+from simgap.errors import UserError
+from simgap.inputs.schema import Value
 
 _DEGREE = math.pi / 180.0
 

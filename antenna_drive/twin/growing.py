@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The verdict that grows: the diagnosis repeated, in a process of its own, on what there is so far.
 
@@ -46,7 +35,7 @@ def diagnosed(recordings: Mapping[str, Recording], drive: Drive) -> dict[str, An
     UserError : a recording cannot be used
 
     """
-    from antenna_drive.machines.antenna.diagnose import diagnose_recordings
+    from antenna_drive.diagnosis.diagnose import diagnose_recordings
     return diagnose_recordings(recordings, drive, threads=1).result
 
 

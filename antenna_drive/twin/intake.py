@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 What comes from a real drive, as it comes: rubbish is counted by name, the rest is kept.
 
@@ -28,12 +17,11 @@ import math
 from antenna_drive.emulator.batch import CHANNELS
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.emulator.wiring import TEST_SIGNAL
-from antenna_drive.recording.recording import (
-    Channel, make_channel, NANOSECONDS, Recording, unit_of,
-)
+from antenna_drive.recording.recording import Recording, unit_of
 from antenna_drive.recording.sheet import TestSheet
 import numpy as np
 from numpy.typing import NDArray
+from simgap.logs.channel import Channel, make_channel, NANOSECONDS
 
 COMMAND = f'{TEST_SIGNAL}/rate_command'
 # No drive of this kind shows more, by unit.

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The next test for a verdict that grows, designed when somebody asks for it.
 
@@ -24,10 +13,10 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
 from typing import Any
 
-from antenna_drive.errors import UserError
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.sheet import dump_sheet, parse_sheet
 from antenna_drive.twin.outcome import outcome
+from simgap.errors import UserError
 
 DURATION_S = 30.0
 Design = Callable[[Mapping[str, Any], Drive], dict[str, Any]]
@@ -54,10 +43,11 @@ def designed(planning: Mapping[str, Any], drive: Drive) -> dict[str, Any]:
     UserError : the verdict is of another configuration
 
     """
-    from antenna_drive.diagnosis import as_data, Findings, objective_for, TestDesign
-    from antenna_drive.diagnosis.proposal import lines
-    from antenna_drive.machines.antenna.allowed_tests import AntennaTests
-    from antenna_drive.machines.antenna.drive_limits import DriveLimits
+    from antenna_drive.diagnosis.allowed_tests import AntennaTests
+    from antenna_drive.diagnosis.drive_limits import DriveLimits
+    from simgap.next_test.design import objective_for, TestDesign
+    from simgap.next_test.proposal import as_data, lines
+    from simgap.next_test.rivals import Findings
     findings = Findings.of_data(planning)
     space = AntennaTests(parse_sheet(planning['sheet']), drive, DriveLimits.of_drive(drive),
                          DURATION_S)

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 What a twin says of a simulated test, played to it in simulated time.
 
@@ -23,16 +12,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from antenna_drive.diagnosis.tuned import tuned
 from antenna_drive.emulator.unit import FloatArray
-from antenna_drive.machines.antenna.tuned import tuned
 from antenna_drive.parameters.loading import load
 from antenna_drive.recording.csv_format import FIELD_COLUMNS
-from antenna_drive.recording.recording import make_channel, NANOSECONDS, Recording, unit_of
+from antenna_drive.recording.recording import Recording, unit_of
 from antenna_drive.recording.sheet import parse_sheet
 from antenna_drive.twin.growing import diagnosed, look_of
 from antenna_drive.twin.sequential import decided, Look, Rule
 from antenna_drive.twin.watch import GAP, Twin, TwinSettings
 import numpy as np
+from simgap.logs.channel import make_channel, NANOSECONDS
 
 # So much arrives between two looks of the twin [s].
 PIECE_S = 0.1

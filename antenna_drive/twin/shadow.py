@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The emulator in step with a real drive: driven by the command that was measured.
 
@@ -27,10 +16,10 @@ from antenna_drive.emulator import units, wiring
 from antenna_drive.emulator.run import Changes, Emulator, MACRO_STEP
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.parameters.sets import Drive
-from antenna_drive.recording.recording import Channel, NANOSECONDS, nanoseconds
 from antenna_drive.recording.replay import command_table
 import numpy as np
 from numpy.typing import NDArray
+from simgap.logs.channel import Channel, NANOSECONDS, nanoseconds
 
 IntArray = NDArray[np.int64]
 

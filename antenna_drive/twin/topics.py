@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Which topics of a real drive are which signals: the map of recordings, read for topics.
 
@@ -34,13 +23,12 @@ from pathlib import Path
 from typing import Any
 
 from antenna_drive.emulator.batch import CHANNELS
-from antenna_drive.parameters.plain_yaml import read_yaml
-from antenna_drive.parameters.schema import ParameterError
-from antenna_drive.recording.import_map import (
-    ImportMap, ISO_8601, parse_map, SignalMap, TIME_UNITS,
-)
-from antenna_drive.recording.recording import nanoseconds
+from antenna_drive.recording.import_map import parse_map
 from antenna_drive.twin.intake import COMMAND, known
+from simgap.inputs.plain_yaml import read_yaml
+from simgap.inputs.schema import ParameterError
+from simgap.logs.channel import nanoseconds
+from simgap.logs.column_map import ImportMap, ISO_8601, SignalMap, TIME_UNITS
 
 SOURCE, ARRIVAL = 'source', 'arrival'
 

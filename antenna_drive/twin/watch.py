@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The twin beside a real drive: what it does, how far the two are apart, and what it says of that.
 
@@ -25,14 +14,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 import math
 
+from antenna_drive.diagnosis.sheet_settings import as_the_sheet_says
+from antenna_drive.diagnosis.tuned import loaded
 from antenna_drive.emulator.batch import CHANNELS
 from antenna_drive.emulator.run import Changes, MACRO_STEP
 from antenna_drive.emulator.unit import FloatArray
-from antenna_drive.errors import UserError
-from antenna_drive.machines.antenna.sheet_settings import as_the_sheet_says
-from antenna_drive.machines.antenna.tuned import loaded
 from antenna_drive.parameters.sets import changed, Drive
-from antenna_drive.recording.recording import NANOSECONDS, Recording, unit_of
+from antenna_drive.recording.recording import Recording, unit_of
 from antenna_drive.recording.sheet import TestSheet
 from antenna_drive.twin.baseline import (
     Baseline, BLOCK_S, block_scores, DRIFT_S, ENCODER, interpolated, motion_of, names_of_charts,
@@ -44,6 +32,8 @@ from antenna_drive.twin.intake import COMMAND, Intake
 from antenna_drive.twin.quiet_record import learn, Track
 from antenna_drive.twin.shadow import Shadow
 import numpy as np
+from simgap.errors import UserError
+from simgap.logs.channel import NANOSECONDS
 
 WAITING, SETTLING, LEARNING = 'waiting', 'settling', 'learning'
 OK, GAP, STALE, BAD_INPUT = 'ok', 'gap', 'stale input', 'bad input'

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Parallel work: on processes or threads of this machine, or on a cluster of dask.distributed.
 
@@ -25,10 +14,10 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
-from antenna_drive.workers.processes import expect_overflow, worker_processes
+from antenna_drive.workers.processes import worker_processes
 from antenna_drive.workers.tasks import TaskLost, Workers
 
-__all__ = ['expect_overflow', 'TaskLost', 'worker_processes', 'Workers', 'workers']
+__all__ = ['TaskLost', 'worker_processes', 'Workers', 'workers']
 
 
 @contextmanager

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Work on a cluster of dask.distributed.
 
@@ -30,9 +19,9 @@ from pathlib import Path
 import time
 from typing import Any
 
-from antenna_drive.errors import UserError
 from antenna_drive.workers.processes import expect_overflow
 from antenna_drive.workers.tasks import Result, TaskLost, Workers
+from simgap.errors import UserError
 
 # How long a scheduler may take to answer, and may be without any worker [s].
 CONNECT_S = 10.0

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Processes of this machine as workers, which end with the one that asked for them."""
 
 from __future__ import annotations
@@ -22,7 +11,7 @@ import os
 import signal
 import warnings
 
-from antenna_drive.programs import end_with_parent
+from simgap.command.programs import end_with_parent, expect_overflow
 
 
 @contextmanager
@@ -57,17 +46,6 @@ def _end(pool: ProcessPoolExecutor) -> None:
     for process in list((pool._processes or {}).values()):
         process.terminate()
     pool.shutdown(cancel_futures=True)
-
-
-def expect_overflow() -> None:
-    """
-    Silence the warnings of numbers that overflow or are undefined.
-
-    A search tries values with which a model diverges, and gives these up. The warnings tell the
-    user nothing.
-    """
-    warnings.filterwarnings('ignore', '(overflow|underflow|invalid value|divide by zero) '
-                                      'encountered', RuntimeWarning)
 
 
 def _become_worker(parent: int) -> None:

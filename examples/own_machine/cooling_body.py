@@ -1,26 +1,14 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """A machine of your own for the diagnosis: a body that cools, seen by two thermometers."""
 
 from __future__ import annotations
 
 import sys
 
-from antenna_drive.diagnosis import (
-    diagnose, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point,
-)
 import numpy as np
+from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
+from simgap.verdict.diagnosis import diagnose
 
 TIME = np.arange(0.0, 10.0, 0.02)
 STARTS = (3.0, -2.0)     # temperatures above the room's at the start of two tests [K]

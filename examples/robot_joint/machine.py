@@ -1,29 +1,18 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """A robot joint: a motor behind a gear, in a position and a velocity loop. All at the motor."""
 
 import math
 
-from antenna_drive.machines.own import (
+import numpy as np
+from numpy.typing import NDArray
+from simgap.model import (
     effect, free, known, machine as own_machine, Numbers, OneTest, push, reading, ripple, size,
     within,
 )
-from antenna_drive.parts import compiled, coupling, friction, loop, shaping, wave
-from antenna_drive.parts.friction import Friction
-from antenna_drive.parts.loop import Cascade
-import numpy as np
-from numpy.typing import NDArray
+from simgap.parts import compiled, coupling, friction, loop, shaping, wave
+from simgap.parts.friction import Friction
+from simgap.parts.loop import Cascade
 
 Array = NDArray[np.float64]
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Tests of a whole diagnosis, on recordings made with the emulator itself, noise added.
 
@@ -25,20 +14,20 @@ import math
 from typing import Any
 
 from antenna_drive.cli import main
-from antenna_drive.diagnosis.diagnosis import Diagnosis, value_lines
-from antenna_drive.diagnosis.page import contents
-from antenna_drive.errors import UserError
-from antenna_drive.machines.antenna.diagnose import diagnose_recordings
-from antenna_drive.machines.antenna.field_test import CHANNELS
-from antenna_drive.machines.antenna.machine import AntennaMachine
-from antenna_drive.machines.antenna.planned_tests import BUILT_IN, confusability_of, planned
-from antenna_drive.machines.antenna.waves import Wave
-from antenna_drive.pages import render
+from antenna_drive.diagnosis.diagnose import diagnose_recordings
+from antenna_drive.diagnosis.field_test import CHANNELS
+from antenna_drive.diagnosis.machine import AntennaMachine
+from antenna_drive.diagnosis.planned_tests import BUILT_IN, confusability_of, planned
+from antenna_drive.diagnosis.waves import Wave
+from simgap.report.render import render
 from antenna_drive.parameters import load
 from antenna_drive.recording.csv_format import write_csv
 from antenna_drive.recording.recording import Recording
 import numpy as np
 import pytest
+from simgap.errors import UserError
+from simgap.report.page import contents
+from simgap.verdict.diagnosis import Diagnosis, value_lines
 
 NOISE = {'ammeter': 0.01, 'tach_rate': 0.0035, 'encoder': 1e-6, 'bias_voltage': 0.01}
 OFFSETS = {

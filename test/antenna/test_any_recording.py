@@ -1,28 +1,17 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Whatever a crew records is made ready or refused in one line."""
 
 from __future__ import annotations
 
-from antenna_drive.errors import UserError
-from antenna_drive.machines.antenna.field_recording import CHANNELS, RATE_COMMAND
-from antenna_drive.machines.antenna.field_test import prepared
+from antenna_drive.diagnosis.field_recording import CHANNELS, RATE_COMMAND
+from antenna_drive.diagnosis.field_test import prepared
 from antenna_drive.parameters import load
 from antenna_drive.recording.recording import Recording
 from field_runs import FAST_TRIANGLE, field_run, SLOW_SQUARE
 from hypothesis import example, given, settings, strategies as st
 import numpy as np
+from simgap.errors import UserError
 
 DRIVE = load('new_circuit')
 RUNS = (field_run(DRIVE, 60.0, start_after=3.0, **FAST_TRIANGLE),

@@ -1,31 +1,20 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Tests of the catalogue: every effect is there, neutral by default, and acts on what it names."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from antenna_drive.diagnosis.catalogue import catalogue
+from antenna_drive.diagnosis.excitation import Bias, Longest, schedule, SheetCommand
+from antenna_drive.diagnosis.field_test import TACH_1
+from antenna_drive.diagnosis.machine import AntennaMachine
+from antenna_drive.diagnosis.modifiers import AntennaParameter
+from antenna_drive.diagnosis.planned_tests import BUILT_IN, planned
+from antenna_drive.diagnosis.waves import Wave
 from antenna_drive.emulator import batch
 from antenna_drive.emulator.run import simulate
-from antenna_drive.machines.antenna.catalogue import catalogue
-from antenna_drive.machines.antenna.excitation import Bias, Longest, schedule, SheetCommand
-from antenna_drive.machines.antenna.field_test import TACH_1
-from antenna_drive.machines.antenna.machine import AntennaMachine
-from antenna_drive.machines.antenna.modifiers import AntennaParameter
-from antenna_drive.machines.antenna.planned_tests import BUILT_IN, planned
-from antenna_drive.machines.antenna.waves import Wave
 from antenna_drive.parameters import load
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """A corrected configuration moves as the fitted model does, and says what it cannot hold."""
 
 from __future__ import annotations
@@ -20,22 +9,23 @@ from pathlib import Path
 from typing import Any
 
 from antenna_drive.cli import main
-from antenna_drive.diagnosis import Form, Hypothesis
-from antenna_drive.diagnosis.by_label import split
-from antenna_drive.diagnosis.least_squares import FitState
-from antenna_drive.errors import UserError
-from antenna_drive.machines.antenna.circuits import nearest_circuit
-from antenna_drive.machines.antenna.corrected import correct, Corrected
-from antenna_drive.machines.antenna.machine import AntennaMachine
-from antenna_drive.machines.antenna.planned_tests import BUILT_IN, planned
-from antenna_drive.machines.antenna.prediction import predict, RecorderErrors
-from antenna_drive.machines.antenna.waves import Wave
+from antenna_drive.diagnosis.circuits import nearest_circuit
+from antenna_drive.diagnosis.corrected import correct, Corrected
+from antenna_drive.diagnosis.machine import AntennaMachine
+from antenna_drive.diagnosis.planned_tests import BUILT_IN, planned
+from antenna_drive.diagnosis.prediction import predict, RecorderErrors
+from antenna_drive.diagnosis.waves import Wave
 from antenna_drive.parameters import load
 from antenna_drive.parameters.sets import changed, Drive
 from antenna_drive.recording.csv_format import read_csv, write_csv
 from antenna_drive.recording.recording import Recording
 import numpy as np
 import pytest
+from simgap.errors import UserError
+from simgap.fit.least_squares import FitState
+from simgap.machine.by_label import split
+from simgap.machine.contract import Form
+from simgap.search.hypothesis import Hypothesis
 
 OFFSETS = {
     'offset:motor_1.motor.torque_constant': 0.012, 'offset:motor_2.amplifier.rate_gain': -0.009,

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The digits of a reading, told by the reading itself, and steps short enough for a wave."""
 
 from __future__ import annotations
@@ -19,13 +8,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 import math
 
-from antenna_drive.diagnosis import FloatArray
+from simgap.machine.contract import FloatArray
 
-from antenna_drive.machines.antenna.excitation import Bias, Longest, schedule, SheetCommand
-from antenna_drive.machines.antenna.field_test import CHANNELS, ENCODER
-from antenna_drive.machines.antenna.machine import AntennaMachine
-from antenna_drive.machines.antenna.planned_tests import planned
-from antenna_drive.machines.antenna.sensors import digit_of
+from antenna_drive.diagnosis.excitation import Bias, Longest, schedule, SheetCommand
+from antenna_drive.diagnosis.field_test import CHANNELS, ENCODER
+from antenna_drive.diagnosis.machine import AntennaMachine
+from antenna_drive.diagnosis.planned_tests import planned
+from antenna_drive.diagnosis.sensors import digit_of
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.recording import Recording

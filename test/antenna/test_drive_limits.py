@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Limits of the drive and the tests that are drawn within them."""
 
 from __future__ import annotations
@@ -20,17 +9,17 @@ import math
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.machines.antenna.allowed_tests import AntennaTests
-from antenna_drive.machines.antenna.candidate_tests import FAMILIES
-from antenna_drive.machines.antenna.drive_limits import CHANNELS, DriveLimits, read_limits
-from antenna_drive.machines.antenna.excitation import SheetCommand
-from antenna_drive.machines.antenna.planned_tests import BUILT_IN
+from antenna_drive.diagnosis.allowed_tests import AntennaTests
+from antenna_drive.diagnosis.candidate_tests import FAMILIES
+from antenna_drive.diagnosis.drive_limits import CHANNELS, DriveLimits, read_limits
+from antenna_drive.diagnosis.excitation import SheetCommand
+from antenna_drive.diagnosis.planned_tests import BUILT_IN
 from antenna_drive.parameters.loading import load
-from antenna_drive.parameters.schema import ParameterError
 from antenna_drive.recording.sheet import dump_sheet, FixedBias, Knots, parse_sheet
 from hypothesis import given, settings, strategies
 import numpy as np
 import pytest
+from simgap.inputs.schema import ParameterError
 import yaml
 
 DRIVE = load()

@@ -1,28 +1,17 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The waveform of a test sheet, beside that of the program that shares no code with the model."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from antenna_drive.machines.antenna.excitation import SheetCommand
-from antenna_drive.machines.antenna.recorded_command import RecordedCommand
+from antenna_drive.diagnosis.excitation import SheetCommand
+from antenna_drive.diagnosis.recorded_command import RecordedCommand
 from antenna_drive.recording.sheet import parse_sheet
-from antenna_drive.trial.sheet import CaseSheet
-from antenna_drive.trial.waveform import command, corners
 from hypothesis import given, strategies as st
+from lab.antenna.sheet import CaseSheet
+from lab.antenna.waveform import command, corners
 import numpy as np
 import pytest
 

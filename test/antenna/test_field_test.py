@@ -1,31 +1,20 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """A recording made ready for a diagnosis: where its time begins, and what cannot serve."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from antenna_drive.errors import UserError
-from antenna_drive.machines.antenna.field_test import FieldTest, prepared
-from antenna_drive.machines.antenna.machine import AntennaMachine
-from antenna_drive.machines.antenna.planned_tests import BUILT_IN, planned
+from antenna_drive.diagnosis.field_test import FieldTest, prepared
+from antenna_drive.diagnosis.machine import AntennaMachine
+from antenna_drive.diagnosis.planned_tests import BUILT_IN, planned
 from antenna_drive.parameters import load
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import TestSheet
 import numpy as np
 import pytest
+from simgap.errors import UserError
 
 NAME = 'field'
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The loop of test, verdict and better test: its order, its end, and how it goes on."""
 
 from __future__ import annotations
@@ -22,22 +11,23 @@ from types import SimpleNamespace
 from typing import Any
 
 from antenna_drive.cli import main
-from antenna_drive.diagnosis import Findings, Judged, Proposal, Rival, TestSpace
-from antenna_drive.errors import UserError
-from antenna_drive.machines.antenna import investigation
-from antenna_drive.machines.antenna.drive_limits import DriveLimits
-from antenna_drive.machines.antenna.field_recording import CHANNELS, RATE_COMMAND
-from antenna_drive.machines.antenna.investigation import (
+from antenna_drive.diagnosis import investigation
+from antenna_drive.diagnosis.drive_limits import DriveLimits
+from antenna_drive.diagnosis.field_recording import CHANNELS, RATE_COMMAND
+from antenna_drive.diagnosis.investigation import (
     Investigation, InvestigationPlan, lines, sensed,
 )
-from antenna_drive.machines.antenna.planned_tests import BUILT_IN
-from antenna_drive.machines.antenna.sensors import SensorModel
-from antenna_drive.pages import render
+from antenna_drive.diagnosis.planned_tests import BUILT_IN
+from antenna_drive.diagnosis.sensors import SensorModel
+from simgap.report.render import render
 from antenna_drive.parameters.loading import load
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import load_sheet, TestSheet
 import numpy as np
 import pytest
+from simgap.errors import UserError
+from simgap.next_test.design import Judged, Proposal, TestSpace
+from simgap.next_test.rivals import Findings, Rival
 
 DRIVE = load()
 LIMITS = DriveLimits.of_drive(DRIVE)

@@ -1,35 +1,25 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Readings at other times: against scipy's interpolation, and commands that jump later."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from antenna_drive.diagnosis import FloatArray
-from antenna_drive.machines.antenna.field_test import ENCODER, TACH_1, TACH_2
-from antenna_drive.machines.antenna.late_readings import dense, parts_of, read_at
-from antenna_drive.machines.antenna.machine import AntennaMachine, LOW_FIDELITY_STEP
-from antenna_drive.machines.antenna.prediction import predict, RecorderErrors
-from antenna_drive.machines.antenna.recorded_command import RecordedCommand
+from antenna_drive.diagnosis.field_test import ENCODER, TACH_1, TACH_2
+from antenna_drive.diagnosis.late_readings import dense, parts_of, read_at
+from antenna_drive.diagnosis.machine import AntennaMachine, LOW_FIDELITY_STEP
+from antenna_drive.diagnosis.prediction import predict, RecorderErrors
+from antenna_drive.diagnosis.recorded_command import RecordedCommand
 from antenna_drive.parameters import load
 from antenna_drive.parameters.sets import changed
-from antenna_drive.recording.recording import Channel, Recording
+from antenna_drive.recording.recording import Recording
 from field_runs import FAST_TRIANGLE, field_run
 import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
+from simgap.logs.channel import Channel
+from simgap.machine.contract import FloatArray
 
 RATE_HZ = 100.0
 DEGREE = np.pi / 180.0

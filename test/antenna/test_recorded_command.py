@@ -1,28 +1,17 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """A command that is known from its samples, against the closed form that was sampled."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from antenna_drive.diagnosis import FloatArray
-from antenna_drive.machines.antenna.command_samples import regular_times
-from antenna_drive.machines.antenna.recorded_command import RecordedCommand
+from antenna_drive.diagnosis.command_samples import regular_times
+from antenna_drive.diagnosis.recorded_command import RecordedCommand
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
+from simgap.machine.contract import FloatArray
 
 PERIOD = 0.02
 

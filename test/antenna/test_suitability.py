@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Columns that cannot be of this drive are refused with the reason; effects of it never are."""
 
 from __future__ import annotations
@@ -18,16 +7,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from antenna_drive.diagnosis import FloatArray
-from antenna_drive.errors import UserError
-from antenna_drive.machines.antenna.field_recording import CHANNELS, FieldRecording, RATE_COMMAND
-from antenna_drive.machines.antenna.suitability import check
+from antenna_drive.diagnosis.field_recording import CHANNELS, FieldRecording, RATE_COMMAND
+from antenna_drive.diagnosis.suitability import check
 from antenna_drive.parameters import load
 from antenna_drive.parameters.sets import changed
 from antenna_drive.recording.recording import Recording
 from field_runs import FAST_TRIANGLE, field_run, SLOW_SQUARE
 import numpy as np
 import pytest
+from simgap.errors import UserError
+from simgap.machine.contract import FloatArray
 
 DRIVE = load('new_circuit')
 RUNS = {'square': field_run(DRIVE, 30.0, start_after=2.0, **SLOW_SQUARE),

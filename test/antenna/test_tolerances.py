@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The nuisances of the antenna: what they change, by how much, and that they change it alone."""
 
 from __future__ import annotations
@@ -18,13 +7,13 @@ from __future__ import annotations
 from dataclasses import replace
 import math
 
-from antenna_drive.machines.antenna.field_test import CHANNELS, FieldTest, prepared
-from antenna_drive.machines.antenna.machine import AntennaMachine
-from antenna_drive.machines.antenna.modifiers import (
+from antenna_drive.diagnosis.field_test import CHANNELS, FieldTest, prepared
+from antenna_drive.diagnosis.machine import AntennaMachine
+from antenna_drive.diagnosis.modifiers import (
     FieldChange, ReadingModifier, RunSetup, SensorReadings,
 )
-from antenna_drive.machines.antenna.planned_tests import BUILT_IN, planned
-from antenna_drive.machines.antenna.tolerances import nuisances
+from antenna_drive.diagnosis.planned_tests import BUILT_IN, planned
+from antenna_drive.diagnosis.tolerances import nuisances
 from antenna_drive.parameters import load
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed

@@ -1,31 +1,22 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Where something that no effect names has entered, told from what it does to the readings."""
 
 from __future__ import annotations
 
-from antenna_drive.diagnosis import DEFAULT, FloatArray, LeastSquares
-from antenna_drive.diagnosis.unknown_input import _Evidence, components, places
-from antenna_drive.machines.antenna.disturbances import DISTURBANCES
-from antenna_drive.machines.antenna.field_test import CHANNELS
-from antenna_drive.machines.antenna.machine import AntennaMachine
-from antenna_drive.machines.antenna.planned_tests import BUILT_IN, planned
+from antenna_drive.diagnosis.disturbances import DISTURBANCES
+from antenna_drive.diagnosis.field_test import CHANNELS
+from antenna_drive.diagnosis.machine import AntennaMachine
+from antenna_drive.diagnosis.planned_tests import BUILT_IN, planned
 from antenna_drive.parameters import load
 from antenna_drive.recording.recording import Recording
 import numpy as np
 import pytest
 from scipy import optimize, stats
+from simgap.fit.least_squares import LeastSquares
+from simgap.machine.contract import FloatArray
+from simgap.settings import DEFAULT
+from simgap.verdict.unknown_input import _Evidence, components, places
 
 NOISE = np.array([0.01, 0.01, 0.0035, 0.0035, 1.5e-6, 0.01])
 

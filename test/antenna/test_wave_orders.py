@@ -1,30 +1,19 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Which waves a residual holds, and how the noise is set while something strong is missing."""
 
 from __future__ import annotations
 
-from antenna_drive.diagnosis import Experiment
-from antenna_drive.machines.antenna.catalogue import catalogue
-from antenna_drive.machines.antenna.field_test import CHANNELS, CURRENT_1, TACH_1, TACH_2, UNITS
-from antenna_drive.machines.antenna.wave_orders import likely_orders
-from antenna_drive.machines.antenna.waves import Wave
+from antenna_drive.diagnosis.catalogue import catalogue
+from antenna_drive.diagnosis.field_test import CHANNELS, CURRENT_1, TACH_1, TACH_2, UNITS
+from antenna_drive.diagnosis.wave_orders import likely_orders
+from antenna_drive.diagnosis.waves import Wave
 from antenna_drive.physics.harmonics import wave
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
+from simgap.machine.contract import Experiment
 
 
 def experiment(seed: int) -> Experiment:

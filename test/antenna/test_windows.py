@@ -1,29 +1,17 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Which parts of a recording are compared, and whether they can be simulated on their own."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from antenna_drive.diagnosis import FloatArray
-from antenna_drive.machines.antenna.excitation import Bias
-from antenna_drive.machines.antenna.field_recording import BIAS, ENCODER, FieldRecording
-from antenna_drive.machines.antenna.field_test import FieldTest, prepared, window_of
-from antenna_drive.machines.antenna.machine import AntennaMachine, TRUNCATED_S
-from antenna_drive.machines.antenna.sheet_settings import as_the_sheet_says
-from antenna_drive.machines.antenna.windows import first_window, Window
+from antenna_drive.diagnosis.excitation import Bias
+from antenna_drive.diagnosis.field_recording import BIAS, ENCODER, FieldRecording
+from antenna_drive.diagnosis.field_test import FieldTest, prepared, window_of
+from antenna_drive.diagnosis.machine import AntennaMachine, TRUNCATED_S
+from antenna_drive.diagnosis.sheet_settings import as_the_sheet_says
+from antenna_drive.diagnosis.windows import first_window, Window
 from antenna_drive.parameters import load
 from antenna_drive.parameters.sets import changed
 from antenna_drive.recording.recording import Recording
@@ -31,6 +19,7 @@ from antenna_drive.recording.sheet import CircuitBias, FixedStepBias, TestSheet,
 from field_runs import FAST_TRIANGLE, field_run, NOISE, SLOW_SQUARE
 import numpy as np
 import pytest
+from simgap.machine.contract import FloatArray
 
 # No jumps, whose times a recording tells to half a macro-step only.
 SLOW_SINE: dict[str, Any] = {'waveform': 'sine', 'amplitude': 8.7e-4, 'period': 6.3}

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The figures: each drawn, with its axes, in a file of its own and on one page."""
 
 from __future__ import annotations
@@ -24,9 +13,9 @@ from antenna_drive import cli
 from antenna_drive.article import figures, loaded_axis
 from antenna_drive.article.measures import Results, with_circuits
 from antenna_drive.article.profile_measures import loaded_axis as loop_of_load
-from antenna_drive.programs import OK
 import numpy as np
 import pytest
+from simgap.command.programs import OK
 
 NUMBERS = (1, 2, 3, *range(8, 14), *range(15, 24))
 # The article's axes: what stands along them, and in which unit.

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The article's rows: reproduced, with the tolerances that were agreed on and no wider."""
 
 from __future__ import annotations
@@ -30,9 +19,9 @@ from antenna_drive.calibration.problem import read_problem
 from antenna_drive.cli.article import CONFIGURATION
 from antenna_drive.parameters.files import config_dir
 from antenna_drive.parameters.sets import changed
-from antenna_drive.programs import BAD_INPUT, OK
 import numpy as np
 import pytest
+from simgap.command.programs import BAD_INPUT, OK
 
 # The published figures and their tolerances: 3 percent of rates and currents, 0.2 V,
 # 5 points of overshoot, 0.15 s of settling, 3 of the stability limit.

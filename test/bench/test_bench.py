@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The benchmark runs, and its result is complete; how fast anything is, no test says."""
 
 from __future__ import annotations
@@ -24,19 +13,17 @@ import shutil
 import time
 
 from antenna_drive.article.experiments import experiments
-from antenna_drive.bench import (
-    batches, c_loop, measuring, peers, simulation, stolen, suite, transport,
-)
-from antenna_drive.bench.batches import Task
-from antenna_drive.bench.peers import Setting
-from antenna_drive.bench.stamps import WARM_STEPS
 from antenna_drive.cli import main
 from antenna_drive.emulator.run import simulate
 from antenna_drive.emulator.wiring import UNITS
 from antenna_drive.lockstep.pace import LEAD_S
-from antenna_drive.programs import BAD_INPUT
+from lab.bench import batches, c_loop, measuring, peers, simulation, stolen, suite, transport
+from lab.bench.batches import Task
+from lab.bench.peers import Setting
+from lab.bench.stamps import WARM_STEPS
 import numpy as np
 import pytest
+from simgap.command.programs import BAD_INPUT
 
 
 def test_work_is_done_in_turn() -> None:

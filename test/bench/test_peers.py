@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The peers solve the same problem as the emulator, and the loop in C is the same loop."""
 
 from __future__ import annotations
@@ -19,10 +8,10 @@ from dataclasses import replace
 import shutil
 
 from antenna_drive.article.experiments import experiments
-from antenna_drive.bench import c_loop, equations, peers
-from antenna_drive.bench.peers import Problem, Setting
-from antenna_drive.bench.simulation import distance, plan, run_lockstep, run_whole
 from antenna_drive.emulator.run import FINE_STEP, simulate
+from lab.bench import c_loop, equations, peers
+from lab.bench.peers import Problem, Setting
+from lab.bench.simulation import distance, plan, run_lockstep, run_whole
 import numpy as np
 import pytest
 

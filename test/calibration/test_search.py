@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The search and its report, on a problem whose best fit and slopes are known by hand."""
 
 from __future__ import annotations
@@ -24,11 +13,11 @@ from antenna_drive import cli
 from antenna_drive.calibration.problem import Evaluation, Free, Target
 from antenna_drive.calibration.report import report
 from antenna_drive.calibration.search import FitCandidate, search
-from antenna_drive.errors import UserError
 from antenna_drive.parameters import load, ParameterError
-from antenna_drive.programs import BAD_INPUT, OK
 import numpy as np
 import pytest
+from simgap.command.programs import BAD_INPUT, OK
+from simgap.errors import UserError
 
 pytest.importorskip('cma')
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The campaign itself: what it finds, counts, keeps and leaves out."""
 
 from __future__ import annotations
@@ -24,24 +13,24 @@ import subprocess
 import sys
 from typing import Any
 
-from antenna_drive.campaign import leftovers
-from antenna_drive.campaign.kills import _lost_steps
-from antenna_drive.campaign.mutations import _fault
-from antenna_drive.campaign.page import page
-from antenna_drive.campaign.readers import Reader
-from antenna_drive.campaign.soak import BLOCKS, slope
-from antenna_drive.campaign.summary import bad, COUNTS, summary
-from antenna_drive.campaign.supervisor import Campaign, OUTCOMES
-from antenna_drive.campaign.trials import DOSES, FULL, Outcome, PARTS, plan, READERS, Trial
 from antenna_drive.cli import main
 from antenna_drive.emulator.wiring import OUTPUTS
-from antenna_drive.errors import UserError
 from antenna_drive.lockstep.frame import FrameLayout, read_foreign
 from antenna_drive.lockstep.inbox import Inbox
-from antenna_drive.trial.verdict import VerdictError
+from lab.campaign import leftovers
+from lab.campaign.kills import _lost_steps
+from lab.campaign.mutations import _fault
+from lab.campaign.page import page
+from lab.campaign.readers import Reader
+from lab.campaign.soak import BLOCKS, slope
+from lab.campaign.summary import bad, COUNTS, summary
+from lab.campaign.supervisor import Campaign, OUTCOMES
+from lab.campaign.trials import DOSES, FULL, Outcome, PARTS, plan, READERS, Trial
+from lab.trials.verdict import VerdictError
 import numpy as np
 import pytest
 from scipy.stats import linregress
+from simgap.errors import UserError
 
 SETTINGS = {'dose': 'short', 'seed': 1, 'soak_s': None}
 
@@ -175,7 +164,7 @@ def test_steps_lost_are_told_of_each_recorder_by_itself() -> None:
 def test_no_garbage_is_a_frame_that_somebody_may_wait_for() -> None:
     """Garbage that is right in everything would be stepped on, and rightly so."""
     pytest.importorskip('rclpy', reason='there is no ROS 2 here')
-    from antenna_drive.campaign.impostor import Garbage
+    from lab.campaign.impostor import Garbage
     garbage = Garbage(random.Random(5))
     garbage.run, garbage.step = 1.7e15, 30_000
     layouts = {unit: FrameLayout(signals) for unit, signals in OUTPUTS.items()}

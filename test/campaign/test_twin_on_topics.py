@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """When a twin's node has told a gap, from what it said on /diagnostics."""
 
 from __future__ import annotations
@@ -19,9 +8,9 @@ import pytest
 
 pytest.importorskip('rclpy', reason='rclpy is not installed: nobody says anything')
 
-from antenna_drive.campaign.rig import Said  # noqa: E402, I100
-from antenna_drive.campaign.twin_on_topics import told  # noqa: E402
 from antenna_drive.twin.watch import GAP, LEARNING, OK  # noqa: E402
+from lab.campaign.rig import Said  # noqa: E402, I100
+from lab.trials.twin_on_topics import told  # noqa: E402
 
 # The test began at 1000 s of the one clock and 5000 s of the other; its onset is 330 s later.
 ZERO_S, ZERO_NS, ONSET_S = 1000.0, 5000 * 10**9, 330.0

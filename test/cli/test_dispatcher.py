@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The antenna-drive command: what it lists, what it imports, how it fails."""
 
 from __future__ import annotations
@@ -23,11 +12,11 @@ import subprocess
 import sys
 
 from antenna_drive import __version__, cli
-from antenna_drive.errors import UserError
-from antenna_drive.parameters.schema import ParameterError
-from antenna_drive.programs import BAD_INPUT, NOT_INSTALLED
 from hypothesis import given, strategies as st
 import pytest
+from simgap.command.programs import BAD_INPUT, NOT_INSTALLED
+from simgap.errors import UserError
+from simgap.inputs.schema import ParameterError
 
 ROOT = Path(__file__).resolve().parents[2]
 FakeCommand = Callable[[str], None]

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The table of thresholds, and verdicts that are decided anew from kept fits."""
 
 from __future__ import annotations
@@ -19,12 +8,13 @@ import json
 from pathlib import Path
 
 from antenna_drive.cli import main
-from antenna_drive.cli.thresholds import DECIDED, variants
-from antenna_drive.diagnosis import (
-    DEFAULT, diagnose, Effect, Evidence, Experiment, FloatArray, Form, Machine, Parameter, Point,
-)
+from lab.cli.thresholds import DECIDED, variants
 import numpy as np
 import pytest
+from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
+from simgap.search.evidence import Evidence
+from simgap.settings import DEFAULT
+from simgap.verdict.diagnosis import diagnose
 
 TIME: FloatArray = np.arange(800, dtype=np.float64) * 0.01
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """A diagnosis works on any machine that is modelled: here a body that cools, in closed form."""
 
 from __future__ import annotations
@@ -18,16 +7,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from antenna_drive.diagnosis import (
-    diagnose, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point, rank_hypotheses,
-)
-from antenna_drive.diagnosis.diagnosis import share_text
-from antenna_drive.diagnosis.rivals import Rival
-from antenna_drive.diagnosis.settings import DEFAULT
 from blas_threads import during, Look
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
+from simgap.next_test.rivals import Rival
+from simgap.search.ranking import rank_hypotheses
+from simgap.settings import DEFAULT
+from simgap.verdict.diagnosis import diagnose, share_text
 
 TIME = np.arange(0.0, 10.0, 0.02)
 NOISE = 0.01

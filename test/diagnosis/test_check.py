@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """What is missing or wrong in a machine is told at once, by name."""
 
 from __future__ import annotations
@@ -18,13 +7,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from antenna_drive.diagnosis import (
-    check_machine, diagnose, Effect, Experiment, FloatArray, Form, idle_effects, Machine,
-    MachineError, Parameter, Point,
-)
-from antenna_drive.errors import UserError
 import numpy as np
 import pytest
+from simgap.errors import UserError
+from simgap.machine.check import check_machine, idle_effects, MachineError
+from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
+from simgap.verdict.diagnosis import diagnose
 
 TIME: FloatArray = np.arange(50, dtype=np.float64) * 0.1
 NUISANCE = Parameter('spring', '1', -0.1, 0.1, 1e-3, 0.05)

@@ -1,26 +1,15 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The least size of an effect that shows, where it follows from a linear model."""
 
 from __future__ import annotations
 
-from antenna_drive.diagnosis import (
-    DEFAULT, Effect, Experiment, FloatArray, Form, LeastSquares, Machine, Parameter, Point,
-)
-from antenna_drive.diagnosis.confusability import visibility
 import numpy as np
 import pytest
+from simgap.fit.least_squares import LeastSquares
+from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
+from simgap.next_test.confusability import visibility
+from simgap.settings import DEFAULT
 
 TIME: FloatArray = np.linspace(-1.0, 1.0, 400)
 STRONG = 1e6

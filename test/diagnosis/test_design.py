@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The search for the next test, on a machine whose best test is known beforehand."""
 
 from __future__ import annotations
@@ -20,17 +9,16 @@ from dataclasses import replace
 import json
 from typing import Any
 
-from antenna_drive.diagnosis import (
-    design, DesignEffort, Effect, Experiment, Findings, FloatArray, Form, Judged, Machine,
-    Parameter, Point, Rival, TestDesign, TestSpace,
-)
-from antenna_drive.diagnosis.design import CRITERIA
-from antenna_drive.diagnosis.discrimination import refitted, Separation
-from antenna_drive.diagnosis.proposal import as_data, contents, lines
-from antenna_drive.diagnosis.settings import DEFAULT
 from blas_threads import during, Look
 import numpy as np
 import pytest
+from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
+from simgap.next_test import design
+from simgap.next_test.design import CRITERIA, DesignEffort, Judged, TestDesign, TestSpace
+from simgap.next_test.discrimination import refitted, Separation
+from simgap.next_test.proposal import as_data, contents, lines
+from simgap.next_test.rivals import Findings, Rival
+from simgap.settings import DEFAULT
 
 SMALL = DesignEffort(drawn=8, judged=6, varied=2, variants=2, confirmed=2)
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Rivals in planned tests: a T-optimal design of the literature, closed forms, and fits."""
 
 from __future__ import annotations
@@ -20,13 +9,12 @@ from dataclasses import replace
 import json
 import math
 
-from antenna_drive.diagnosis import (
-    Effect, Experiment, FloatArray, Form, Machine, Parameter, Point, Rival,
-)
-from antenna_drive.diagnosis.discrimination import refitted, Separation, separation
-from antenna_drive.diagnosis.doubts import Doubt
 import numpy as np
 import pytest
+from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
+from simgap.next_test.discrimination import refitted, Separation, separation
+from simgap.next_test.rivals import Rival
+from simgap.verdict.doubts import Doubt
 
 WIDE = 1e3
 

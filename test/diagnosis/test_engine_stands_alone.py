@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The engine knows no machine: it imports no other room, and machines import its face alone."""
 
 from __future__ import annotations
@@ -44,7 +33,7 @@ def test_engine_imports_no_other_room(source: Path) -> None:
     for name in imported(source):
         top = name.split('.')[0]
         if top == 'antenna_drive':
-            assert name.startswith('antenna_drive.diagnosis') or name == 'antenna_drive.errors'
+            assert name.startswith('antenna_drive.diagnosis') or name == 'simgap.errors'
         else:
             assert top in LIBRARIES | sys.stdlib_module_names, f'{source.name} imports {name}'
 
@@ -54,9 +43,9 @@ def test_nothing_else_is_loaded_with_the_engine() -> None:
                'print(*[name for name in sys.modules if name.startswith("antenna_drive.")])')
     loaded = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True,
                             check=True).stdout.split()
-    assert 'antenna_drive.diagnosis.search' in loaded
+    assert 'simgap.search.search' in loaded
     assert [name for name in loaded if not name.startswith('antenna_drive.diagnosis')
-            and name != 'antenna_drive.errors'] == []
+            and name != 'simgap.errors'] == []
 
 
 @pytest.mark.parametrize('source', MACHINES, ids=lambda path: f'{path.parent.name}/{path.name}')

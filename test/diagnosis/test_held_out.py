@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """How far a gap shrinks on withheld data, where the answer follows from the construction."""
 
 from __future__ import annotations
@@ -20,18 +9,17 @@ from dataclasses import replace
 import math
 from typing import Any
 
-from antenna_drive.diagnosis import (
-    Colour, Effect, Experiment, FloatArray, Form, Hypothesis, LeastSquares, Machine, Parameter,
-    Point,
-)
-from antenna_drive.diagnosis.held_out import (
-    block_sums, explained_fraction, held_out, refuted, shows_no_gap,
-)
-from antenna_drive.diagnosis.settings import DEFAULT
-from antenna_drive.diagnosis.training import Part, Slopes, trained
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
+from simgap.fit.least_squares import LeastSquares
+from simgap.machine.contract import (
+    Colour, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point,
+)
+from simgap.search.hypothesis import Hypothesis
+from simgap.search.training import Part, Slopes, trained
+from simgap.settings import DEFAULT
+from simgap.verdict.held_out import block_sums, explained_fraction, held_out, refuted, shows_no_gap
 
 TIME: FloatArray = np.arange(2000, dtype=np.float64) * 0.01
 SIZE = Parameter('spring.rate.size', '1', -10.0, 10.0, 1e-3)

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Intervals of fitted values, against covariances in closed form."""
 
 from __future__ import annotations
@@ -20,15 +9,16 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
-from antenna_drive.diagnosis import Form, Hypothesis, Parameter
-from antenna_drive.diagnosis.doubts import Doubt, doubts
-from antenna_drive.diagnosis.intervals import (
-    covariance, deviations, inflation, jackknife, values_with_intervals,
-)
-from antenna_drive.diagnosis.least_squares import FitState
-from antenna_drive.diagnosis.settings import DEFAULT
 import numpy as np
 import pytest
+from simgap.fit.least_squares import FitState
+from simgap.machine.contract import Form, Parameter
+from simgap.search.hypothesis import Hypothesis
+from simgap.settings import DEFAULT
+from simgap.verdict.doubts import Doubt, doubts
+from simgap.verdict.intervals import (
+    covariance, deviations, inflation, jackknife, values_with_intervals,
+)
 
 SETTINGS = DEFAULT.interval
 CHANGE = Parameter('part.effect.change', '1', -0.9, 0.9, 0.005)

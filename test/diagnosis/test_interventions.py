@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Tests with labels: which effect an intervention changes, by how much, and which one stays."""
 
 from __future__ import annotations
@@ -18,14 +7,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from antenna_drive.diagnosis import (
-    diagnose, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point, without_labels,
-)
-from antenna_drive.diagnosis.by_label import by_label, ByLabel, groups_of
-from antenna_drive.diagnosis.page import contents
-from antenna_drive.pages import render
+from simgap.report.render import render
 import numpy as np
 import pytest
+from simgap.machine.by_label import by_label, ByLabel, groups_of, without_labels
+from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
+from simgap.report.page import contents
+from simgap.verdict.diagnosis import diagnose
 
 TIME = np.arange(0.0, 10.0, 0.02)
 NOISE = 0.01

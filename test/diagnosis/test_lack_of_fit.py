@@ -1,30 +1,19 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """What a fit leaves, on a reading of nothing with waves of known size in it."""
 
 from __future__ import annotations
 
 import math
 
-from antenna_drive.diagnosis import (
-    Experiment, FloatArray, Hypothesis, LeastSquares, Machine, Parameter, Point,
-)
-from antenna_drive.diagnosis.lack_of_fit import lack_of_fit
-from antenna_drive.diagnosis.settings import DEFAULT
-from antenna_drive.diagnosis.verdict import LackOfFit, unknown_probability
 import numpy as np
 import pytest
+from simgap.fit.least_squares import LeastSquares
+from simgap.machine.contract import Experiment, FloatArray, Machine, Parameter, Point
+from simgap.search.hypothesis import Hypothesis
+from simgap.settings import DEFAULT
+from simgap.verdict.lack_of_fit import lack_of_fit
+from simgap.verdict.verdict import LackOfFit, unknown_probability
 
 TIME: FloatArray = np.arange(4000, dtype=np.float64) * 0.01
 # a period of eight samples: one of the first lags is a whole period

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Tests of the bounded robust fits, on a machine whose answer is known in closed form."""
 
 from __future__ import annotations
@@ -19,17 +8,15 @@ from dataclasses import replace
 import math
 from typing import Any
 
-from antenna_drive.diagnosis import (
-    Effect, Experiment, FloatArray, Form, LeastSquares, Machine, Parameter, Point,
-)
-from antenna_drive.diagnosis.box_qp import box_constrained_step, BoxQuadratic
-from antenna_drive.diagnosis.least_squares import led, robust_loss, robust_weight, settled
-from antenna_drive.diagnosis.settings import DEFAULT
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
+from simgap.fit.box_qp import box_constrained_step, BoxQuadratic
+from simgap.fit.least_squares import LeastSquares, led, robust_loss, robust_weight, settled
+from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
+from simgap.settings import DEFAULT
 
 OFFSET = Parameter('offset', '1', -1.0, 1.0, 1e-3, 0.5)
 RATE = Parameter('rate', '1', 0.0, 3.0, 1e-3)

@@ -1,29 +1,22 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Where a gap lies, on a machine whose parts, signals and regimes are laid out beforehand."""
 
 from __future__ import annotations
 
-from antenna_drive.diagnosis import (
-    Course, courses, diagnose, DisturbanceInput, Effect, Experiment, FloatArray, Form, Hypothesis,
-    LeastSquares, Machine, Parameter, Point, Regimes, TimeScales,
-)
-from antenna_drive.diagnosis.localisation import of_effects, of_the_unknown, parts_of_the_unknown
-from antenna_drive.diagnosis.verdict import Answer, LackOfFit
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from simgap.fit.least_squares import LeastSquares
+from simgap.machine.contract import (
+    Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point,
+    Regimes, TimeScales,
+)
+from simgap.search.hypothesis import Hypothesis
+from simgap.verdict.diagnosis import diagnose
+from simgap.verdict.localisation import of_effects, of_the_unknown, parts_of_the_unknown
+from simgap.verdict.unknown_input import courses
+from simgap.verdict.verdict import Answer, LackOfFit
 
 TIME: FloatArray = np.arange(3000, dtype=np.float64) * 0.01
 NOISE = 0.05

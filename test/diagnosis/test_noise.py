@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The noise that a recording shows, against processes whose levels and colours are known."""
 
 from __future__ import annotations
@@ -19,17 +8,17 @@ from dataclasses import replace
 import json
 import math
 
-from antenna_drive.diagnosis import Colour, Experiment, FloatArray
-from antenna_drive.diagnosis.noise import (
-    estimated, found_noise, Process, same_noise, whitened, with_estimated_noise,
-    with_found_noise, with_model_error,
-)
-from antenna_drive.diagnosis.settings import DEFAULT
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.signal import lfilter
+from simgap.fit.noise import (
+    estimated, found_noise, Process, same_noise, whitened, with_estimated_noise, with_found_noise,
+    with_model_error,
+)
+from simgap.machine.contract import Colour, Experiment, FloatArray
+from simgap.settings import DEFAULT
 
 SETTINGS = DEFAULT.noise
 INTERVAL_S = 1.0 / 70.0

@@ -1,31 +1,20 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Other effects in the place of the best one: in its other places, and of other kinds."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from antenna_drive.diagnosis import (
-    Effect, Experiment, FloatArray, Form, Hypothesis, LeastSquares, Machine, Parameter, Point,
-)
-from antenna_drive.diagnosis.full_fits import FullFits
-from antenna_drive.diagnosis.search import Search
-from antenna_drive.diagnosis.settings import DEFAULT
-from antenna_drive.diagnosis.training import begun, Part
 import numpy as np
 import pytest
+from simgap.fit.least_squares import LeastSquares
+from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
+from simgap.search.full_fits import FullFits
+from simgap.search.hypothesis import Hypothesis
+from simgap.search.search import Search
+from simgap.search.training import begun, Part
+from simgap.settings import DEFAULT
 
 TIME = np.arange(0.0, 4.0, 0.01)
 NOISE = 0.01

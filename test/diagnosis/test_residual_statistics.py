@@ -1,27 +1,16 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Statistics of residuals whose answers are known: white noise, AR(1), a sine, a staircase."""
 
 from __future__ import annotations
 
-from antenna_drive.diagnosis import FloatArray
-from antenna_drive.diagnosis.residual_statistics import (
-    autocorrelation, dependence, dependences, fast_power, power, slow_excess,
-)
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from simgap.fit.residual_statistics import (
+    autocorrelation, dependence, dependences, fast_power, power, slow_excess,
+)
+from simgap.machine.contract import FloatArray
 
 N = 200_000
 WHITE: FloatArray = np.random.default_rng(11).normal(size=N)

@@ -1,31 +1,19 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Answers that share a fit are apart where one of its effects exceeds its tolerance by little."""
 
 from __future__ import annotations
 
-from antenna_drive.diagnosis import (
-    Effect, Experiment, Findings, FloatArray, Form, Machine, objective_for, Parameter, Point,
-)
-from antenna_drive.diagnosis.discrimination import separation
-from antenna_drive.diagnosis.hypothesis import Hypothesis
-from antenna_drive.diagnosis.least_squares import LeastSquares
-from antenna_drive.diagnosis.rivals import Rival, rivals_of, within
-from antenna_drive.diagnosis.settings import DEFAULT
-from antenna_drive.diagnosis.verdict import Answer
 import numpy as np
 import pytest
+from simgap.fit.least_squares import LeastSquares
+from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
+from simgap.next_test.design import objective_for
+from simgap.next_test.discrimination import separation
+from simgap.next_test.rivals import Findings, Rival, rivals_of, within
+from simgap.search.hypothesis import Hypothesis
+from simgap.settings import DEFAULT
+from simgap.verdict.verdict import Answer
 
 TOLERANCE = 0.02
 

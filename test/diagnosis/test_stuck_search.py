@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The search for single effects, where fits to all tests at once get stuck."""
 
 from __future__ import annotations
@@ -18,12 +7,11 @@ from __future__ import annotations
 from dataclasses import replace
 import math
 
-from antenna_drive.diagnosis import (
-    Effect, Experiment, FloatArray, Form, LeastSquares, Machine, Parameter, Point,
-)
-from antenna_drive.diagnosis.search import Search
 import numpy as np
 import pytest
+from simgap.fit.least_squares import LeastSquares
+from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
+from simgap.search.search import Search
 
 TIME = np.arange(0.0, 30.0, 0.02)
 NOISE = 0.05

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """What a hypothesis costs, and when it is none: prices, strangeness and the unknown."""
 
 from __future__ import annotations
@@ -18,22 +7,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from antenna_drive.diagnosis.elimination import (
-    backward_elimination, forward_selection, settled_rivals,
-)
-from antenna_drive.diagnosis.hypothesis import Hypothesis, penalty
-from antenna_drive.diagnosis.least_squares import FitState
-from antenna_drive.diagnosis.machine import FloatArray, Form, Parameter
-from antenna_drive.diagnosis.residual_statistics import fast_power, power, slow_excess
-from antenna_drive.diagnosis.settings import DEFAULT
-from antenna_drive.diagnosis.verdict import (
-    also_seen, best, decide, LackOfFit, rank, unknown_probability,
-)
-from antenna_drive.machines.antenna.gust import gust_form, KNOT_S, knots
+from antenna_drive.diagnosis.gust import gust_form, KNOT_S, knots
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
+from simgap.fit.least_squares import FitState
+from simgap.fit.residual_statistics import fast_power, power, slow_excess
+from simgap.machine.contract import FloatArray, Form, Parameter
+from simgap.search.elimination import backward_elimination, forward_selection, settled_rivals
+from simgap.search.hypothesis import Hypothesis, penalty
+from simgap.settings import DEFAULT
+from simgap.verdict.verdict import also_seen, best, decide, LackOfFit, rank, unknown_probability
 
 SETTINGS = DEFAULT.verdict
 NUMBER = Parameter('motor.gain', '1', -1.0, 1.0, 0.01, tolerance=0.02)

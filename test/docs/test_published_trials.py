@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Trials that are published case by case give the figures that the documents state."""
 
 from __future__ import annotations
@@ -21,11 +10,11 @@ from pathlib import Path
 import re
 from typing import Any
 
-from antenna_drive.cli.twin_trial import of_onsets, of_verdicts
-from antenna_drive.trial import investigations, third_tests
-from antenna_drive.trial.results import FILE, TrialResults
-from antenna_drive.trial.scorecard import score
-from antenna_drive.trial.scored_cases import read_scored
+from lab.cli.twin_trial import of_onsets, of_verdicts
+from lab.trials import investigations, third_tests
+from lab.trials.results import FILE, TrialResults
+from lab.trials.scorecard import score
+from lab.trials.scored_cases import read_scored
 import pytest
 
 DOCS = Path(__file__).resolve().parents[2] / 'docs'

@@ -1,20 +1,9 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The emulator against a second program for the same drive, sample by sample.
 
-`antenna_drive.trial` was written from the same equations without a line in common: other states,
+`lab.antenna` was written from the same equations without a line in common: other states,
 another integrator (Dormand-Prince with dense output, tolerance 1e-8), other code for gears and
 friction. Where both agree a mistake would have to have been made twice.
 """
@@ -24,9 +13,9 @@ from typing import Any
 from antenna_drive.article.experiments import experiments
 from antenna_drive.emulator.run import simulate
 from antenna_drive.parameters.sets import changed
-from antenna_drive.trial.machine import LAW_B, reference_machine
-from antenna_drive.trial.real_antenna import simulate as simulate_apart
-from antenna_drive.trial.sheet import CaseSheet
+from lab.antenna.machine import LAW_B, reference_machine
+from lab.antenna.real_antenna import simulate as simulate_apart
+from lab.antenna.sheet import CaseSheet
 import numpy as np
 import pytest
 

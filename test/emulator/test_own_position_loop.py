@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The example's sixth unit in one process: compiled with the others, right, and in a batch too."""
 
 from pathlib import Path
@@ -22,7 +11,6 @@ from typing import Any
 from antenna_drive.emulator import batch
 from antenna_drive.emulator.run import Emulator, FINE_STEP, simulate
 from antenna_drive.emulator.wiring import DRIVE, find, Wired, Wiring
-from antenna_drive.errors import UserError
 from antenna_drive.parameters import load, ParameterError
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed
@@ -30,6 +18,7 @@ from antenna_drive.physics.block import Interface, Signal
 import numpy as np
 import pytest
 from scipy import integrate
+from simgap.errors import UserError
 
 PACKAGE = Path(__file__).parents[2] / 'examples' / 'own_position_loop'
 TRACK: dict[int, dict[str, dict[str, Any]]] = {

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The drive in one process: bit-identity, order of convergence, live changes, own units."""
 
 from dataclasses import replace
@@ -23,10 +12,10 @@ from antenna_drive.emulator.run import Emulator, FINE_STEP, simulate
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.units import build
 from antenna_drive.parameters import load, ParameterError
-from antenna_drive.parameters.schema import Value
 from antenna_drive.parameters.sets import changed, Drive
 import numpy as np
 import pytest
+from simgap.inputs.schema import Value
 
 CHANGES: dict[int, dict[str, dict[str, Value]]] = {
     300: {'test_signal': {'waveform': 'saw_tooth', 'amplitude': 0.01, 'period': 0.9}},

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """What the page shows of parameters, experiments and test signals, against what the drive has."""
 
 from __future__ import annotations
@@ -24,10 +13,10 @@ from antenna_drive.emulator.wiring import UNITS
 from antenna_drive.live.experiment_buttons import levels, listed, plan, preview, start_of
 from antenna_drive.live.parameter_table import Description, entry_of, reach
 from antenna_drive.parameters import load
-from antenna_drive.parameters.schema import ParameterError
 from antenna_drive.parameters.sets import changed
 import numpy as np
 import pytest
+from simgap.inputs.schema import ParameterError
 
 
 def described(unit: str) -> list[tuple[Description, object]]:

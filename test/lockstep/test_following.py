@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Steps put together from frames, whoever comes late, twice or in whatever order."""
 
 from __future__ import annotations
@@ -23,10 +12,11 @@ import tracemalloc
 from antenna_drive.lockstep.following import Follower
 from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.recorder import RunRecorder
-from antenna_drive.recording.recording import Change, RecordingError
+from antenna_drive.recording.recording import Change
 from antenna_drive.recording.sheet import parse_sheet
 from hypothesis import given, strategies as st
 import pytest
+from simgap.logs.channel import RecordingError
 
 UNITS = {'test_signal': 1, 'motor_1': 2, 'plant': 1}
 LENGTHS = {unit: 3 + 2 * count for unit, count in UNITS.items()}

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """A partner that does not wait, step by step: ages, misses, refusals, and what it puts out."""
 
 from __future__ import annotations
@@ -23,10 +12,10 @@ from antenna_drive.lockstep.exchange import Exchange
 from antenna_drive.lockstep.member import Member
 from antenna_drive.lockstep.partner import Answers, NO_STEP, PartnerUnit
 from antenna_drive.parameters import load
-from antenna_drive.parameters.schema import ParameterError
 from memory_channel import Frame, MemoryChannel
 import numpy as np
 import pytest
+from simgap.inputs.schema import ParameterError
 
 RUN = 7.0
 

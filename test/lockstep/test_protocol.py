@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The protocol without ROS: five members and a network that delivers as it pleases.
 
@@ -33,11 +22,11 @@ from antenna_drive.lockstep.inbox import DEPTH, Inbox, Refusal
 from antenna_drive.lockstep.member import (
     Conductor, DECEIVED_STANDSTILL_S, Guest, Member, MEMORY, SLACK, STANDSTILL_S,
 )
-from antenna_drive.physics.compiling import inner
 from hypothesis import example, given, settings, strategies as st
 from memory_channel import MemoryChannel
 import numpy as np
 import pytest
+from simgap.laws.compiling import inner
 
 UNITS = ('test_signal', 'motor_1', 'motor_2', 'torque_share', 'plant')
 OUTPUTS = {name: (Signal('a', 'rad', ''), Signal('b', 'V', '')) for name in UNITS}

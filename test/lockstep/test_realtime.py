@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Real-time scheduling and locked memory: had where they are allowed, refused in one line."""
 
 from __future__ import annotations
@@ -20,9 +9,9 @@ import subprocess
 import sys
 from typing import Any
 
-from antenna_drive.errors import UserError
 from antenna_drive.lockstep import realtime
 import pytest
+from simgap.errors import UserError
 
 # Threads that are there when the class changes have it, and those that they start have not.
 PROGRAM = """
@@ -71,7 +60,7 @@ def test_who_may_not_is_told_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None
 def test_memory_is_locked_or_refused(limit: int | None) -> None:
     """Under a limit of one byte the system refuses, unless the user may lock any amount."""
     code = ('import resource, sys\n'
-            'from antenna_drive.errors import UserError\n'
+            'from simgap.errors import UserError\n'
             'from antenna_drive.lockstep.realtime import lock_memory\n'
             f'limit = {limit}\n'
             'if limit: resource.setrlimit(resource.RLIMIT_MEMLOCK, (limit, limit))\n'

@@ -1,26 +1,15 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """A test sheet that test_signal plays, in five real processes, and that the bag carries."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from antenna_drive.diagnosis.excitation import SheetCommand
 from antenna_drive.emulator.units import build
 from antenna_drive.emulator.wiring import UNITS
 from antenna_drive.lockstep.exchange import compile_ahead
-from antenna_drive.machines.antenna.excitation import SheetCommand
 from antenna_drive.nodes.signal_generator import main
 from antenna_drive.parameters import load
 from antenna_drive.recording.files import read_recording

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 What robotics tools see of one running drive: joints, and the socket that Foxglove reads.
 
@@ -38,7 +27,6 @@ pytest.importorskip('foxglove', reason='foxglove-sdk is not installed')
 
 from antenna_drive.lockstep.thinning import Thinned  # noqa: E402, I100
 from antenna_drive.nodes.joint_states_node import axis_state, motor_states  # noqa: E402
-from antenna_drive.programs import BAD_INPUT  # noqa: E402
 from drive_watch import Watch  # noqa: E402
 from live_command import LiveCommand  # noqa: E402
 import numpy as np  # noqa: E402
@@ -46,6 +34,7 @@ from rclpy.serialization import serialize_message  # noqa: E402
 from rosbags.typesys import get_typestore, Stores  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
+from simgap.command.programs import BAD_INPUT  # noqa: E402
 from std_msgs.msg import Float64  # noqa: E402
 from tornado.httpclient import HTTPRequest  # noqa: E402
 from tornado.websocket import websocket_connect, WebSocketClientConnection  # noqa: E402

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The twin as a process, beside a 'real' drive that is the independent antenna, over DDS."""
 
 from __future__ import annotations
@@ -30,15 +19,15 @@ pytest.importorskip('rclpy', reason='there is no ROS 2 here')
 
 from antenna_drive.lockstep.entry import choose_transport  # noqa: E402, I100
 from antenna_drive.lockstep.leaving import leave  # noqa: E402
-from antenna_drive.programs import BAD_INPUT  # noqa: E402
 from antenna_drive.recording.csv_format import write_csv  # noqa: E402
-from antenna_drive.trial import onset  # noqa: E402
-from antenna_drive.trial.effects import CATALOGUE  # noqa: E402
 from antenna_drive.twin.proving import recording_of  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
+from lab.antenna.effects import CATALOGUE  # noqa: E402
+from lab.trials import onset  # noqa: E402
 import numpy as np  # noqa: E402
 import rclpy  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from simgap.command.programs import BAD_INPUT  # noqa: E402
 from std_msgs.msg import Float64, Float64MultiArray  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 import yaml  # noqa: E402

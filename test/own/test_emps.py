@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The worked example: a real ball-screw axis, and what the model of its authors lacks.
 
@@ -22,12 +11,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from antenna_drive.diagnosis import Diagnosis
-from antenna_drive.machines.own import (
-    check_model, diagnose_logs, load_model, Log, Model, read_log, unseen,
-)
 import numpy as np
 import pytest
+from simgap.model import check_model, diagnose_logs, load_model, Log, Model, read_log, unseen
+from simgap.verdict.diagnosis import Diagnosis
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get('ANTENNA_DRIVE_EMPS', ROOT.parent / 'shared' / 'data' / 'emps'))

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """One joint in Python, as a MuJoCo model and as FMUs: the same motion and the same verdict."""
 
 from __future__ import annotations
@@ -20,9 +9,9 @@ import runpy
 import shutil
 from typing import Any
 
-from antenna_drive.machines.own import diagnose_logs, load_model, Log, Model, OwnMachine
 import numpy as np
 import pytest
+from simgap.model import diagnose_logs, load_model, Log, Model, OwnMachine
 
 pytest.importorskip('mujoco', reason="mujoco is not installed, see the extra 'mujoco'")
 pytest.importorskip('fmpy', reason="fmpy is not installed, see the extra 'fmu'")

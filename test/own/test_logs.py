@@ -1,27 +1,16 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Logs from files: plain, mapped, with a sheet; and models from files."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from antenna_drive.errors import UserError
-from antenna_drive.machines.own import load_model, read_log, read_logs
 import numpy as np
 import pytest
 from scipy.io import savemat
+from simgap.errors import UserError
+from simgap.model import load_model, read_log, read_logs
 
 MAP = """
 time: {column: "T (ms)", unit: ms}
@@ -110,7 +99,7 @@ def test_two_files_of_one_name_are_refused(tmp_path: Path) -> None:
 
 
 GOOD = """
-from antenna_drive.machines.own import known, machine, reading
+from simgap.model import known, machine, reading
 drive = machine(lambda n, t: {'x': n.a * t.time}, {'a': known(1.0)}, {'x': reading('m', 0.1)})
 """
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Model files: what they say of numbers, readings and effects, and what is told of mistakes."""
 
 from __future__ import annotations
@@ -19,11 +8,11 @@ from pathlib import Path
 import sys
 
 from antenna_drive.cli import main
-from antenna_drive.diagnosis import FloatArray
-from antenna_drive.machines.own import load_model, Log, model_file, ModelError, OwnMachine
-from antenna_drive.machines.own.simulator import Ports
 import numpy as np
 import pytest
+from simgap.machine.contract import FloatArray
+from simgap.model import load_model, Log, model_file, ModelError, OwnMachine
+from simgap.model.simulator import Ports
 
 TEXT = """\
 mujoco: any.xml
@@ -200,7 +189,7 @@ def test_a_missing_package_is_told_with_its_remedy(
         program: str, package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
         capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setitem(sys.modules, package, None)
-    monkeypatch.delitem(sys.modules, f'antenna_drive.machines.own.{program}_model',
+    monkeypatch.delitem(sys.modules, f'simgap.model.{program}_model',
                         raising=False)
     (tmp_path / 'any.xml').write_text('')
     (tmp_path / 'm.yaml').write_text(TEXT.replace('mujoco:', f'{program}:'))

@@ -1,32 +1,21 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """A model in, the missing effect out: its name and size, and when something pushes."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from antenna_drive.diagnosis.page import contents
-from antenna_drive.errors import UserError
-from antenna_drive.machines.own import (
-    diagnose_logs, effect, free, Log, machine, OwnMachine, reading, ripple, size, summary_of,
-    unseen,
-)
-from antenna_drive.pages import render
+from simgap.report.render import render
 import numpy as np
 from own.swing import log_of, logs, NOISE, simulate, swing, TIME
 import pytest
+from simgap.errors import UserError
+from simgap.model import (
+    diagnose_logs, effect, free, Log, machine, OwnMachine, reading, ripple, size, summary_of,
+    unseen,
+)
+from simgap.report.page import contents
 
 
 def test_nothing_is_named_where_nothing_is_wrong() -> None:

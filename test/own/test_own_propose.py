@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The next test of a machine of one's own: a swing that may be pushed off anywhere."""
 
 from __future__ import annotations
@@ -20,11 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from antenna_drive.cli import main
-from antenna_drive.diagnosis import DesignEffort, Findings, Rival, TestDesign
-from antenna_drive.machines.own import effect, Log, Model, ModelError, own_tests, read_log, size
 import numpy as np
 from own.swing import swing
 import pytest
+from simgap.model import effect, Log, Model, ModelError, own_tests, read_log, size
+from simgap.next_test.design import DesignEffort, TestDesign
+from simgap.next_test.rivals import Findings, Rival
 
 SMALL = DesignEffort(drawn=6, judged=4, varied=1, variants=1, confirmed=1)
 

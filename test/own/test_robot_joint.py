@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The robot joint: logs of a program of its own, and the fault that it was given is named."""
 
 from __future__ import annotations
@@ -19,8 +8,8 @@ from pathlib import Path
 import runpy
 from typing import Any
 
-from antenna_drive.machines.own import check_model, diagnose_logs, load_model, Log
 import pytest
+from simgap.model import check_model, diagnose_logs, load_model, Log
 
 FOLDER = Path(__file__).resolve().parents[2] / 'examples' / 'robot_joint'
 MODEL = load_model(str(FOLDER / 'machine.py'))

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """A plain `pip install` without ROS 2, in a virtual environment of its own."""
 
 from __future__ import annotations
@@ -18,10 +7,10 @@ from __future__ import annotations
 from pathlib import Path
 import subprocess
 
-from antenna_drive.programs import NOT_INSTALLED
-from antenna_drive.remedies import REMEDIES
 from installations import bare_environment, install_in_new_venv, NODES, ROOT
 import pytest
+from simgap.command.programs import NOT_INSTALLED
+from simgap.command.remedies import REMEDIES
 
 pytestmark = pytest.mark.slow
 IMPORT_EVERYTHING = """

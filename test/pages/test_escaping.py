@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Whatever is written in a recording is shown as text, and never becomes part of the page."""
 
 from __future__ import annotations
@@ -19,12 +8,13 @@ from html.parser import HTMLParser
 import json
 
 from antenna_drive.pages import render
-from antenna_drive.recording.recording import Channel, Recording
+from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.report import page
 from hypothesis import example, given, strategies as st
 from jinja2 import UndefinedError
 import numpy as np
 import pytest
+from simgap.logs.channel import Channel
 
 
 class Parsed(HTMLParser):

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The page about a diagnosis: of any machine, whatever its names are, in a real browser."""
 
 from __future__ import annotations
@@ -20,17 +9,17 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from antenna_drive.diagnosis.diagnosis import Diagnosis
-from antenna_drive.diagnosis.diagram import Diagram, DiagramBlock
-from antenna_drive.diagnosis.machine import Effect, Experiment
-from antenna_drive.diagnosis.page import contents
-from antenna_drive.machines.antenna.advice import ADVICE
-from antenna_drive.machines.antenna.catalogue import catalogue
-from antenna_drive.machines.antenna.diagram import DIAGRAM
+from antenna_drive.diagnosis.advice import ADVICE
+from antenna_drive.diagnosis.catalogue import catalogue
+from antenna_drive.diagnosis.diagram import DIAGRAM
 from antenna_drive.pages import render
 from chromium import EXECUTABLE, Page
 import numpy as np
 import pytest
+from simgap.machine.contract import Effect, Experiment
+from simgap.machine.diagram import Diagram, DiagramBlock
+from simgap.report.page import contents
+from simgap.verdict.diagnosis import Diagnosis
 
 needs_browser = pytest.mark.skipif(EXECUTABLE is None, reason='there is no Chromium '
                                                               '(apt-get install chromium)')

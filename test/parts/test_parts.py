@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Coupling, shaping, sensors and loops against closed forms."""
 
 from __future__ import annotations
@@ -20,11 +9,11 @@ from pathlib import Path
 import subprocess
 import sys
 
-from antenna_drive.parts import compiled, coupling, harmonics, loop, sensor, shaping, wave
-from antenna_drive.parts.loop import Cascade
 import numpy as np
 from numpy.typing import NDArray
 import pytest
+from simgap.parts import compiled, coupling, harmonics, loop, sensor, shaping, wave
+from simgap.parts.loop import Cascade
 
 FloatArray = NDArray[np.float64]
 
@@ -261,10 +250,10 @@ def test_a_pi_controller_integrates_as_its_closed_form_and_does_not_wind_up() ->
 
 def test_an_edit_of_a_file_beside_the_model_counts(tmp_path: Path) -> None:
     """What is compiled is kept, and is stale when a function that it calls changes."""
-    program = ('from beside import doubled\nfrom antenna_drive.parts import compiled\n'
+    program = ('from beside import doubled\nfrom simgap.parts import compiled\n'
                '@compiled\ndef called(x):\n    return doubled(x)\nprint(called(2.0))\n')
     (tmp_path / 'main.py').write_text(program)
-    beside = 'from antenna_drive.parts import inner\n@inner\ndef doubled(x):\n    return {} * x\n'
+    beside = 'from simgap.parts import inner\n@inner\ndef doubled(x):\n    return {} * x\n'
     for factor in ('2.0', '3.0'):
         (tmp_path / 'beside.py').write_text(beside.format(factor))
         done = subprocess.run([sys.executable, '-B', 'main.py'], cwd=tmp_path, text=True,

@@ -1,23 +1,10 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Backlash against Eq. (1), with the numbers of Fig. 1: a gap of 1 deg, 20 N m/deg."""
 
-from antenna_drive.physics.backlash import (
-    contact_side, contact_torque, contact_torque_rate, dead_zone,
-)
 from hypothesis import given, strategies as st
 import pytest
+from simgap.laws.backlash import contact_side, contact_torque, contact_torque_rate, dead_zone
 
 FIG_1_GAP = 1.0
 FIG_1_STIFFNESS = 20.0

@@ -1,22 +1,11 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Friction against Eq. (2), and its modes against what they stand for."""
 
-from antenna_drive.physics.friction import drag, friction_torque, next_slip, slip_level
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
+from simgap.laws.friction import drag, friction_torque, next_slip, slip_level
 
 COULOMB, STICTION, THRESHOLD = 2.0, 2.5, 1e-3
 

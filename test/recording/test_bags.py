@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Bags: read by other libraries, safe up to the last chunk, refused when they are not whole."""
 
 from __future__ import annotations
@@ -30,9 +19,7 @@ from antenna_drive.emulator.wiring import signal_names
 from antenna_drive.recording import bag_writer
 from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.bag_writer import BagWriter, write_bag
-from antenna_drive.recording.recording import (
-    Change, Channel, Recording, RecordingError, RecordingWarning, unit_of,
-)
+from antenna_drive.recording.recording import Change, Recording, unit_of
 from antenna_drive.recording.sheet import FILE_NAME, parse_sheet
 from mcap.exceptions import EndOfFile
 from mcap.reader import make_reader, NonSeekingReader
@@ -41,6 +28,7 @@ import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer as RosbagsWriter
 from rosbags.typesys import get_typestore, Stores
+from simgap.logs.channel import Channel, RecordingError, RecordingWarning
 import yaml
 
 UNITS = {name: unit_of(name) for name in signal_names()}

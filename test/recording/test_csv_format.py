@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """CSV in and out: exact, and refused with file, line and column."""
 
 from __future__ import annotations
@@ -22,16 +11,14 @@ import struct
 import tempfile
 import warnings
 
-from antenna_drive.recording.csv_format import (
-    Cell, FIELD_COLUMNS, format_nanoseconds, meta_path, parse_nanoseconds, read_csv, write_csv,
-)
-from antenna_drive.recording.recording import (
-    Change, Channel, Recording, RecordingError, RecordingWarning,
-)
+from antenna_drive.recording.csv_format import FIELD_COLUMNS, meta_path, read_csv, write_csv
+from antenna_drive.recording.recording import Change, Recording
 from antenna_drive.recording.sheet import parse_sheet
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
+from simgap.logs.channel import Channel, RecordingError, RecordingWarning
+from simgap.logs.text import Cell, format_nanoseconds, parse_nanoseconds
 
 HEADER = ('time_s,rate_command_rad_s,current_1_A,current_2_A,tach_rate_1_rad_s,'
           'tach_rate_2_rad_s,encoder_rad,bias_voltage_V')

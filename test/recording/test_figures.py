@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The figures of a recording against numbers worked out by hand."""
 
 from __future__ import annotations
@@ -18,11 +7,12 @@ from __future__ import annotations
 import math
 
 from antenna_drive.recording.figures import crossings, share_of_time, statistics
-from antenna_drive.recording.recording import Channel, Recording
+from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import Sensors, TestSheet
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
+from simgap.logs.channel import Channel
 
 
 def test_shares_of_time_count_the_time_and_not_the_samples() -> None:

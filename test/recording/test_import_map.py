@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Somebody else's CSV through a map: units, signs, clocks, and refusals with their place."""
 
 from __future__ import annotations
@@ -18,10 +7,12 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from antenna_drive.parameters.schema import ParameterError
-from antenna_drive.recording.import_map import import_file, load_map, parse_map, UNITS
-from antenna_drive.recording.recording import Recording, RecordingError, RecordingWarning
+from antenna_drive.recording.import_map import import_file, load_map, parse_map
+from antenna_drive.recording.recording import Recording
 import pytest
+from simgap.inputs.schema import ParameterError
+from simgap.logs.channel import RecordingError, RecordingWarning
+from simgap.logs.column_map import UNITS
 import yaml
 
 COMMAND, CURRENT, TACH, ENCODER = (

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """What is larger than a drive needs is refused in one line, before it takes the memory."""
 
 from __future__ import annotations
@@ -21,17 +10,18 @@ import struct
 import tracemalloc
 from typing import Any
 
-from antenna_drive.errors import UserError
-from antenna_drive.limits import BAG, BAG_RECORD, CSV_LINE, Limit, LIMITS, SAMPLES, SIGNALS, TEXT
+from antenna_drive.limits import BAG, BAG_RECORD, LIMITS
 from antenna_drive.recording.bag import MESSAGE_DEFINITION, MESSAGE_TYPE
 from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.csv_format import read_csv
 from antenna_drive.recording.import_map import import_file, load_map
-from antenna_drive.recording.recording import RecordingError
 import lz4.frame
 from mcap.records import Chunk
 from mcap.writer import CompressionType, Writer
 import pytest
+from simgap.errors import UserError
+from simgap.inputs.limits import CSV_LINE, Limit, SAMPLES, SIGNALS, TEXT
+from simgap.logs.channel import RecordingError
 import zstandard
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Files of MATLAB, written by scipy and then damaged."""
 
 from __future__ import annotations
@@ -21,14 +10,14 @@ from tempfile import TemporaryDirectory
 from typing import Any
 import zlib
 
-from antenna_drive.errors import UserError
-from antenna_drive.recording.mat_format import read_mat
-from antenna_drive.recording.tables import open_table
 from hypothesis import given, settings, strategies as st
 import numpy as np
 import pytest
 from scipy.io import savemat
 from scipy.sparse import csc_array
+from simgap.errors import UserError
+from simgap.logs.mat import read_mat
+from simgap.logs.tables import open_table
 
 VALUES = {'time': np.arange(5.0)[:, np.newaxis], 'count': np.array([[3]], dtype='u1'),
           'flags': np.array([[True, False]]), 'table': np.arange(12, dtype='i2').reshape(3, 4)}

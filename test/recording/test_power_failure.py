@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """What a failure of the power leaves of a bag: what the disk was made to hold, and no less."""
 
 from __future__ import annotations
@@ -22,10 +11,10 @@ import stat
 
 from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.bag_writer import BagWriter
-from antenna_drive.recording.recording import RecordingWarning
 from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader
 import pytest
+from simgap.logs.channel import RecordingWarning
 
 SYNC_S = 2.0
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The recorder with a real drive: five processes, real DDS, other libraries to read."""
 
 from __future__ import annotations
@@ -41,7 +30,7 @@ from antenna_drive.parameters.loading import load  # noqa: E402
 from antenna_drive.parameters.sets import changed  # noqa: E402
 from antenna_drive.recording.bag_reader import read_bag  # noqa: E402
 from antenna_drive.recording.csv_format import read_csv, write_csv  # noqa: E402
-from antenna_drive.recording.recording import Recording, RecordingWarning  # noqa: E402
+from antenna_drive.recording.recording import Recording  # noqa: E402
 from antenna_drive.recording.replay import twin  # noqa: E402
 from mcap.exceptions import EndOfFile  # noqa: E402
 from mcap.reader import NonSeekingReader  # noqa: E402
@@ -49,6 +38,7 @@ import numpy as np  # noqa: E402
 from rcl_interfaces.srv import SetParameters  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rosbags.highlevel import AnyReader  # noqa: E402
+from simgap.logs.channel import RecordingWarning  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 Damaged and invented files: a clear error of one line, or exactly what was written.
 
@@ -27,17 +16,17 @@ import random
 from typing import Any
 import warnings
 
-from antenna_drive.campaign.mutating import mutations, POISON
-from antenna_drive.campaign.readers import MAP, one_recording, SHEET
-from antenna_drive.errors import UserError
 from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.bag_writer import write_bag
 from antenna_drive.recording.csv_format import read_csv, write_csv
 from antenna_drive.recording.import_map import import_file, load_map
-from antenna_drive.recording.recording import RecordingError, RecordingWarning
 from antenna_drive.recording.sheet import load_sheet
 from hypothesis import given, HealthCheck, settings, strategies as st
+from lab.campaign.mutating import mutations, POISON
+from lab.campaign.readers import MAP, one_recording, SHEET
 import pytest
+from simgap.errors import UserError
+from simgap.logs.channel import RecordingError, RecordingWarning
 
 FEW, MANY = 300, 5000
 COUNTS = [pytest.param(FEW, id='few'), pytest.param(MANY, id='many', marks=pytest.mark.trial)]

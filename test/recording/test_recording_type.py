@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The Recording type against closed forms."""
 
 from __future__ import annotations
@@ -24,14 +13,13 @@ from typing import Any, get_args
 
 from antenna_drive.emulator.wiring import OUTPUTS, signal_names
 from antenna_drive.recording import recording as module
-from antenna_drive.recording.plain import PlainDataError
-from antenna_drive.recording.recording import (
-    Change, Channel, Method, METHODS, nanoseconds, Recording, RecordingError, unit_of,
-)
+from antenna_drive.recording.recording import Change, Recording, unit_of
 from antenna_drive.recording.sheet import parse_sheet
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
+from simgap.inputs.plain import PlainDataError
+from simgap.logs.channel import Channel, Method, METHODS, nanoseconds, RecordingError
 
 CURRENT, COMMAND = 'motor_1/current', 'test_signal/rate_command'
 

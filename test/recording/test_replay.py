@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The twin of a recording: the same bits where everything is known, the same motion elsewhere."""
 
 from __future__ import annotations
@@ -28,12 +17,13 @@ from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.bag_writer import write_bag
 from antenna_drive.recording.csv_format import FIELD_COLUMNS, write_csv
-from antenna_drive.recording.recording import Channel, nanoseconds, Recording, RecordingError
+from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.replay import command_table, distances, of_sheet, twin
 from antenna_drive.recording.runs import from_run
 from antenna_drive.recording.sheet import parse_sheet
 import numpy as np
 import pytest
+from simgap.logs.channel import Channel, nanoseconds, RecordingError
 
 
 def commanded(drive: Drive, **waveform: Any) -> Drive:

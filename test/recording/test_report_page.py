@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The page about a recording in a real browser: drawn, zoomable, and asking nobody."""
 
 from __future__ import annotations
@@ -21,14 +10,15 @@ import math
 from pathlib import Path
 import re
 
-from antenna_drive.pages.curves import COLOURS
+from simgap.report.curves import COLOURS
 from antenna_drive.recording.panels import PANELS, panels_of
-from antenna_drive.recording.recording import Change, Recording, RecordingError
+from antenna_drive.recording.recording import Change, Recording
 from antenna_drive.recording.report import page
 from antenna_drive.recording.sheet import parse_sheet
 from chromium import EXECUTABLE, Page
 import numpy as np
 import pytest
+from simgap.logs.channel import RecordingError
 
 needs_browser = pytest.mark.skipif(EXECUTABLE is None, reason='there is no Chromium '
                                                               '(apt-get install chromium)')

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """A long bag in several storage files: read by us, by another library, and after a kill."""
 
 from __future__ import annotations
@@ -21,11 +10,11 @@ from typing import Any
 
 from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.bag_writer import BagWriter
-from antenna_drive.recording.recording import RecordingWarning
 import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer as RosbagsWriter
 from rosbags.typesys import get_typestore, Stores
+from simgap.logs.channel import RecordingWarning
 import yaml
 
 STEP_NS = 1_000_000

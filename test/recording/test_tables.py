@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The same table in every kind of file is the same recording; what is damaged is refused."""
 
 from __future__ import annotations
@@ -23,16 +12,17 @@ from typing import Any
 import warnings
 
 from antenna_drive.cli import main
-from antenna_drive.errors import UserError
-from antenna_drive.limits import SAMPLES
-from antenna_drive.machines.own import read_log, read_logs
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.import_map import import_file, parse_map
-from antenna_drive.recording.recording import Recording, RecordingWarning
+from antenna_drive.recording.recording import Recording
 from hypothesis import given, HealthCheck, settings, strategies as st
 import numpy as np
 import pytest
 from scipy.io import savemat
+from simgap.errors import UserError
+from simgap.inputs.limits import SAMPLES
+from simgap.logs.channel import RecordingWarning
+from simgap.model import read_log, read_logs
 
 TIME = np.array([0.0, 0.01, 0.02, 0.035])
 CURRENT = np.array([0.1, np.nan, -0.3, 1 / 3])
@@ -128,7 +118,7 @@ def test_diagnose_reads_recordings_of_the_drive_through_a_map(
         given.update(recordings)
         raise UserError('read, and no more')
 
-    monkeypatch.setattr('antenna_drive.machines.antenna.diagnose.diagnose_recordings', stand_in)
+    monkeypatch.setattr('antenna_drive.diagnosis.diagnose.diagnose_recordings', stand_in)
     write(tmp_path / 'a.npz')
     (tmp_path / 'm.yaml').write_text(json.dumps(MAP))
     assert main(['diagnose', f'{tmp_path}/a.npz', '--map', f'{tmp_path}/m.yaml']) == 2

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Logs of a real servo through the Recording type."""
 
 from __future__ import annotations
@@ -20,10 +9,11 @@ import math
 import os
 from pathlib import Path
 
-from antenna_drive.machines.servo.bam import read_bam
-from antenna_drive.recording.recording import Recording, RecordingError
+from antenna_drive.recording.bam import read_bam
+from antenna_drive.recording.recording import Recording
 import numpy as np
 import pytest
+from simgap.logs.channel import RecordingError
 
 FIXTURE = Path(__file__).parent / 'data' / '2026-01-15_10h28m57.json'
 # the folder of all sixteen logs: next to a checkout, or from the variable

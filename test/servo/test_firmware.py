@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The firmware of a servo is a YAML file: ours, or one beside the logs."""
 
 from __future__ import annotations
@@ -18,12 +7,12 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from antenna_drive.errors import UserError
-from antenna_drive.machines.servo.bam import read_bam
-from antenna_drive.machines.servo.firmware import Firmware, firmware_of
-from antenna_drive.machines.servo.log import DUTY, ServoLog
+from antenna_drive.recording.bam import read_bam
+from lab.servo.firmware import Firmware, firmware_of
+from lab.servo.log import DUTY, ServoLog
 import numpy as np
 import pytest
+from simgap.errors import UserError
 
 LOG = Path(__file__).parent / 'data' / '2026-01-15_10h28m57.json'
 OTHER = ('counts_per_revolution: 4096\nduty_counts: 1000\ngain_divisor: 128\n'

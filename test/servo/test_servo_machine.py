@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 The servo as a model: fits and diagnoses of servos that another integrator has moved.
 
@@ -26,21 +15,21 @@ import math
 from pathlib import Path
 
 from antenna_drive import cli
-from antenna_drive.diagnosis import rank_hypotheses
-from antenna_drive.machines.servo import refit as servo_refit
-from antenna_drive.machines.servo.bam import read_bam
-from antenna_drive.machines.servo.catalogue import BASE, catalogue, number, NUMBERS, TIED, vector
-from antenna_drive.machines.servo.firmware import firmware_of
-from antenna_drive.machines.servo.log import ServoLog
-from antenna_drive.machines.servo.machine import ServoMachine
-from antenna_drive.machines.servo.physics import GRAVITY, ORDER
-from antenna_drive.machines.servo.rounds import FitEffort, folds, lacking, numbers
-from antenna_drive.machines.servo.study import compared, Direction, directions, summed
-from antenna_drive.programs import BAD_INPUT
+from antenna_drive.recording.bam import read_bam
+from lab.servo import refit as servo_refit
+from lab.servo.catalogue import BASE, catalogue, number, NUMBERS, TIED, vector
+from lab.servo.firmware import firmware_of
+from lab.servo.log import ServoLog
+from lab.servo.machine import ServoMachine
+from lab.servo.physics import GRAVITY, ORDER
+from lab.servo.rounds import FitEffort, folds, lacking, numbers
+from lab.servo.study import compared, Direction, directions, summed
 import numpy as np
 from numpy.typing import NDArray
 import pytest
 from scipy.integrate import solve_ivp
+from simgap.command.programs import BAD_INPUT
+from simgap.search.ranking import rank_hypotheses
 
 LOGS = Path(__file__).resolve().parents[3] / 'shared' / 'data' / 'bam_xl330'
 MASS, LENGTH, SUPPLY = 0.5, 0.1, 7.4

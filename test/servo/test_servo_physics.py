@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The servo's physics against closed forms, another integrator and BAM's own figures."""
 
 from __future__ import annotations
@@ -19,11 +8,11 @@ import math
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.machines.servo.bam import read_bam
-from antenna_drive.machines.servo.catalogue import catalogue, vector
-from antenna_drive.machines.servo.log import ServoLog
-from antenna_drive.machines.servo.physics import GRAVITY, swing
-from antenna_drive.machines.servo.refit import error, LADDER
+from antenna_drive.recording.bam import read_bam
+from lab.servo.catalogue import catalogue, vector
+from lab.servo.log import ServoLog
+from lab.servo.physics import GRAVITY, swing
+from lab.servo.refit import error, LADDER
 import numpy as np
 from numpy.typing import NDArray
 import pytest

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """A trial of whole investigations, and the tests that it makes on sealed antennas."""
 
 from __future__ import annotations
@@ -24,10 +13,10 @@ from typing import Any
 
 from antenna_drive.cli import main
 from antenna_drive.recording.csv_format import read_csv
-from antenna_drive.trial import batch, further_tests, investigations, sealing
-from antenna_drive.trial.further_tests import known, reached, with_test
-from antenna_drive.trial.investigations import run_trial, summary, until_sure
-from antenna_drive.trial.results import FILE, TrialResults
+from lab.trials import batch, further_tests, investigations, sealing
+from lab.trials.further_tests import known, reached, with_test
+from lab.trials.investigations import run_trial, summary, until_sure
+from lab.trials.results import FILE, TrialResults
 import numpy as np
 import pytest
 import yaml

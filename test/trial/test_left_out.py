@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The trial without true effects: which cases it takes, what it leaves out, and how it goes on."""
 
 from __future__ import annotations
@@ -21,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from antenna_drive.cli import main
-from antenna_drive.errors import UserError
-from antenna_drive.trial import batch, sealing
-from antenna_drive.trial.left_out import run_trial
-from antenna_drive.trial.scorecard import read_cases
-from antenna_drive.trial.scored_cases import case_lines
+from lab.trials import batch, sealing
+from lab.trials.left_out import run_trial
+from lab.trials.scorecard import read_cases
+from lab.trials.scored_cases import case_lines
 import pytest
+from simgap.errors import UserError
 
 
 def verdict_of(**answers: float) -> dict[str, Any]:

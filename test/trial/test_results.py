@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The results of a trial in one file: nothing is lost, nothing foreign gets in."""
 
 from __future__ import annotations
@@ -20,12 +9,13 @@ import json
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.cli import main, twin_trial
-from antenna_drive.errors import UserError
-from antenna_drive.trial import batch
-from antenna_drive.trial.results import FILE, TrialResults
+from antenna_drive.cli import main
 from antenna_drive.workers import workers
+from lab.cli import twin_trial
+from lab.trials import batch
+from lab.trials.results import FILE, TrialResults
 import pytest
+from simgap.errors import UserError
 
 
 def prepared(folder: Path, seed: int = 5) -> dict[str, Any]:

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The trial of designed tests: which cases it takes, what it runs, and how it goes on."""
 
 from __future__ import annotations
@@ -20,10 +9,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.trial import batch, further_tests, sealing, third_tests
-from antenna_drive.trial.results import FILE, TrialResults
-from antenna_drive.trial.third_tests import is_open, rivals_of, run_trial, set_of, summary
-from antenna_drive.trial.verdict import parse_verdict, Verdict
+from lab.trials import batch, further_tests, sealing, third_tests
+from lab.trials.results import FILE, TrialResults
+from lab.trials.third_tests import is_open, rivals_of, run_trial, set_of, summary
+from lab.trials.verdict import parse_verdict, Verdict
 import pytest
 import yaml
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The real antenna against the table of published and reference figures, T1 to T4."""
 
 from __future__ import annotations
@@ -18,9 +7,9 @@ from __future__ import annotations
 import functools
 import math
 
-from antenna_drive.trial.machine import reference_machine
-from antenna_drive.trial.real_antenna import simulate, TrueSignals
-from antenna_drive.trial.sheet import CaseSheet
+from lab.antenna.machine import reference_machine
+from lab.antenna.real_antenna import simulate, TrueSignals
+from lab.antenna.sheet import CaseSheet
 import numpy as np
 from numpy.typing import NDArray
 import pytest

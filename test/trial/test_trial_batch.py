@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Sealing, making and resuming a trial, and handing its cases to a diagnosis."""
 
 from __future__ import annotations
@@ -24,12 +13,12 @@ import sys
 from typing import Any
 
 from antenna_drive.cli import main
-from antenna_drive.errors import UserError
 from antenna_drive.recording.csv_format import read_csv
-from antenna_drive.trial import batch, sealing
-from antenna_drive.trial.cases import make_recording
+from lab.antenna.cases import make_recording
+from lab.trials import batch, sealing
 import numpy as np
 import pytest
+from simgap.errors import UserError
 import yaml
 
 SETTINGS = {'count': 3, 'seed': 11, 'tolerance': 0.02, 'sample_rate': 100.0, 'duration': 3.0}

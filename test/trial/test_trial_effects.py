@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The effects: their names, their closed forms, and that each one shows and none breaks."""
 
 from __future__ import annotations
@@ -18,15 +7,15 @@ from __future__ import annotations
 import functools
 import math
 
-from antenna_drive.trial import equations, family_b
-from antenna_drive.trial.cases import draw_truths
-from antenna_drive.trial.effect import Defect
-from antenna_drive.trial.effects import CATALOGUE
-from antenna_drive.trial.machine import LAW_A, LAW_B, reference_machine
-from antenna_drive.trial.outside import OUTSIDE
-from antenna_drive.trial.real_antenna import simulate
-from antenna_drive.trial.sensors import record
-from antenna_drive.trial.sheet import CaseSheet
+from lab.antenna import equations, family_b
+from lab.antenna.cases import draw_truths
+from lab.antenna.effect import Defect
+from lab.antenna.effects import CATALOGUE
+from lab.antenna.machine import LAW_A, LAW_B, reference_machine
+from lab.antenna.outside import OUTSIDE
+from lab.antenna.real_antenna import simulate
+from lab.antenna.sensors import record
+from lab.antenna.sheet import CaseSheet
 import numpy as np
 from numpy.typing import NDArray
 import pytest

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The real antenna shares no code with what it is to test."""
 
 from __future__ import annotations
@@ -20,13 +9,13 @@ from pathlib import Path
 import subprocess
 import sys
 
-import antenna_drive.trial as trial
+import lab.antenna as trial
 import pytest
 
 PACKAGE = Path(trial.__file__).parent
 # what starts processes and reports errors knows nothing of any drive
-ALLOWED = ('antenna_drive.trial', 'antenna_drive.errors', 'antenna_drive.workers',
-           'antenna_drive.subcommand', 'antenna_drive.programs', 'antenna_drive.remedies')
+ALLOWED = ('lab.antenna', 'simgap.errors', 'antenna_drive.workers',
+           'antenna_drive.subcommand', 'simgap.command.programs', 'simgap.command.remedies')
 
 
 # models that diagnose, which only a diagnosis loads
@@ -52,11 +41,11 @@ def test_source_imports_nothing_of_the_emulator(source: Path) -> None:
 
 def test_nothing_of_the_emulator_is_loaded_with_it() -> None:
     program = (
-        'import sys, antenna_drive.trial.batch, antenna_drive.trial.scorecard\n'
+        'import sys, lab.trials.batch, lab.trials.scorecard\n'
         'print(*[name for name in sys.modules if name.startswith("antenna_drive.")])')
     loaded = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True,
                             check=True).stdout.split()
-    assert 'antenna_drive.trial.equations' in loaded
-    assert 'antenna_drive.trial.others.mechanism' in loaded
+    assert 'lab.antenna.equations' in loaded
+    assert 'lab.joints.mechanism' in loaded
     assert [name for name in loaded if '.models' in name] == []
     assert [name for name in loaded if not name.startswith(ALLOWED)] == []

@@ -1,27 +1,16 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The integrator and the equations against closed forms and conservation laws."""
 
 from __future__ import annotations
 
 import math
 
-from antenna_drive.trial import equations
-from antenna_drive.trial.equations import MODES_AT, MOTOR_AT, MOTOR_SIZE
-from antenna_drive.trial.machine import Records, reference_machine
-from antenna_drive.trial.real_antenna import simulate, TrueSignals
-from antenna_drive.trial.sheet import CaseSheet
+from lab.antenna import equations
+from lab.antenna.equations import MODES_AT, MOTOR_AT, MOTOR_SIZE
+from lab.antenna.machine import Records, reference_machine
+from lab.antenna.real_antenna import simulate, TrueSignals
+from lab.antenna.sheet import CaseSheet
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

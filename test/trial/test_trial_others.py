@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The cases of joints and axes: their mix, their recordings and their seals."""
 
 from __future__ import annotations
@@ -21,17 +10,17 @@ from pathlib import Path
 from typing import Any
 
 from antenna_drive.cli import main
-from antenna_drive.errors import UserError
-from antenna_drive.machines.own import load_model, OwnMachine, read_logs
-from antenna_drive.trial import batch, sealing
-from antenna_drive.trial.others.cases import draw_truths, make_recording, moved
-from antenna_drive.trial.others.machines import kind_of, MACHINES
-from antenna_drive.trial.others.programme import draw_tests, reference
-from antenna_drive.trial.scorecard import Case, read_cases, score
-from antenna_drive.trial.sizes import stated_sizes
-from antenna_drive.trial.verdict import parse_verdict
+from lab.antenna.sizes import stated_sizes
+from lab.joints.cases import draw_truths, make_recording, moved
+from lab.joints.machines import kind_of, MACHINES
+from lab.joints.programme import draw_tests, reference
+from lab.trials import batch, sealing
+from lab.trials.scorecard import Case, read_cases, score
+from lab.trials.verdict import parse_verdict
 import numpy as np
 import pytest
+from simgap.errors import UserError
+from simgap.model import load_model, OwnMachine, read_logs
 
 COUNT = 4
 

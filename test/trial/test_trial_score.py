@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The scorecard against verdicts made by hand, whose scores follow from counting."""
 
 from __future__ import annotations
@@ -21,26 +10,24 @@ from pathlib import Path
 from typing import Any
 
 from antenna_drive.cli import main
-from antenna_drive.errors import UserError
-from antenna_drive.machines.antenna.catalogue import catalogue
-from antenna_drive.trial import sealing
-from antenna_drive.trial.cases import draw_truths
-from antenna_drive.trial.effects import CATALOGUE
-from antenna_drive.trial.held_back import noise_power
-from antenna_drive.trial.imperfections import apply_imperfections, imperfect_recording
-from antenna_drive.trial.machine import reference_machine
-from antenna_drive.trial.scorecard import (
+from antenna_drive.diagnosis.catalogue import catalogue
+from hypothesis import given, strategies as st
+from lab.antenna.cases import draw_truths
+from lab.antenna.effects import CATALOGUE
+from lab.antenna.imperfections import apply_imperfections, imperfect_recording
+from lab.antenna.machine import reference_machine
+from lab.antenna.sheet import CaseSheet
+from lab.antenna.sizes import size_of, StatedSize
+from lab.trials import sealing
+from lab.trials.held_back import noise_power
+from lab.trials.scorecard import (
     auroc, calibration_error, Case, rate, read_cases, reliability, score,
 )
-from antenna_drive.trial.scored_cases import read_scored
-from antenna_drive.trial.sheet import CaseSheet
-from antenna_drive.trial.sizes import size_of, StatedSize
-from antenna_drive.trial.verdict import (
-    Interval, parse_verdict, read_verdict, Verdict, VerdictError,
-)
-from hypothesis import given, strategies as st
+from lab.trials.scored_cases import read_scored
+from lab.trials.verdict import Interval, parse_verdict, read_verdict, Verdict, VerdictError
 import numpy as np
 import pytest
+from simgap.errors import UserError
 
 PLAIN = st.recursive(
     st.none() | st.booleans() | st.floats() | st.integers() | st.sampled_from(

@@ -1,26 +1,15 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """Sensors: noise, digits, clock and errors are what the test sheet and the machine say."""
 
 from __future__ import annotations
 
 import math
 
-from antenna_drive.trial.machine import apply_tolerances, draw_tolerances, reference_machine
-from antenna_drive.trial.real_antenna import TrueSignals
-from antenna_drive.trial.sensors import COLUMNS, record, sample_instants
-from antenna_drive.trial.sheet import SensorGrade
+from lab.antenna.machine import apply_tolerances, draw_tolerances, reference_machine
+from lab.antenna.real_antenna import TrueSignals
+from lab.antenna.sensors import COLUMNS, record, sample_instants
+from lab.antenna.sheet import SensorGrade
 import numpy as np
 from numpy.typing import NDArray
 import pytest

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """A wild trial: its imperfections are what they claim to be, and its files are what they were."""
 
 from __future__ import annotations
@@ -23,18 +12,19 @@ from typing import Any
 
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.sheet import parse_sheet, Sensors, TestSheet
-from antenna_drive.trial import batch, imperfections, sealing, waveform
-from antenna_drive.trial.cases import build_machine, draw_truths
-from antenna_drive.trial.detectability import PERFECT
-from antenna_drive.trial.family import FAMILIES
-from antenna_drive.trial.machine import FILTER_1, nominal, reference_machine
-from antenna_drive.trial.real_antenna import simulate
-from antenna_drive.trial.sensors import record
-from antenna_drive.trial.sheet import CaseSheet
-from antenna_drive.trial.wild_programme import (
+from hypothesis import given, settings, strategies as st
+from lab.antenna import imperfections, waveform
+from lab.antenna.cases import build_machine, draw_truths
+from lab.antenna.detectability import PERFECT
+from lab.antenna.family import FAMILIES
+from lab.antenna.machine import FILTER_1, nominal, reference_machine
+from lab.antenna.real_antenna import simulate
+from lab.antenna.sensors import record
+from lab.antenna.sheet import CaseSheet
+from lab.antenna.wild_programme import (
     draw_programme, LONGEST_S, MOST_SAMPLES, RATE_HZ, RECORDINGS, SHORTEST_S,
 )
-from hypothesis import given, settings, strategies as st
+from lab.trials import batch, sealing
 import numpy as np
 from numpy.typing import NDArray
 import pytest

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The verdict that grows: when it looks, at what, and when it stops."""
 
 from __future__ import annotations
@@ -20,10 +9,9 @@ from concurrent.futures import BrokenExecutor
 import time
 from typing import Any
 
-from antenna_drive.errors import UserError
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.sets import Drive
-from antenna_drive.recording.recording import make_channel, Recording
+from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import TestSheet
 from antenna_drive.twin.growing import FIRST_S, GrowingVerdict, look_of
 from antenna_drive.twin.intake import COMMAND, Intake
@@ -31,6 +19,8 @@ from antenna_drive.workers import worker_processes
 from later import Later
 import numpy as np
 import pytest
+from simgap.errors import UserError
+from simgap.logs.channel import make_channel
 from worker_tasks import lengths_found
 
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """How a trial looks at tests that grow, and what it says of the answers."""
 
 from __future__ import annotations
@@ -18,13 +7,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from antenna_drive.cli.twin_trial import of_verdicts
 from antenna_drive.parameters.sets import Drive
-from antenna_drive.recording.recording import make_channel, Recording
+from antenna_drive.recording.recording import Recording
 from antenna_drive.twin import proving
 from antenna_drive.twin.intake import COMMAND
+from lab.cli.twin_trial import of_verdicts
 import numpy as np
 import pytest
+from simgap.logs.channel import make_channel
 
 TEST = Recording({COMMAND: make_channel(
     COMMAND, 'rad/s', np.arange(0, 31) * 1_000_000_000, np.zeros(31))})

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The twin beside the independent antenna, in simulated time."""
 
 from __future__ import annotations
@@ -19,16 +8,16 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
-from antenna_drive.machines.antenna.tuned import tuned
+from antenna_drive.diagnosis.tuned import tuned
 from antenna_drive.parameters.loading import load
 from antenna_drive.recording.csv_format import FIELD_COLUMNS
 from antenna_drive.recording.sheet import parse_sheet
-from antenna_drive.trial import onset
-from antenna_drive.trial.effects import CATALOGUE
 from antenna_drive.twin import watch
 from antenna_drive.twin.baseline import Baseline
 from antenna_drive.twin.proving import played
 from antenna_drive.twin.watch import Twin, TwinSettings
+from lab.antenna.effects import CATALOGUE
+from lab.trials import onset
 import numpy as np
 import pytest
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """The diagnosis of a fleet: what a machine is, what is kept, what is done again."""
 
 from __future__ import annotations
@@ -25,9 +14,9 @@ import tempfile
 from typing import Any
 
 from antenna_drive.cli import main
-from antenna_drive.errors import UserError
 from antenna_drive.fleet import machines_of, share
 import pytest
+from simgap.errors import UserError
 
 # A stand-in for the diagnosis: it notes what it was given, and answers from the recording's name.
 STAND_IN = """

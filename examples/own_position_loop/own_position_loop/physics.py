@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """
 A position loop around the rate loop: the rate command that brings the encoder to a moving angle.
 
@@ -21,8 +10,8 @@ stands still while it is there.
 
 from antenna_drive.physics.arrays import FloatArray, IntArray
 from antenna_drive.physics.block import Block, Equation, held, output_rows, put, rest, rows, Signal
-from antenna_drive.physics.compiling import inner, shared
 from own_position_loop.parameters import PositionLoop
+from simgap.laws.compiling import inner, shared
 
 STATE = rows('moved', 'integral')
 MODE = rows('limited')

@@ -1,16 +1,5 @@
-# Copyright 2026 The antenna_drive authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
 """A torque share of one's own: the same bias at every load, through a first-order filter."""
 
 from __future__ import annotations
@@ -23,8 +12,8 @@ from antenna_drive.emulator.unit import FloatArray, Unit
 from antenna_drive.emulator.wiring import OUTPUTS
 from antenna_drive.lockstep.entry import run_unit
 from antenna_drive.parameters import Entry
-from antenna_drive.parameters.schema import Value
 import numpy as np
+from simgap.inputs.schema import Value
 
 GAIN, POLE, DIFFERENCE_GAIN = 4.54, 1.369863, 8.192149  # 1/s, 1/s, V/A: Filter 1 as it was
 BIAS = Entry('V', 0.0, 20.0, 'bias voltage, at every load', live=True)

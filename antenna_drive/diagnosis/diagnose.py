@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The diagnosis of recordings of the antenna drive.
+
+Examples
+--------
+>>> from antenna_drive.diagnosis.diagnose import diagnose_recordings  # doctest: +SKIP
+>>> from antenna_drive.parameters import load                                # doctest: +SKIP
+>>> from antenna_drive.recording.files import read_recording                 # doctest: +SKIP
+>>> recording = read_recording('field.csv')                                  # doctest: +SKIP
+>>> print(diagnose_recordings({'field': recording}, load()).summary())       # doctest: +SKIP
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from antenna_drive.diagnosis.corrected import correct, Corrected
+from antenna_drive.diagnosis.machine import AntennaMachine
+from antenna_drive.parameters.sets import Drive
+from antenna_drive.recording.recording import Recording
+from simgap.errors import UserError
+from simgap.machine.by_label import without_labels
+from simgap.next_test.rivals import Rival
+from simgap.settings import DEFAULT, Settings
+from simgap.verdict.diagnosis import diagnose, Diagnosis, Progress
+
+
+def diagnose_recordings(recordings: Mapping[str, Recording], drive: Drive,
+                        progress: Progress = lambda share, doing: None, threads: int = 2,
+                        settings: Settings = DEFAULT, without: Sequence[str] = (),
+                        limits: Mapping[str, float] | None = None,
+                        earlier: Sequence[Rival] = ()) -> Diagnosis:
+    """
+    Say where a real drive and its model part, which effect is behind it, and how far it goes.
+
+    Parameters
+    ----------
+    recordings
+        of one machine, by name, with their test sheets
+    drive
+        the configuration of the model
+    progress
+        called with the share that is done, 0 to 1, and what is being done
+    threads
+        how many simulations at once
+    settings
+        thresholds
+    without
+        effects that the catalogue shall lack
+    limits
+        for some signals, the remainder beyond noise from which it matters
+    earlier
+        answers of a verdict on some of the recordings, see `diagnosis.diagnose`
+
+    Raises
+    ------
+    UserError : a recording cannot be used; the message says which and why
+
+    """
+    machine = AntennaMachine(recordings, drive, threads)
+    for effect in without:
+        if effect not in machine.effects:
+            raise UserError(f'{effect}: no such effect; docs/diagnosis.md lists the catalogue')
+    for signal in limits or ():
+        if signal not in machine.experiments[0].channels:
+            raise UserError(f'{signal}: no such signal; there are '
+                            + ', '.join(machine.experiments[0].channels))
+    return diagnose(machine.without(without), progress, threads, settings, limits, earlier)
+
+
+def corrected(drive: Drive, diagnosis: Diagnosis) -> Corrected:
+    """Return the configuration of a diagnosis of recordings, with what was found in it."""
+    machine = without_labels(diagnosis.machine)
+    assert isinstance(machine, AntennaMachine)
+    return correct(drive, machine.records, diagnosis.best)

@@ -1,0 +1,51 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""The places of the drive where an unknown input may act."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+import math
+
+from antenna_drive.diagnosis.modifiers import ADD, SET
+from simgap.machine.contract import DisturbanceInput
+
+
+@dataclass(frozen=True)
+class DriveDisturbance(DisturbanceInput):
+    """
+    A place of the drive.
+
+    Attributes
+    ----------
+    path : the number of the record that the input is added to
+    size : of one unit of the input, in the unit of that number
+    settings : other changes of the record that the input needs: path, how, value
+
+    """
+
+    path: str = ''
+    size: float = 0.0
+    settings: tuple[tuple[str, str, float], ...] = ()
+
+
+def _inputs() -> Iterator[DriveDisturbance]:
+    yield DriveDisturbance('torque on the axis', 'axis', 'plant.axis.steady_wind_torque', 3e4)
+    yield DriveDisturbance('voltage in the torque share', 'torque_share',
+                           'torque_share.circuit.fade_out_voltage', 0.2)
+    for m in (1, 2):
+        motor, tooth = f'motor_{m}', f'motor_{m}.gearbox.transmission_error'
+        yield DriveDisturbance(f'friction of motor {m}', motor, f'{motor}.motor.coulomb_torque',
+                               0.2)
+        yield DriveDisturbance(f'voltage in amplifier {m}', motor, f'{motor}.amplifier.offset',
+                               0.01)
+        yield DriveDisturbance(f'reading of tachometer {m}', f'tach_{m}',
+                               f'{motor}.tachometer.offset', 0.2)
+        # a transmission error of zero cycles displaces the tooth alike at any angle
+        yield DriveDisturbance(f'displacement in gearbox {m}', f'gearbox_{m}', tooth, 2e-3, (
+            (tooth, ADD, 1e-12), (f'{tooth}_cycles', SET, 0.0),
+            (f'{tooth}_phase', SET, 0.5 * math.pi)))
+
+
+DISTURBANCES = tuple(_inputs())

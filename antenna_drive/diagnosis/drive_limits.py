@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Limits of the drive that a test must keep, and how near a simulated test comes to them.
+
+A limit that the user does not give follows from the configuration. The drive limits currents and
+voltages by itself, in tests as in service: a test may reach these limits, and may go beyond them
+only by what `BEYOND` says. What it may not do is stay there, see `hot_s`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
+import math
+from pathlib import Path
+
+from antenna_drive.parameters.sets import Drive
+import numpy as np
+from simgap.inputs.plain_yaml import read_yaml
+from simgap.inputs.schema import Entry, mapping_of, ParameterError
+from simgap.machine.contract import FloatArray
+
+# What must be known of a simulated test.
+CHANNELS = ('plant/axis_rate', 'plant/axis_angle', 'motor_1/current', 'motor_2/current',
+            'motor_1/gear_torque', 'motor_2/gear_torque', 'motor_1/tach_rate',
+            'motor_2/tach_rate')
+# The drive's own limiters, and the tolerance and the margin beyond them.
+BEYOND = 1.2
+# Shares of the greatest rate and current that a test keeps, the time above that current, and the
+# travel of a test of half a minute. None of them is in the article.
+_RATE, _HOT, _HOT_S, _TRAVEL_DEG = 0.9, 0.8, 10.0, 10.0
+
+
+def _limit(unit: str, description: str) -> float:
+    found: float = field(metadata={'entry': Entry(unit, 1e-6, 1e12, description)})
+    return found
+
+
+@dataclass(frozen=True)
+class DriveLimits:
+    """
+    What a test must not exceed.
+
+    Attributes
+    ----------
+    rate_deg_s, acceleration_deg_s2, travel_deg : of the axis
+    current_A : of each motor, article amperes
+    voltage_V : of each armature
+    axis_torque_N_m : of both gearboxes together, at the axis
+    hot_current_A, hot_s : a motor may spend `hot_s` above that current, in all
+
+    """
+
+    rate_deg_s: float = _limit('deg/s', 'rate of the axis')
+    acceleration_deg_s2: float = _limit('deg/s^2', 'acceleration of the axis')
+    travel_deg: float = _limit('deg', 'from the lowest to the highest elevation of a test')
+    current_A: float = _limit('A', 'current of each motor, article amperes')
+    voltage_V: float = _limit('V', 'voltage of each armature')
+    axis_torque_N_m: float = _limit('N m', 'torque of both gearboxes at the axis')
+    hot_current_A: float = _limit('A', 'current above which the time is limited')
+    hot_s: float = _limit('s', 'time of each motor above hot_current_A')
+
+    @classmethod
+    def of_drive(cls, drive: Drive) -> DriveLimits:
+        """Return the limits that follow from a configuration."""
+        armature, motor = drive.motor_1.armature, drive.motor_1.motor
+        ratio = drive.motor_1.gear_ratio
+        rate = armature.voltage_limit / armature.back_emf_constant / ratio
+        torque = 2.0 * motor.current_limit * motor.torque_constant * ratio
+        return cls(
+            rate_deg_s=_RATE * math.degrees(rate),
+            # the modes follow the hub later
+            acceleration_deg_s2=BEYOND * math.degrees(torque / drive.plant.axis.inertia_hub),
+            travel_deg=_TRAVEL_DEG, current_A=BEYOND * motor.current_limit,
+            voltage_V=BEYOND * armature.voltage_limit, axis_torque_N_m=BEYOND * torque,
+            hot_current_A=_HOT * motor.current_limit, hot_s=_HOT_S)
+
+    def changed(self, given: Mapping[str, object]) -> DriveLimits:
+        """
+        Return the limits with some of them given.
+
+        Raises
+        ------
+        ParameterError : a name or a value is not allowed; the message names the key
+
+        """
+        known = {item.name: item for item in fields(self)}
+        return replace(self, **{
+            name: known[name].metadata['entry'].check(name, value)
+            for name, value in mapping_of('', given, known).items()})
+
+    def as_data(self) -> dict[str, float]:
+        """Return the limits by name."""
+        return asdict(self)
+
+    def use(self, time: FloatArray, out: FloatArray, drive: Drive) -> dict[str, float]:
+        """
+        Return the share of each limit that a simulated test uses, 1 at the limit.
+
+        Parameters
+        ----------
+        time
+            shape (n,) [s]
+        out
+            values and slopes of `CHANNELS`, shape (n, 8, 2)
+        drive
+            the configuration
+
+        """
+        value, slope = out[:, :, 0], out[:, :, 1]
+        armature, ratio = drive.motor_1.armature, drive.motor_1.gear_ratio
+        current = value[:, 2:4]
+        voltage = (armature.physical_amperes_per_article_ampere * (
+            armature.inductance * slope[:, 2:4] + armature.resistance * current)
+            + armature.back_emf_constant * value[:, 6:8])
+        hot = np.gradient(time) @ (np.abs(current) > self.hot_current_A)
+        reached = {
+            'rate_deg_s': math.degrees(_greatest(value[:, 0])),
+            'acceleration_deg_s2': math.degrees(_greatest(slope[:, 0])),
+            'travel_deg': math.degrees(_greatest(value[:, 1] - value[:, 1].min())),
+            'current_A': _greatest(current), 'voltage_V': _greatest(voltage),
+            'axis_torque_N_m': ratio * _greatest(value[:, 4] + value[:, 5]),
+            'hot_s': _greatest(hot)}
+        return {name: amount / getattr(self, name) for name, amount in reached.items()}
+
+
+def read_limits(path: Path, drive: Drive) -> DriveLimits:
+    """
+    Read limits from a file; what it does not give follows from the configuration.
+
+    Raises
+    ------
+    ParameterError : the file cannot be read or an entry is not allowed; the message names both
+
+    """
+    tree = read_yaml(path)
+    try:
+        return DriveLimits.of_drive(drive).changed(mapping_of('', {} if tree is None else tree))
+    except ParameterError as error:
+        raise ParameterError(f'{path}: {error}') from None
+
+
+def _greatest(values: FloatArray) -> float:
+    # a run that diverged keeps no limit
+    return float(np.nan_to_num(np.abs(values), nan=np.inf).max())

@@ -1,0 +1,178 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What a test does to the drive, and the steps in which it is simulated.
+
+The waveform of a test sheet is exact: its jumps are known to the microsecond. A command that is
+known from its samples is a `RecordedCommand`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+import math
+from typing import Any, Protocol
+
+from antenna_drive.emulator import batch
+from antenna_drive.parameters.records import record_of
+from antenna_drive.physics import signal_generator
+from antenna_drive.recording import sheet as sheets
+from antenna_drive.recording.sheet_signal import test_signal_of
+import numpy as np
+from simgap.machine.contract import FloatArray
+
+# Places within a step at which the command is read; jumps may be at its ends.
+_PLACES = np.array([0.1, 0.5, 0.9])
+_NO_BITS = np.ones(1)   # no test sheet has a pseudo-random sequence
+_PARABOLA = np.linalg.inv(np.vander(_PLACES, 3, increasing=True))
+
+
+class CommandedRate(Protocol):
+    """An axis rate command over time."""
+
+    def __call__(self, time: FloatArray) -> FloatArray:
+        """Return the rate command [rad/s] at these times [s]."""
+
+    def knots(self, end: float) -> FloatArray:
+        """Return the times up to `end` at which the command or its slope jumps [s]."""
+
+
+@dataclass(frozen=True)
+class SheetCommand:
+    """The waveform of a test sheet, as the drive's own test signal plays it."""
+
+    waveform: sheets.Waveform
+
+    @cached_property
+    def _record(self) -> Any:
+        return record_of(test_signal_of(self.waveform))[0]
+
+    def __call__(self, time: FloatArray) -> FloatArray:
+        """Return the rate command [rad/s] at these times [s]."""
+        command = np.empty(time.size)
+        signal_generator.values(time, self._record, _NO_BITS, command)
+        return command
+
+    def knots(self, end: float) -> FloatArray:
+        """Return the times up to `end` at which the command or its slope jumps [s]."""
+        w = self.waveform
+        if isinstance(w, (sheets.Square, sheets.Triangle)):
+            period, phase = w.period_s or 1.0, w.phase or 0.0
+            first = 0.0 if isinstance(w, sheets.Square) else 0.25
+            cycles = np.arange(np.floor(phase) - 1.0, end / period + phase + 1.0, 0.5) + first
+            times = (cycles - phase) * period
+            return times[(times > 0.0) & (times < end)]
+        if isinstance(w, sheets.Knots):
+            times = np.unique(w.times_s or ())
+            return times[(times > 0.0) & (times < end)]
+        edges = [w.start_s or 0.0]
+        if isinstance(w, sheets.Chirp):
+            edges.append(edges[0] + (w.duration_s or 0.0))
+        return np.array([edge for edge in edges if 0.0 < edge < end])
+
+
+@dataclass(frozen=True)
+class Bias:
+    """A source of bias voltage: `before` until `at` [s], `after` from then on [V]."""
+
+    before: float = 0.0
+    after: float = 0.0
+    at: float = 0.0
+
+    def later(self, begin: float) -> Bias:
+        """Return the source in a time that counts from `begin` [s]."""
+        return replace(self, at=self.at - begin)
+
+
+@dataclass(frozen=True)
+class Longest:
+    """
+    How long a step of the integration may be.
+
+    Attributes
+    ----------
+    usual : at most so long [s]
+    shortest : even where a wave asks for less [s]
+    wave : angle by which a wave may turn in a step [rad]
+    cycles : of the fastest wave per turn of the axis, 0 for none
+
+    """
+
+    usual: float
+    shortest: float = 0.0
+    wave: float = math.inf
+    cycles: float = 0.0
+
+    def at(self, rate: FloatArray) -> FloatArray:
+        """Return the longest step where the axis turns at these rates [rad/s], as an array."""
+        asked = self.wave / np.maximum(self.cycles * np.abs(rate), 1e-9)
+        return np.asarray(np.minimum(self.usual, np.maximum(self.shortest, asked)))
+
+
+def schedule(command: CommandedRate, bias: Bias, samples: FloatArray, longest: Longest,
+             delay: float = 0.0) -> batch.Schedule:
+    """
+    Plan the integration of a test: no step reaches across a sample, a jump, or `longest`.
+
+    Parameters
+    ----------
+    command, bias
+        what the test does
+    samples
+        when the sensors are read, increasing, none before zero, shape (n,) [s]
+    longest
+        step, where the axis turns as commanded
+    delay
+        by which the command comes late [s]
+
+    """
+    end = float(samples[-1])
+    jumps = command.knots(end) + delay
+    if delay > 0.0:
+        jumps = np.r_[delay, jumps]
+    if 0.0 < bias.at < end:
+        jumps = np.r_[jumps, bias.at]
+    jumps = jumps[(jumps > 0.0) & (jumps < end)]
+    knots = np.unique(np.r_[0.0, samples, jumps])
+    # a jump on a sample needs no step of its own
+    keep = np.r_[True, np.diff(knots) > 1e-9]
+    knots = knots[keep]
+    rate = command(0.5 * (knots[:-1] + knots[1:]) - delay)
+    pieces = np.maximum(np.ceil(np.diff(knots) / longest.at(rate) - 1e-6).astype(int), 1)
+    first = np.repeat(knots[:-1], pieces)
+    length = np.repeat(np.diff(knots) / pieces, pieces)
+    number = np.arange(first.size) - np.repeat(np.r_[0, np.cumsum(pieces)[:-1]], pieces)
+    start = first + number * length
+    steps = np.zeros((start.size, batch.COLUMNS))
+    steps[:, batch.LENGTH] = length
+    places = start[:, np.newaxis] + _PLACES * length[:, np.newaxis]
+    shape = command(places.ravel() - delay).reshape(places.shape) @ _PARABOLA.T
+    steps[:, batch.COMMAND] = shape[:, 0]
+    steps[:, batch.SLOPE] = shape[:, 1] / length
+    steps[:, batch.CURVE] = shape[:, 2] / length ** 2
+    rows = np.full(start.size + 1, -1)
+    ends = np.r_[0.0, np.cumsum(length)]
+    at = np.searchsorted(ends, samples - 1e-8)
+    rows[np.minimum(at, start.size)] = np.arange(samples.size)
+    return with_bias(batch.Schedule(steps, rows), bias)
+
+
+def with_bias(plan: batch.Schedule, bias: Bias) -> batch.Schedule:
+    """Return a plan with other voltages of the bias source, which steps at the same time."""
+    steps = plan.steps.copy()
+    length = steps[:, batch.LENGTH]
+    middle = np.cumsum(length) - 0.5 * length
+    steps[:, batch.FIXED_BIAS] = np.where(middle < bias.at, bias.before, bias.after)
+    return batch.Schedule(steps, plan.keep)
+
+
+def with_torque(plan: batch.Schedule, time: FloatArray, torque: FloatArray) -> batch.Schedule:
+    """Return a plan with a torque on the axis: times [s], values [N m], straight lines between."""
+    steps = plan.steps.copy()
+    length = steps[:, batch.LENGTH]
+    ends = np.cumsum(length)
+    left = np.interp(ends - length, time, torque)
+    steps[:, batch.TORQUE] = left
+    steps[:, batch.TORQUE_SLOPE] = (np.interp(ends, time, torque) - left) / length
+    return batch.Schedule(steps, plan.keep)

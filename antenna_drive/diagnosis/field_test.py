@@ -1,0 +1,212 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""A recorded test, prepared for comparison: the command, the bias and the readings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+import math
+from typing import Any
+
+from antenna_drive.diagnosis.excitation import (
+    Bias, CommandedRate, Longest, schedule, SheetCommand,
+)
+from antenna_drive.diagnosis.field_recording import (
+    BIAS, CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldRecording, Note, TACH_1, TACH_2, UNITS,
+)
+from antenna_drive.diagnosis.inference import completed
+from antenna_drive.diagnosis.late_readings import dense, parts_of
+from antenna_drive.diagnosis.recorded_command import RecordedCommand
+from antenna_drive.diagnosis.samples import slips
+from antenna_drive.diagnosis.sensors import jitter_of, SensorModel
+from antenna_drive.diagnosis.sheet_settings import as_the_sheet_says
+from antenna_drive.diagnosis.suitability import check
+from antenna_drive.diagnosis.windows import Window, windows
+from antenna_drive.emulator import batch
+from antenna_drive.parameters.records import record_of
+from antenna_drive.parameters.sets import changed, Drive
+from antenna_drive.recording import sheet as sheets
+from antenna_drive.recording.recording import Recording
+import numpy as np
+from simgap.machine.contract import FloatArray
+
+__all__ = ('BIAS', 'CHANNELS', 'CURRENT_1', 'CURRENT_2', 'ENCODER', 'TACH_1', 'TACH_2', 'UNITS',
+           'FieldTest', 'prepared')
+# This many recordings tell different things: one window of each is enough. Of fewer, two are
+# taken.
+_MANY = 3
+# Step of the run that places the encoder's readings of a window of unknown start [s].
+_STEP_S = 5.3e-3
+# A command is a sweep if it reverses in one half of a test more often than in the other by this
+# factor, seen at this many places.
+_SWEEP, _LOOKS = 2.0, 2000
+# The angle at the beginning of a window is read in this time [s].
+_ANGLE_S = 0.1
+# What the command did in a hole of the recording is forgotten after this time, as far as the mean
+# in it does not tell [s].
+_FORGOTTEN_S = 2.0
+
+
+@dataclass(frozen=True)
+class FieldTest:
+    """
+    A window of a recording, prepared; its time counts from the beginning of the window.
+
+    Attributes
+    ----------
+    name : for people
+    record : of the drive as configured and as the sheet says, shape (1,)
+    command : axis rate command
+    bias : source of bias voltage, where the share circuit is not connected
+    time : of the samples that are compared, shape (n,) [s]
+    measured : readings, shape (n, 6), NaN where there is none
+    slope : their slopes over time as recorded, shape (n, 6), NaN where there is none
+    sensors : what they add
+    jitter : of the time stamps [s]
+    period : between two recorded samples [s]
+    sheet : what the tester knows, and what was inferred
+    known_start : False if the simulation begins in the middle of a motion, whose state is not
+        known; the zero of the encoder then follows from the readings alone
+    start_angle : of the axis at the beginning of the window, since that of the recording [rad];
+        waves go on where they were
+    labels : what was different in this test, by its sheet
+
+    """
+
+    name: str
+    record: np.ndarray[Any, np.dtype[Any]]
+    command: CommandedRate
+    bias: Bias
+    time: FloatArray
+    measured: FloatArray
+    slope: FloatArray
+    sensors: SensorModel
+    jitter: float
+    period: float
+    sheet: sheets.TestSheet
+    known_start: bool = True
+    start_angle: float = 0.0
+    labels: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def tolerances(self) -> sheets.Tolerances:
+        """Return the tolerances of zeros, recorders and clocks."""
+        return self.sheet.tolerances or sheets.Tolerances()
+
+    @cached_property
+    def output_times(self) -> FloatArray:
+        """Return the times at which a run keeps its outputs: the samples and some between [s]."""
+        return dense(self.time, self.parts)
+
+    @cached_property
+    def parts(self) -> int:
+        """Return into how many parts the outputs cut the time between two samples."""
+        return parts_of(float(np.median(np.diff(self.time))) if self.time.size > 1 else 0.0)
+
+    def until(self, end: float) -> FieldTest:
+        """Return the first part of the test, of this length [s]."""
+        n = int(np.searchsorted(self.time, self.time[0] + end))
+        return replace(self, time=self.time[:n], measured=self.measured[:n],
+                       slope=self.slope[:n])
+
+    def simulated(self, longest_step: float) -> FloatArray:
+        """Return the readings of the drive as configured, with steps of at most this [s]."""
+        plan = schedule(self.command, self.bias, self.time, Longest(longest_step))
+        return np.asarray(batch.run(self.record, plan)[:, :, 0])
+
+    @property
+    def repeats(self) -> bool:
+        """Return whether a part of the test shows what the whole does; not so with a sweep."""
+        if isinstance(self.command, SheetCommand):
+            return not isinstance(self.command.waveform, sheets.Chirp)
+        rate = self.command(np.linspace(self.time[0], self.time[-1], _LOOKS))
+        early, late = (np.count_nonzero(np.diff(np.sign(part))) for part in np.split(rate, 2))
+        return bool(max(early, late) <= _SWEEP * (min(early, late) + 1))
+
+
+def prepared(recordings: Mapping[str, Recording], drive: Drive, note: Note) -> list[FieldTest]:
+    """
+    Make recordings of one machine ready: the windows that tell most, each a test of its own.
+
+    Parameters
+    ----------
+    recordings
+        with their test sheets, by name
+    drive
+        the configuration
+    note
+        called with what was inferred or is missing
+
+    Raises
+    ------
+    UserError : a recording lacks the rate command or readings, or cannot be of this drive
+
+    """
+    found = [FieldRecording.of(name, recording, note) for name, recording in recordings.items()]
+    for recording in found:
+        if not recording.is_planned:
+            check(recording, drive, note)
+    found = completed(found, drive, note)
+    most = 1 if len(found) >= _MANY else 2
+    tests = []
+    for recording in found:
+        configured, bias = as_the_sheet_says(recording.sheet, drive)
+        chosen = windows(recording, configured, bias, most)
+        tests += [window_of(recording, window, configured, bias) for window in chosen]
+        if not (len(chosen) == 1 and math.isinf(chosen[0].end)):
+            note(f'{recording.name}: of {recording.end:.0f} s, ' + ' and '.join(
+                f'{window.compared:.0f} to {min(window.end, recording.end):.0f} s'
+                for window in chosen) + ' are compared')
+    return tests
+
+
+def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bias) -> FieldTest:
+    """Return one window of a recording, made ready."""
+    name = recording.name
+    time = recording.thinned(window.compared, window.end)
+    measured, slope = recording.measured(time)
+    sensors = SensorModel.of(recording.sheet.sensors)
+    command = recording.command_between(window.begin, window.compared, time[-1])
+    if isinstance(command, RecordedCommand):
+        for begin, end in command.holes + window.begin:
+            measured[(time > begin) & (time < end + _FORGOTTEN_S)] = np.nan
+    rest = time < recording.onset
+    for tach in (TACH_1, TACH_2):
+        measured[rest, tach] = np.where(
+            slips(measured[rest, tach], sensors.tach_noise), np.nan, measured[rest, tach])
+    if window.begin > 0.0:
+        drive = changed(drive, {'torque_share.circuit.start': 'steady'})
+    angle = 0.0 if window.known_start else _angle(recording, window.begin)
+    if not window.known_start:
+        measured[:, ENCODER] -= angle
+        drive = changed(drive, {
+            'plant.axis.start_elevation': drive.plant.axis.start_elevation + angle})
+    if not math.isinf(window.end):
+        name = f'{name} {window.compared:.0f}-{time[-1]:.0f} s'
+    test = FieldTest(
+        name, record_of(drive), command,
+        bias.later(window.begin), time - window.begin, measured, slope,
+        sensors, jitter_of(recording.command, recording.rates.time_s, recording.rates.values),
+        recording.period, recording.sheet, window.known_start, angle,
+        dict(recording.sheet.labels or ()))
+    if not window.known_start:
+        off = measured[:, ENCODER] - test.simulated(_STEP_S)[:, ENCODER]
+        if np.isfinite(off).any():
+            more = float(np.nanmedian(off))
+            measured[:, ENCODER] -= more
+            return replace(test, start_angle=angle + more)
+    return test
+
+
+def _angle(recording: FieldRecording, at: float) -> float:
+    """Return the angle of the axis since the start of a recording [rad]."""
+    encoder = recording.readings.get('plant/encoder')
+    if encoder is not None:
+        near = slice(*np.searchsorted(encoder.time_s, [at - _ANGLE_S, at + _ANGLE_S]))
+        if encoder.values[near].size:
+            return float(np.median(encoder.values[near]))
+    rates = recording.rates
+    before = np.searchsorted(rates.time_s, at)
+    return float(rates.values[:before] @ np.diff(rates.time_s[:before + 1]))

@@ -1,0 +1,282 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What a parameter does: it modifies the run before it is simulated, or the readings after it.
+
+Each entry of the catalogue, and each tolerance, declares its modifier where it stands.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+from antenna_drive.diagnosis.excitation import Bias
+from antenna_drive.diagnosis.field_test import CHANNELS
+from antenna_drive.diagnosis.wave_shape import WaveShape
+from antenna_drive.parameters.records import place_of
+import numpy as np
+from simgap.machine.contract import FloatArray, Parameter
+
+SCALE, ADD, SET = 'scale', 'add', 'set'
+
+
+@dataclass
+class RunSetup:
+    """
+    A run as parameters modify it.
+
+    Attributes
+    ----------
+    numbers : the drive's record as plain numbers: numpy copies a record field by field
+    kind : type of the record
+    duration_s : of the test
+    bias : source of the bias voltage, where the share circuit is not connected
+    gust : torque on the axis at its knots [N m]; None for none
+    late_jumps : by how much jumps of the command come later, by number [s]
+    hole_means : by how much the mean of the command is higher in its holes, by number [rad/s]
+    waves : parts of each wave
+    start_angle : of the axis at the beginning [rad]; waves go on from there
+
+    """
+
+    numbers: FloatArray
+    kind: np.dtype[Any]
+    duration_s: float
+    bias: Bias
+    gust: FloatArray | None = None
+    late_jumps: dict[int, float] = field(default_factory=dict)
+    hole_means: dict[int, float] = field(default_factory=dict)
+    waves: dict[WaveShape, list[float]] = field(default_factory=dict)
+    start_angle: float = 0.0
+
+    def change(self, path: str, how: str, value: float) -> None:
+        """Scale a number of the record by 1 + value, add the value to it, or set it."""
+        change(self.numbers, place_of(self.kind, path), how, value)
+
+    @property
+    def delay(self) -> float:
+        """Return the delay of the rate command [s]."""
+        return float(self.numbers[place_of(self.kind, 'test_signal.delay')])
+
+    def write_waves(self) -> None:
+        """Write the waves into the record."""
+        for shape, parts in self.waves.items():
+            turned = self.start_angle
+            if shape.angle != 'axis':
+                turned *= float(self.numbers[place_of(self.kind, f'{shape.angle}.gear_ratio')])
+            for path in shape.paths:
+                for end, value in shape.fields(parts, turned).items():
+                    self.change(f'{path}.{shape.stem}{end}', SET, value)
+
+
+@dataclass
+class SensorReadings:
+    """
+    What parameters do to the readings of a run.
+
+    Attributes
+    ----------
+    gain, zero, late : of every channel; the last is by how much earlier it is read [s]; shape (6,)
+    clock_rate : share by which the recorder's clock is slow
+    digit : of the encoder [rad]; 0 for none
+    turn : share of a digit by which the encoder's rounding is off its middle
+    waves : parts of each wave of the encoder
+
+    """
+
+    gain: FloatArray = field(default_factory=lambda: np.ones(len(CHANNELS)))
+    zero: FloatArray = field(default_factory=lambda: np.zeros(len(CHANNELS)))
+    late: FloatArray = field(default_factory=lambda: np.zeros(len(CHANNELS)))
+    clock_rate: float = 0.0
+    digit: float = 0.0
+    turn: float = 0.0
+    waves: dict[WaveShape, list[float]] = field(default_factory=dict)
+
+
+class Modifier(ABC):
+    """
+    What a parameter does.
+
+    Attributes
+    ----------
+    fields : the numbers of the drive's configuration that it stands for
+    how : how it changes them
+
+    """
+
+    fields: tuple[str, ...] = ()
+    how: str = ADD
+
+
+class RunModifier(Modifier):
+    """Modifies a run before it is simulated."""
+
+    @abstractmethod
+    def apply(self, run: RunSetup, value: float) -> None:
+        """Modify the run."""
+
+
+class ReadingModifier(Modifier):
+    """Modifies readings after a run."""
+
+    @abstractmethod
+    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
+        """Modify the readings."""
+
+    def write(self, run: RunSetup, value: float) -> bool:
+        """Write the error into the drive's record; return False if it has no number for it."""
+        for path in self.fields:
+            run.change(path, self.how, value)
+        return bool(self.fields)
+
+
+@dataclass(frozen=True)
+class FieldChange(RunModifier):
+    """Changes numbers of the drive's record."""
+
+    how: str
+    fields: tuple[str, ...]
+
+    def apply(self, run: RunSetup, value: float) -> None:
+        for place in _places(run.kind, self.fields):
+            change(run.numbers, place, self.how, value)
+
+
+@cache
+def _places(kind: np.dtype[Any], fields: tuple[str, ...]) -> tuple[int, ...]:
+    return tuple(place_of(kind, path) for path in fields)
+
+
+def change(numbers: FloatArray, place: int, how: str, value: float) -> None:
+    """Change one number of a record."""
+    if how == SCALE:
+        numbers[place] *= 1.0 + value
+    elif how == ADD:
+        numbers[place] += value
+    else:
+        numbers[place] = value
+
+
+@dataclass(frozen=True)
+class SupplyGain(RunModifier):
+    """Scales the voltages of the source of bias."""
+
+    def apply(self, run: RunSetup, value: float) -> None:
+        run.bias = Bias(run.bias.before * (1.0 + value), run.bias.after * (1.0 + value),
+                        run.bias.at)
+
+
+@dataclass(frozen=True)
+class ReadingGain(ReadingModifier):
+    """Scales the reading of a channel."""
+
+    channel: int
+    fields: tuple[str, ...] = ()
+
+    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
+        readings.gain[self.channel] += value
+
+
+@dataclass(frozen=True)
+class ReadingZero(ReadingModifier):
+    """Shifts the reading of a channel."""
+
+    channel: int
+    fields: tuple[str, ...] = ()
+
+    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
+        readings.zero[self.channel] += value
+
+
+@dataclass(frozen=True)
+class ClockShift(ReadingModifier):
+    """Reads every channel later."""
+
+    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
+        readings.late -= value
+
+
+@dataclass(frozen=True)
+class ChannelDelay(ReadingModifier):
+    """Reads one channel earlier than its time stamps say."""
+
+    channel: int
+
+    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
+        readings.late[self.channel] += value
+
+
+@dataclass(frozen=True)
+class ClockRate(ReadingModifier):
+    """Lets the recorder's clock run slow by a share of the time."""
+
+    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
+        readings.clock_rate += value
+
+
+@dataclass(frozen=True)
+class UnrecordedJump(RunModifier):
+    """
+    Lets a jump of the command come later.
+
+    Between the samples of a recorded command nobody knows when it jumped.
+    """
+
+    number: int
+
+    def apply(self, run: RunSetup, value: float) -> None:
+        run.late_jumps[self.number] = value
+
+
+@dataclass(frozen=True)
+class UnrecordedMean(RunModifier):
+    """Lets the command have another mean in a hole of the recording."""
+
+    number: int
+
+    def apply(self, run: RunSetup, value: float) -> None:
+        run.hole_means[self.number] = value
+
+
+@dataclass(frozen=True)
+class Digit(ReadingModifier):
+    """Rounds the encoder's reading to a digit."""
+
+    fields = ('plant.encoder.step',)
+    how = SET
+
+    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
+        readings.digit = value
+
+
+@dataclass(frozen=True)
+class DigitTurn(ReadingModifier):
+    """Shifts where the encoder rounds, by a share of its digit."""
+
+    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
+        readings.turn = value
+
+
+@dataclass(frozen=True)
+class AntennaParameter(Parameter):
+    """A parameter of the antenna, with what it does."""
+
+    modifier: Modifier = Modifier()
+
+
+def add(*fields: str) -> FieldChange:
+    """Return the modifier that adds to numbers of the record."""
+    return FieldChange(ADD, fields)
+
+
+def scale(*fields: str) -> FieldChange:
+    """Return the modifier that scales numbers of the record by 1 + value."""
+    return FieldChange(SCALE, fields)
+
+
+def set_to(*fields: str) -> FieldChange:
+    """Return the modifier that sets numbers of the record."""
+    return FieldChange(SET, fields)

@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""Planned tests: the built-in ones, and which effects a set of tests can tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from antenna_drive.diagnosis.excitation import SheetCommand
+from antenna_drive.diagnosis.field_recording import CHANNELS, PLANNED
+from antenna_drive.diagnosis.machine import AntennaMachine
+from antenna_drive.parameters.sets import Drive
+from antenna_drive.recording.recording import Recording
+from antenna_drive.recording.sheet import CircuitBias, parse_sheet, Square, TestSheet
+import numpy as np
+from simgap.next_test.confusability import Confusability, confusability
+
+BUILT_IN: Mapping[str, TestSheet] = {
+    name: replace(parse_sheet({'waveform': waveform, 'start': 'rest', 'elevation_deg': elevation,
+                               'parameter_tolerance': 0.02}),
+                  bias=CircuitBias(start='steady'))
+    for name, elevation, waveform in (
+        ('square', 45.0, {'type': 'square', 'amplitude_deg_s': 0.05, 'period_s': 6.3,
+                          'phase': 0.25}),
+        ('triangle', 30.0, {'type': 'triangle', 'amplitude_deg_s': 0.5, 'period_s': 6.0,
+                            'phase': 0.0}),
+        ('multisine', 60.0, {'type': 'multisine', 'amplitude_deg_s': 0.1,
+                             'frequencies_hz': [0.2, 0.5, 0.9, 1.7, 3.1, 5.3],
+                             'weights': [0.5, 0.4, 0.3, 0.2, 0.15, 0.1],
+                             'phases': [0.0, 1.0, 2.0, 3.0, 4.0, 5.0], 'start_s': 1.0}),
+        ('chirp', 60.0, {'type': 'chirp', 'amplitude_deg_s': 0.06, 'f0_hz': 0.1, 'f1_hz': 8.0,
+                         'duration_s': 28.0, 'start_s': 1.0}),
+    )
+}
+
+
+def planned(sheet: TestSheet, duration: float, rate: float) -> Recording:
+    """Return a planned test as a recording: its command, and readings of zero."""
+    time = np.arange(int(duration * rate) + 1) / rate
+    command = SheetCommand(sheet.waveform or Square(0.05, 6.3, 0.25))
+    signals = {'test_signal/rate_command': command(time)}
+    signals.update({name: np.zeros(time.size) for name in CHANNELS})
+    return Recording.from_arrays(time, signals, sheet=sheet, notes={PLANNED: True})
+
+
+def confusability_of(tests: Mapping[str, Recording], drive: Drive,
+                     progress: Callable[[float], None] = lambda share: None,
+                     threads: int = 2) -> Confusability:
+    """
+    Say which effects these tests can tell apart.
+
+    Parameters
+    ----------
+    tests
+        planned or made ones, by name
+    drive
+        the configuration
+    progress
+        called with the share that is done
+    threads
+        simulations at once
+
+    """
+    machine = AntennaMachine(tests, drive, threads)
+    machine.experiments = tuple(replace(e, measured=machine.predict({}, k))
+                                for k, e in enumerate(machine.experiments))
+    return confusability(machine, progress)

@@ -1,0 +1,177 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""The nuisances: tolerances of the machine, its initial conditions, zeros of the sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, replace
+import math
+
+from antenna_drive.diagnosis.field_test import (
+    BIAS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, TACH_1, TACH_2,
+)
+from antenna_drive.diagnosis.modifiers import (
+    add, AntennaParameter, ChannelDelay, ClockRate, ClockShift, Modifier, ReadingGain, ReadingZero,
+    scale, SupplyGain, UnrecordedJump, UnrecordedMean,
+)
+from antenna_drive.diagnosis.recorded_command import RecordedCommand
+from antenna_drive.recording.sheet import Tolerances
+
+# The numbers that the configuration knows only within the tolerance of the test sheet.
+TOLERANT_MOTOR = (
+    'rate_command.k_s', 'rate_command.k_1', 'rate_command.tau_1', 'amplifier.rate_gain',
+    'amplifier.integral_time', 'amplifier.lag', 'amplifier.current_feedback_gain',
+    'amplifier.forward_gain_share', 'armature.voltage_limit',
+    'amplifier.tach_gain', 'amplifier.bias_command_gain', 'armature.inductance',
+    'motor.current_limit', 'motor.rotor_inertia', 'motor.coulomb_torque', 'motor.stiction_ratio',
+    'gearbox.stiffness', 'gearbox.half_gap', 'gearbox.contact_damping',
+)
+TOLERANT_DRIVE = (
+    'torque_share.circuit.bias_pot', 'torque_share.circuit.fade_out_voltage',
+    'torque_share.circuit.current_to_voltage', 'torque_share.circuit.k_2',
+    'torque_share.circuit.s_2', 'torque_share.circuit.k_3',
+    'torque_share.circuit.g_4', 'torque_share.circuit.saturation_high',
+    'torque_share.filter_1.gain', 'torque_share.filter_1.pole',
+    'torque_share.filter_1.difference_gain',
+    'plant.axis.inertia_hub', 'plant.axis.coulomb_torque', 'plant.axis.stiction_ratio',
+    *(f'plant.axis.{name}.{j}' for name in (
+        'mode_inertias', 'mode_frequencies', 'mode_damping_ratios') for j in range(3)),
+)
+
+
+# What instruments of the kind have when somebody looks after them: tachometers and servo
+# amplifiers of a drive, transducers and the logger of a test.
+USUAL = Tolerances(tach_zero_rad_s=0.01, amplifier_zero_V=1e-3, recorder_gain=0.01,
+                   current_zero_A=0.02, bias_zero_V=0.03, channel_delay_samples=1.0,
+                   clock_ppm=100.0)
+# A jump of the command is felt for about this time [s].
+_FELT_S = 5.0
+# The recorded channels with the number of the configuration that is their recorder's gain.
+_RECORDED = (('current_1', 'motor_1.ammeter.gain'), ('current_2', 'motor_2.ammeter.gain'),
+             ('tach_1', ''), ('tach_2', ''), ('encoder', ''),
+             ('bias_voltage', 'torque_share.circuit.voltmeter_gain'))
+
+
+def nuisances(tests: Sequence[FieldTest], tolerance: float) -> tuple[AntennaParameter, ...]:
+    """
+    Return the nuisances of a machine in its tests.
+
+    Parameters
+    ----------
+    tests
+        that were made
+    tolerance
+        by what share the machine's numbers may differ from the configuration
+
+    """
+    return (*_of_the_machine(tests[0], tolerance), *_of_zeros_and_recorders(tests),
+            *(item for k, test in enumerate(tests) for item in _of_a_test(k, test, tolerance)))
+
+
+def _within(name: str, unit: str, half_width: float, modifier: Modifier,
+            experiment: int | None = None) -> AntennaParameter:
+    """Return a number that is spread evenly within a tolerance."""
+    return AntennaParameter(name, unit, -half_width, half_width, 0.3 * half_width,
+                            half_width / math.sqrt(3.0), experiment=experiment,
+                            modifier=modifier)
+
+
+def _of_the_machine(test: FieldTest, tolerance: float) -> Iterator[AntennaParameter]:
+    def relative(name: str, *others: str) -> AntennaParameter:
+        return _within(f'offset:{name}', '1', tolerance, scale(name, *others))
+
+    for motor in ('motor_1', 'motor_2'):
+        for name in TOLERANT_MOTOR:
+            yield relative(f'{motor}.{name}')
+        # a motor's magnets make its torque and its back-EMF
+        yield relative(f'{motor}.motor.torque_constant', f'{motor}.armature.back_emf_share')
+        yield relative(f'{motor}.armature.back_emf_constant')
+        # the amplifier is made for the resistance that the winding should have
+        ohms = tolerance * float(test.record[motor]['armature']['resistance'][0])
+        path = f'{motor}.armature.resistance_change'
+        yield _within(f'offset:{path}', 'ohm', ohms, add(path))
+    for name in TOLERANT_DRIVE:
+        yield relative(name)
+
+
+def allowed(tests: Sequence[FieldTest]) -> Tolerances:
+    """Return the greatest tolerances that the sheets of some tests give, or else usual ones."""
+    def greatest(name: str) -> float:
+        given = [value for value in (getattr(test.tolerances, name) for test in tests)
+                 if value is not None]
+        return max(given, default=getattr(USUAL, name))
+
+    return Tolerances(**{item.name: greatest(item.name) for item in fields(Tolerances)})
+
+
+def _of_zeros_and_recorders(tests: Sequence[FieldTest]) -> Iterator[AntennaParameter]:
+    """Yield what may be off beyond the parameters: zeros in the loop, gains, delays."""
+    given = allowed(tests)
+    period = max(test.period for test in tests)
+    for m in (1, 2):
+        motor = f'motor_{m}'
+        for size, unit, path in (
+                (given.tach_zero_rad_s, 'rad/s', f'{motor}.tachometer.offset'),
+                (given.amplifier_zero_V, 'V', f'{motor}.amplifier.offset')):
+            if size:
+                yield _within(f'offset:{path}', unit, size, add(path))
+    for channel, (name, field) in enumerate(_RECORDED):
+        if given.recorder_gain and channel != ENCODER:
+            yield _within(f'gain:{name}', '1', given.recorder_gain,
+                          ReadingGain(channel, (field,) if field else ()))
+        if given.channel_delay_samples:
+            seconds = given.channel_delay_samples * period
+            yield replace(_within(f'delay:{name}', 's', seconds, ChannelDelay(channel)), low=0.0)
+
+
+def starting_places(k: int, test: FieldTest) -> tuple[AntennaParameter, ...]:
+    """Return where in its gap each motor starts in test k, as a share of half the gap."""
+    return tuple(AntennaParameter(
+        f'start:{test.name}.{motor}', '1', -1.0, 1.0, 0.05, 0.6, experiment=k,
+        modifier=add(f'{motor}.start_in_gap')) for motor in ('motor_1', 'motor_2'))
+
+
+def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaParameter]:
+    yield from starting_places(k, test)
+    if test.record['torque_share']['circuit']['bias_source'][0] == 1:
+        yield _within(f'supply:{test.name}', '1', tolerance, SupplyGain(), k)
+    yield AntennaParameter(f'clock:{test.name}', 's', -0.01, 0.01, 1e-4, 1e-3, experiment=k,
+                           modifier=ClockShift())
+
+    if isinstance(test.command, RecordedCommand):
+        command = test.command
+        for i, begin in enumerate(command.jumps.tolist()):
+            # of those before a window the last ones alone are still felt in it
+            if not test.time[0] - _FELT_S < begin < test.time[-1]:
+                continue
+            name = f'jump:{test.name}:{begin:.3f}'
+            earlier, later = command.slack[i].tolist()
+            half = 0.5 * (later - earlier)
+            yield replace(_within(name, 's', half, UnrecordedJump(i), k), low=earlier, high=later)
+
+        for i, (begin, _) in enumerate(command.holes):
+            yield _within(f'hole:{test.name}:{begin:.3f}', 'rad/s',
+                          2.0 * float(command.uncertainty[i]), UnrecordedMean(i), k)
+
+    given = allowed([test])
+    if given.clock_ppm:
+        yield _within(f'clock_rate:{test.name}', '1', 1e-6 * given.clock_ppm, ClockRate(), k)
+
+    def zero(channel: int, name: str, unit: str, half_width: float, step: float,
+             sigma: float) -> AntennaParameter:
+        return AntennaParameter(f'zero:{name}:{test.name}', unit, -half_width, half_width, step,
+                                sigma, experiment=k, modifier=ReadingZero(channel))
+
+    # an encoder counts on from an angle that is not known where the start is not
+    wide = 1.0 if test.known_start else 50.0
+    yield zero(ENCODER, 'encoder', 'rad', 4e-5 * wide, 2e-6, 1e-5 * wide)
+    sensors = test.sensors
+    for channel, name, unit, size in (
+            (CURRENT_1, 'current_1', 'A', given.current_zero_A),
+            (CURRENT_2, 'current_2', 'A', given.current_zero_A),
+            (TACH_1, 'tach_1', 'rad/s', 2.0 * sensors.tach_noise),
+            (TACH_2, 'tach_2', 'rad/s', 2.0 * sensors.tach_noise),
+            (BIAS, 'bias_voltage', 'V', given.bias_zero_V)):
+        if size:
+            yield zero(channel, name, unit, size, 0.3 * size, size / math.sqrt(3.0))

@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""Waves of an angle: ripples of torque and tachometer, errors of teeth and encoder, rail bumps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from antenna_drive.diagnosis.modifiers import (
+    AntennaParameter, ReadingModifier, RunModifier, RunSetup, SensorReadings,
+)
+from antenna_drive.diagnosis.wave_shape import WaveShape
+import numpy as np
+from simgap.machine.contract import Form
+
+_PARTS = ('sine', 'cosine', 'cycles_change', 'second_sine', 'second_cosine', 'third_sine',
+          'third_cosine')
+
+
+_CYCLES = ' cycles per revolution'
+# The waves of the drive that follow a motor's angle: unit, part and name.
+_OF_MOTORS = tuple((motor, part, stem) for motor in ('motor_1', 'motor_2') for part, stem in (
+    ('motor', 'torque_ripple'), ('gearbox', 'transmission_error'), ('tachometer', 'ripple')))
+
+
+def is_there(numbers: np.ndarray[Any, np.dtype[Any]], stem: str) -> bool:
+    """Return whether the record of a part, shape (1,), has a wave whose names begin so."""
+    return any(numbers[stem + end][0] != 0.0 for end in ('', '_second', '_third'))
+
+
+def fastest_wave(record: np.ndarray[Any, np.dtype[Any]]) -> float:
+    """Return the cycles per turn of the axis of the fastest wave in a drive's record; 0: none."""
+    cycles = 0.0
+    for motor, part, stem in _OF_MOTORS:
+        numbers = record[motor][part]
+        if is_there(numbers, stem):
+            cycles = max(cycles, float(numbers[f'{stem}_cycles'][0])
+                         * float(record[motor]['gear_ratio'][0]))
+    return cycles
+
+
+@dataclass(frozen=True)
+class _WavePart(RunModifier):
+    """One part of a wave of the drive."""
+
+    shape: WaveShape
+    index: int
+
+    def apply(self, run: RunSetup, value: float) -> None:
+        run.waves.setdefault(self.shape, [0.0] * len(_PARTS))[self.index] = value
+
+
+@dataclass(frozen=True)
+class _ReadingWavePart(ReadingModifier):
+    """One part of a wave of the encoder's reading."""
+
+    shape: WaveShape
+    index: int
+
+    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
+        readings.waves.setdefault(self.shape, [0.0] * len(_PARTS))[self.index] = value
+
+    def write(self, run: RunSetup, value: float) -> bool:
+        run.waves.setdefault(self.shape, [0.0] * len(_PARTS))[self.index] = value
+        return True
+
+
+@dataclass(frozen=True)
+class Wave(Form):
+    """
+    A wave of three harmonics by their sine and cosine parts.
+
+    Attributes
+    ----------
+    shape : where it is
+    orders : cycles per revolution to look for
+
+    """
+
+    shape: WaveShape = WaveShape('', (), '')
+    orders: tuple[float, ...] = ()
+
+    def order_of(self, name: str) -> float:
+        """
+        Return the order in the name of a form that `at` has made.
+
+        Raises
+        ------
+        KeyError : there is none in it
+
+        """
+        try:
+            return float(name.removesuffix(_CYCLES))
+        except ValueError:
+            raise KeyError(name) from None
+
+    def at(self, order: float) -> Wave:
+        """Return the form for one order, with parameters of its own."""
+        shape = replace(self.shape, order=order)
+        parameters = []
+        for part in self.parameters:
+            assert isinstance(part, AntennaParameter)
+            assert isinstance(part.modifier, (_WavePart, _ReadingWavePart))
+            parameters.append(replace(part, name=f'{part.name}@{order:g}',
+                                      modifier=replace(part.modifier, shape=shape)))
+        return replace(self, name=f'{order:g}{_CYCLES}',
+                       parameters=tuple(parameters), shape=shape, scanned=True)
+
+
+def wave(unit: str, limit: float, step: float, shape: WaveShape, orders: tuple[float, ...],
+         on_readings: bool = False, healthy: float = 0.0) -> Wave:
+    """
+    Return the form of a wave whose order is not chosen yet.
+
+    Parameters
+    ----------
+    unit, limit, step
+        of each amplitude: unit, greatest size, step of the difference quotient
+    shape
+        where it is
+    orders
+        cycles per revolution to look for
+    on_readings
+        True if nothing feeds the wave back
+    healthy
+        amplitude of each part that a machine in good order may have
+
+    """
+    made = _ReadingWavePart if on_readings else _WavePart
+
+    def part(index: int) -> AntennaParameter:
+        name = _PARTS[index]
+        bound, unit_, step_ = ((0.05, '1', 2e-4) if name == 'cycles_change' else
+                               (limit, unit, step))
+        return AntennaParameter(name, unit_, -bound, bound, step_,
+                                is_shape=index > 1, modifier=made(shape, index),
+                                tolerance=healthy if index < 2 else 0.0)
+
+    return Wave('', tuple(part(index) for index in range(len(_PARTS))), is_wave=True,
+                shape=shape, orders=orders)

@@ -1,0 +1,52 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Compile the real antenna's kernels and cache them on disk while their sources are unchanged.
+
+numba's own cache checks only the file of the outermost function and would miss a change of an
+equation in another file. The cache folder is therefore named after a hash of all sources of this
+package.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import hashlib
+import os
+from pathlib import Path
+import tempfile
+from typing import Any, TypeVar
+
+import numba
+
+Function = TypeVar('Function', bound=Callable[..., Any])
+
+
+def _cache_folder() -> Path:
+    digest = hashlib.sha256(numba.__version__.encode())
+    for source in sorted(Path(__file__).parent.rglob('*.py')):
+        digest.update(source.name.encode() + b'\0' + source.read_bytes() + b'\0')
+    home = os.environ.get('XDG_CACHE_HOME') or str(Path('~/.cache').expanduser())
+    if not os.access(home if Path(home).exists() else Path(home).parent, os.W_OK):
+        home = tempfile.gettempdir()
+    return Path(home) / 'antenna_drive' / f'trial-{digest.hexdigest()[:16]}'
+
+
+CACHE_FOLDER = _cache_folder()
+
+
+def compiled(function: Function) -> Function:
+    """Compile a function of numbers and arrays; a division by zero gives infinity."""
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(CACHE_FOLDER)
+    try:
+        kernel: Function = numba.njit(cache=True, error_model='numpy')(function)
+    finally:
+        numba.config.CACHE_DIR = before
+    return kernel
+
+
+def inner(function: Function) -> Function:
+    """Compile a function that only compiled functions call: it becomes a part of each."""
+    kernel: Function = numba.njit(forceinline=True, error_model='numpy', _nrt=False)(function)
+    return kernel

@@ -1,0 +1,19 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""The tables of this program: YAML files of this folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+
+def read_table(name: str) -> dict[str, Any]:
+    """Return the content of a YAML file of this folder, or of one below it."""
+    text = (Path(__file__).parent / name).read_text(encoding='utf-8')
+    # libyaml, where it is there, is several times as fast
+    loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+    content: dict[str, Any] = yaml.load(text, Loader=loader)
+    return content

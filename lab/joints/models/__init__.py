@@ -1,0 +1,8 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The models that diagnose the joint and the axis, as their users would write them.
+
+They are data of the trial: each diagnosis is given the path of one. docs/own-machine.md teaches
+how to write them.
+"""

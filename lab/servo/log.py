@@ -1,0 +1,142 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""One log of a position-controlled servo with a pendulum, and the servo's readings in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+from pathlib import Path
+
+from antenna_drive.recording.recording import Recording
+from lab.servo.firmware import Firmware, firmware_of
+from lab.servo.physics import swing
+import numpy as np
+from simgap.errors import UserError
+from simgap.machine.contract import FloatArray
+
+CHANNELS = ('position', 'speed', 'duty')
+UNITS = ('rad', 'rad/s', '1')
+POSITION, SPEED, DUTY = range(3)
+STEP_S = 2.8e-3
+
+
+@dataclass(frozen=True)
+class ServoLog:
+    """
+    One log of a servo with a pendulum.
+
+    Attributes
+    ----------
+    name : for people
+    kp : position gain, in the firmware's unit
+    trajectory : the name of the goal's course
+    mass, length : of the pendulum [kg], [m]
+    gain : duty per position error [1/rad]
+    supply : voltage [V]
+    firmware : of the servo
+    time : of the samples, shape (n,) [s]
+    goal : shape (n,) [rad]
+    enabled : 1 where the servo drives, shape (n,)
+    temperature : shape (n,) [degC]
+    measured : position [rad], speed [rad/s], duty; shape (n, 3)
+
+    """
+
+    name: str
+    kp: float
+    trajectory: str
+    mass: float
+    length: float
+    gain: float
+    supply: float
+    firmware: Firmware
+    time: FloatArray
+    goal: FloatArray
+    enabled: FloatArray
+    temperature: FloatArray
+    measured: FloatArray
+
+    @classmethod
+    def of(cls, name: str, recording: Recording, beside: Path | None = None) -> ServoLog:
+        """
+        Prepare a log that `bam.read_bam` has read.
+
+        Parameters
+        ----------
+        name
+            for people
+        recording
+            of the log
+        beside
+            folder in which the servo's firmware may lie; see `firmware_of`
+
+        Raises
+        ------
+        UserError : too short, or the drive law of this servo is not known
+
+        """
+        notes = recording.notes
+        for key in ('mass', 'length', 'kp', 'vin'):
+            if not 0.0 < float(notes[key]) < math.inf:
+                raise UserError(f'{name}: {key}: {notes[key]} given, allowed is more than 0')
+        try:
+            firmware = firmware_of(notes['motor'], beside)
+        except UserError as error:
+            raise UserError(f'{name}: {error}') from None
+        time = np.asarray(recording['servo/position'].time_s, dtype=np.float64)
+        if time.size < 50:
+            raise UserError(f'{name}: {time.size} samples, at least 50 are needed')
+        values = {key: np.array(recording[f'servo/{key}'].values, dtype=np.float64)
+                  for key in ('position', 'speed', 'goal_position', 'torque_enable',
+                              'temperature', 'load')}
+        load = values['load']
+        # the register has 16 bits in two's complement
+        duty = np.where(load >= 2 ** 15, load - 2 ** 16, load) / firmware.duty_count
+        return cls(name, float(notes['kp']), str(notes['trajectory']), float(notes['mass']),
+                   float(notes['length']), float(notes['kp']) * firmware.error_gain,
+                   float(notes['vin']), firmware, time, values['goal_position'],
+                   values['torque_enable'], values['temperature'],
+                   np.column_stack([values['position'], values['speed'], duty]))
+
+    @property
+    def steps(self) -> FloatArray:
+        """Return the resolution of position, speed and duty, shape (3,)."""
+        position = self.firmware.position_step
+        return np.array([position, self.firmware.rate_step,
+                         max(1.0 / self.firmware.duty_count, self.gain * position)])
+
+    def simulate(self, values: FloatArray, step: float = STEP_S) -> FloatArray:
+        """
+        Return position, rate, duty and current that a servo with these numbers would have had.
+
+        It runs free of the measured course, but that it starts where that starts, at rest.
+
+        Parameters
+        ----------
+        values
+            from `servo_catalogue.vector`
+        step
+            of integration, at most [s]
+
+        Returns
+        -------
+        array of shape (n, 4) [rad, rad/s, 1, A]
+
+        """
+        out = np.empty((self.time.size, 4))
+        swing(values, self.mass, self.length, self.gain, self.supply, self.time, self.goal,
+              self.enabled, self.temperature, self.measured[0, POSITION], 0.0, step, out)
+        return out
+
+    def error(self, values: FloatArray, step: float = STEP_S) -> float:
+        """Return the mean absolute error of the position over the whole run [rad]."""
+        miss = np.abs(self.simulate(values, step)[:, 0] - self.measured[:, POSITION])
+        return float(np.nan_to_num(miss, nan=10.0).mean())
+
+    def readings(self, values: FloatArray, step: float = STEP_S) -> FloatArray:
+        """Return what the servo would have reported, shape (n, 3) like `measured`."""
+        run = self.simulate(values, step)
+        window = self.firmware.rate_window_s
+        past = np.interp(self.time - window, self.time, run[:, 0])
+        return np.column_stack([run[:, 0], (run[:, 0] - past) / window, run[:, 2]])

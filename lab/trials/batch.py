@@ -1,0 +1,422 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Make and diagnose the recordings of a trial in batches that can be resumed.
+
+Complete parts are kept. The folder of a case gets its name only once all its recordings are in
+it, and a verdict only once the diagnosis has succeeded.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+import json
+import math
+import os
+from pathlib import Path
+import shutil
+from typing import Any
+
+from antenna_drive.subcommand import run_command
+from antenna_drive.workers import workers
+from lab.antenna.cases import draw_truths, make_recording, Truth
+from lab.antenna.programme import RECORDINGS
+from lab.antenna.real_antenna import FloatArray
+from lab.antenna.sensors import COLUMNS
+from lab.antenna.wild_programme import KEPT_BACK, LONGEST_S
+from lab.joints import cases as others
+from lab.joints.machines import kind_of
+from lab.trials import sealing
+from simgap.errors import UserError
+import yaml
+
+VERDICT = 'verdict.json'
+FAILURE = 'failure.txt'
+KEPT = 'kept'               # folder of the recordings that no diagnosis gets
+CORRECTED = 'corrected.yaml'
+PREDICTIONS = {'before': 'before.csv', 'after': 'after.csv'}
+PREDICTION_FAILURE = 'prediction_failure.txt'
+PREDICTION_LIMIT_S = 300.0
+DURATION_S = 30.0
+# Formats that keep every digit of the sensors.
+FORMATS = {'time_s': '%.6f', 'rate_command_rad_s': '%.12g', 'encoder_rad': '%.12g'}
+USUAL_FORMAT = '%.9g'
+Done = Callable[[int, int], None]
+
+
+def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: float,
+            duration: float, *, wild: bool = False, family: str = 'a', largest: float = 1.0,
+            longest: float = LONGEST_S, machines: Sequence[str] = ()) -> dict[str, Any]:
+    """
+    Draw and seal the truths of a trial, unless they are sealed already.
+
+    Parameters
+    ----------
+    folder
+        of the trial
+    count, seed, tolerance, sample_rate, duration, wild, family, largest, longest
+        as in `cases.draw_truths`
+    machines
+        other machines than the antenna, as in `others.cases.draw_truths`; of the entries above,
+        only `count` and `seed` are then used
+
+    Returns
+    -------
+    the manifest
+
+    Raises
+    ------
+    UserError : the folder holds a trial with other settings
+
+    """
+    settings: dict[str, Any] = {'cases': count, 'seed': seed}
+    if machines:
+        settings |= {'machines': list(machines)}
+    elif wild:
+        settings |= {'tolerance': tolerance, 'wild': True, 'family': family}
+    else:
+        settings |= {'tolerance': tolerance, 'sample_rate_hz': sample_rate,
+                     'duration_s': duration}
+    # a trial that was begun without these entries goes on
+    if largest != 1.0:
+        settings['largest'] = largest
+    if longest != LONGEST_S:
+        settings['longest_s'] = longest
+    if (folder / sealing.MANIFEST).exists():
+        manifest = sealing.read_manifest(folder)
+        if manifest['settings'] != settings:
+            old: dict[str, Any] = manifest['settings']
+            differing = [f'{key} {old.get(key)}, not {value}'
+                         for key, value in {**dict.fromkeys(old), **settings}.items()
+                         if old.get(key) != value]
+            raise UserError(f'{folder}: holds a trial with {"; ".join(differing)}; '
+                            'give the same settings to resume it, or another --out')
+        return manifest
+    if machines:
+        truths = others.draw_truths(count, seed, machines)
+    else:
+        truths = draw_truths(count, seed, tolerance, sample_rate=sample_rate, duration=duration,
+                             wild=wild, family=family, largest=largest, longest=longest)
+    return sealing.seal(folder, settings, truths)
+
+
+def write_csv(path: Path, columns: Mapping[str, FloatArray],
+              formats: Mapping[str, str] = FORMATS) -> None:
+    """Write the columns of a recording as CSV with a heading."""
+    row_format = ','.join(formats.get(name, USUAL_FORMAT) for name in columns)
+    rows = zip(*(values.tolist() for values in columns.values()))
+    lines = [','.join(columns), *(row_format % row for row in rows)]
+    path.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+
+
+def make_case(folder: Path, truth: Truth) -> None:
+    """
+    Write the recordings of one case and their test sheets; of a wild case, keep one back.
+
+    Parameters
+    ----------
+    folder
+        of the trial
+    truth
+        of the case
+
+    """
+    if len(truth.get('sheets', ())) > len(RECORDINGS):
+        (folder / KEPT).mkdir(exist_ok=True)
+        _make_folder(folder / KEPT / truth['case'], truth, {len(RECORDINGS): KEPT_BACK})
+    _make_folder(folder / truth['case'], truth, dict(enumerate(RECORDINGS)))
+
+
+def _make_folder(final: Path, truth: Truth, names: Mapping[int, str]) -> None:
+    """Write recordings of a case, by number and name, and their sheets; all or none."""
+    draft = final.with_name(f'.{final.name}.{os.getpid()}')
+    shutil.rmtree(draft, ignore_errors=True)
+    draft.mkdir()
+    try:
+        for number, name in names.items():
+            if 'machine' in truth:
+                write_csv(draft / f'{name}.csv', others.make_recording(truth, number),
+                          kind_of(truth['machine']).formats)
+                continue
+            columns = make_recording(truth, number)
+            write_csv(draft / f'{name}.csv', {key: columns[key] for key in COLUMNS})
+            given = (truth.get('given_sheets') or truth['sheets'])[number]
+            if given is not None:
+                sheet = yaml.safe_dump(given, sort_keys=False, default_flow_style=None)
+                (draft / f'{name}.yaml').write_text(sheet, encoding='utf-8')
+        shutil.rmtree(final, ignore_errors=True)
+        os.replace(draft, final)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
+               done: Done = lambda part, total: None, scheduler: str | None = None,
+               skipped: Container[str] = ()) -> None:
+    """
+    Make all cases that do not exist yet.
+
+    Parameters
+    ----------
+    folder
+        of the trial
+    manifest
+        of the trial
+    jobs
+        number of processes
+    done
+        called with the number of complete cases and their total
+    scheduler
+        address of a dask.distributed scheduler whose workers make them; they see the folder
+        under the same path
+    skipped
+        names of cases that are not wanted
+
+    """
+    _remove_drafts(folder)
+    names = [name for name in manifest['seals'] if name not in skipped]
+    wanted = [name for name in names if not (folder / name).is_dir()]
+    truths = [sealing.open_truth(folder, name, manifest) for name in wanted]
+    complete = len(names) - len(wanted)
+    done(complete, len(names))
+    for _ in _made(folder, truths, jobs, scheduler):
+        complete += 1
+        done(complete, len(names))
+    _remove_drafts(folder)
+
+
+def _made(folder: Path, truths: Sequence[Truth], jobs: int,
+          scheduler: str | None) -> Iterator[None]:
+    """Make the cases of these truths; yield after each."""
+    if scheduler is None:
+        # The first case compiles the equations for the processes that follow.
+        alone = 1 if jobs > 1 else len(truths)
+        for truth in truths[:alone]:
+            make_case(folder, truth)
+            yield
+        truths = truths[alone:]
+    if truths:
+        with workers(jobs, scheduler) as pool:
+            for _, result in pool.each(_make_seen_case,
+                                       ((folder.absolute(), truth) for truth in truths)):
+                result()
+                yield
+
+
+def _make_seen_case(folder: Path, truth: Truth) -> None:
+    """Make a case, unless a worker that was killed had just completed it."""
+    _check_seen(folder)
+    if not (folder / truth['case']).exists():
+        make_case(folder, truth)
+
+
+def _check_seen(folder: Path) -> None:
+    if not (folder / sealing.MANIFEST).exists():
+        raise UserError(f'{folder}: a worker does not see this folder; --out must lie on a disk '
+                        'that all workers have under the same path')
+
+
+def _remove_drafts(folder: Path) -> None:
+    """Remove incomplete cases of an interrupted run or of a worker that was killed."""
+    for draft in (*folder.glob('.case_*'), *(folder / KEPT).glob('.case_*')):
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def machine_of(folder: Path, name: str, manifest: Mapping[str, Any]) -> str | None:
+    """Return the machine of a case if it is no antenna: a diagnosis is told that much."""
+    if 'machines' not in manifest['settings']:
+        return None
+    return str(sealing.open_truth(folder, name, dict(manifest))['machine'])
+
+
+def model_options(machine: str | None) -> list[str]:
+    """Return the options of a diagnosis that name the model of a machine; None: the antenna."""
+    return [] if machine is None else ['--model', kind_of(machine).model]
+
+
+def diagnose_case(case: Path, options: Sequence[str], limit: float,
+                  kept: Path | None = None) -> bool:
+    """
+    Diagnose one case in a process of its own, which gets only the recordings.
+
+    Parameters
+    ----------
+    case
+        folder of the case
+    options
+        further options for the diagnosis
+    limit
+        time limit, after which the case counts as failed [s]
+    kept
+        recording that is kept from the diagnosis; it is predicted after the verdict
+
+    Returns
+    -------
+    True if there is a verdict; otherwise FAILURE holds the reason
+
+    """
+    correction = [] if kept is None else ['--corrected', str(case / CORRECTED)]
+    failure = diagnose_recordings(case, RECORDINGS, VERDICT, limit, [*correction, *options])
+    (case / FAILURE).unlink(missing_ok=True)
+    if not (case / VERDICT).exists():
+        sealing.write_whole(case / FAILURE, failure[-20000:] + '\n')
+        return False
+    if kept is not None:
+        predict_kept(case, options, kept)
+    return True
+
+
+def diagnose_recordings(case: Path, recordings: Sequence[str], name: str, limit: float,
+                        options: Sequence[str]) -> str:
+    """
+    Diagnose some recordings of a case in a process of its own, unless that was done before.
+
+    Parameters
+    ----------
+    case
+        folder of the case
+    recordings
+        names of the recordings in it
+    name
+        of the verdict in it; it is there only if the diagnosis succeeds
+    limit
+        time limit [s]
+    options
+        further options for the diagnosis
+
+    Returns
+    -------
+    what the diagnosis said; empty if it was done before
+
+    """
+    if (case / name).exists():
+        return ''
+    draft = case / f'.{name}.{os.getpid()}'
+    said = run_command(['diagnose', *(str(case / f'{item}.csv') for item in recordings),
+                        '--jobs', '1', '--json', str(draft), *options], limit)
+    if not draft.exists():
+        return said
+    try:
+        json.loads(draft.read_text(encoding='utf-8'))
+    except ValueError as error:
+        draft.unlink()
+        return f'verdict is not JSON: {error}\n{said}'
+    os.replace(draft, case / name)
+    return said
+
+
+def predict_kept(case: Path, options: Sequence[str], kept: Path) -> bool:
+    """
+    Predict the recording that was kept back, before and after, and name it in the verdict.
+
+    Parameters
+    ----------
+    case
+        folder of a case with its verdict and its corrected configuration
+    options
+        further options that the diagnosis was given
+    kept
+        the recording
+
+    Returns
+    -------
+    True if both predictions are there; otherwise PREDICTION_FAILURE holds the reason
+
+    """
+    parser = argparse.ArgumentParser(add_help=False)
+    parser.add_argument('--config', action='append')
+    given = parser.parse_known_args(list(options))[0].config or ['reference']
+    (case / PREDICTION_FAILURE).unlink(missing_ok=True)
+    for key, words in (
+            ('before', [word for name in given for word in ('--config', name)]),
+            ('after', ['--config', str(case / CORRECTED), '--recorder', str(case / VERDICT)])):
+        out = case / PREDICTIONS[key]
+        for old in (out, out.with_suffix('.meta.json')):
+            old.unlink(missing_ok=True)
+        failure = run_command(['predict', str(kept), *words, '--out', str(out)],
+                              PREDICTION_LIMIT_S)
+        if not out.exists():
+            sealing.write_whole(case / PREDICTION_FAILURE, f'{key}: {failure[-20000:]}\n')
+            return False
+    verdict = json.loads((case / VERDICT).read_text(encoding='utf-8'))
+    sealing.write_whole(case / VERDICT, json.dumps(
+        {**verdict, 'held_back': PREDICTIONS}, indent=2, ensure_ascii=False) + '\n')
+    return True
+
+
+def _unpredicted(case: Path) -> bool:
+    """Return whether a case has a verdict that still lacks its predictions."""
+    if not (case / VERDICT).exists() or not (case / CORRECTED).exists():
+        return False
+    verdict = json.loads((case / VERDICT).read_text(encoding='utf-8'))
+    return isinstance(verdict, dict) and 'held_back' not in verdict
+
+
+def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
+                   options: Sequence[str] = (), limit: float = math.inf,
+                   done: Done = lambda part, total: None,
+                   scheduler: str | None = None, skipped: Container[str] = ()) -> int:
+    """
+    Diagnose all cases that have no verdict yet, including those that failed before.
+
+    Where a recording was kept back, it is predicted then.
+
+    Parameters
+    ----------
+    folder
+        of the trial
+    manifest
+        of the trial
+    jobs
+        diagnoses at a time
+    options
+        further options for the diagnosis
+    limit
+        time limit of one diagnosis, after which it counts as failed [s]
+    done
+        called with the number of finished cases and their total
+    scheduler
+        address of a dask.distributed scheduler whose workers diagnose them; they see the folder
+        under the same path
+    skipped
+        names of cases that are not wanted
+
+    Returns
+    -------
+    number of cases that failed
+
+    """
+    names = [name for name in manifest['seals'] if name not in skipped]
+    wanted = [name for name in names if not (folder / name / VERDICT).exists()]
+    here = folder if scheduler is None else folder.absolute()
+    kept = {name: path if path.exists() else None for name in names
+            for path in [here / KEPT / name / f'{KEPT_BACK}.csv']}
+    complete, failures = len(names) - len(wanted), 0
+    done(complete, len(names))
+    if scheduler is None:
+        # each diagnosis gets its share of the cores; a worker of a cluster has one
+        options = ['--jobs', str(max(1, (os.cpu_count() or 1) // jobs)), *options]
+    late = [(here, here / name, options, limit, path) for name, path in kept.items()
+            if path is not None and _unpredicted(folder / name)]
+    tasks = [*late, *((here, here / name, options, limit, kept[name],
+                       machine_of(folder, name, manifest)) for name in wanted)]
+    with workers(jobs, scheduler, threads=True) as pool:
+        for number, result in pool.each(_complete, tasks):
+            success = result()
+            if number >= len(late):
+                complete += 1
+                failures += not success
+                done(complete, len(names))
+    return failures
+
+
+def _complete(folder: Path, case: Path, options: Sequence[str], limit: float,
+              kept: Path | None, machine: str | None = None) -> bool:
+    """Do what a case still lacks: its diagnosis, the predictions of what was kept back."""
+    _check_seen(folder)
+    if not (case / VERDICT).exists():
+        return diagnose_case(case, [*model_options(machine), *options], limit, kept)
+    if kept is not None and _unpredicted(case):
+        predict_kept(case, options, kept)
+    return True

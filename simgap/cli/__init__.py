@@ -1,0 +1,18 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Says why a real machine and its simulation part: where, which effect, and how far it shrinks.
+
+Give a model of the machine and logs of its tests. simgap/README.md leads from there to a verdict.
+"""
+
+from __future__ import annotations
+
+from simgap import __version__
+from simgap.command.program import Command, Program
+
+COMMANDS = {
+    'check': Command('check', 'tell what is wrong with a model, before any fit'),
+}
+PROGRAM = Program('simgap', __name__, __version__, COMMANDS)
+main, make_parser = PROGRAM.main, PROGRAM.parser

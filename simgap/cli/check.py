@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+r"""
+Tell what is wrong with a model of your own machine, before any fit.
+
+The model is simulated with the logs of its tests. Found are readings with a wrong shape or NaN,
+numbers that nobody asks for, effects that do nothing, bounds without the neutral value, a
+simulation that is not the same twice, and derivatives that are noise. docs/own-machine.md leads to
+a first model.
+
+For example:
+
+  antenna-drive check-model my_machine.py:machine logs/*.csv
+  antenna-drive check-model my_machine.py logs/*.csv --map map.yaml
+  antenna-drive check-model my_machine.yaml logs/*.csv
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from antenna_drive.cli.reading import warnings_in_one_line
+from simgap.command.output import add_json_option, give
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.add_argument('model', metavar='FILE.py:NAME',
+                        help='Python file and name of the model, or a model file FILE.yaml')
+    parser.add_argument('logs', nargs='+', type=Path, metavar='LOG.csv', help='logs of its tests')
+    parser.add_argument('--map', type=Path, metavar='MAP.yaml',
+                        help='which column is which, and how it is written')
+    add_json_option(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Check, and print what was found; 1 if something is wrong."""
+    from simgap.model import check_model, load_model, read_logs
+
+    model = load_model(arguments.model)
+    with warnings_in_one_line():
+        logs = read_logs(arguments.logs, arguments.map)
+    checked = check_model(model, logs)
+    lines = [f'wrong: {line}' for line in checked.faults]
+    lines += checked.remarks
+    lines.append(f'{len(checked.faults)} to mend' if checked.faults else 'nothing is wrong')
+    give({'faults': list(checked.faults), 'remarks': list(checked.remarks)}, arguments.json,
+         '\n'.join(lines))
+    return 1 if checked.faults else 0

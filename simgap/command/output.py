@@ -1,0 +1,186 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""What several commands need to speak to people and to machines."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+import json
+import math
+import os
+from pathlib import Path
+import sys
+import time
+from types import TracebackType
+from typing import Any, IO, TextIO
+
+import numpy as np
+from simgap.drafts import drafted
+from simgap.errors import UserError
+from simgap.inputs.schema import Entry
+
+STANDARD_OUTPUT = '-'
+
+
+def add_json_option(parser: argparse.ArgumentParser) -> None:
+    """Add `--json FILE|-`, to be answered with `give`."""
+    parser.add_argument('--json', metavar='FILE',
+                        help='write the result as JSON to FILE; - writes it to standard output, '
+                             'and the text to standard error')
+
+
+def give(result: object, target: str | None, text: str) -> None:
+    """
+    Print a result as text, and write it as JSON where `--json` asks for it.
+
+    Parameters
+    ----------
+    result
+        as in `write_json`
+    target
+        a file, '-' for standard output, or None for no JSON
+    text
+        goes to standard output unless the JSON does; then it goes to standard error
+
+    """
+    if target:
+        write_json(result, target)
+    print(text, file=sys.stderr if target == STANDARD_OUTPUT else sys.stdout)
+
+
+def check_options(arguments: argparse.Namespace, **allowed: Entry) -> None:
+    """
+    Check the numbers of options that are given.
+
+    Raises
+    ------
+    UserError : an option is outside the range of its entry
+
+    """
+    for name, entry in allowed.items():
+        value = getattr(arguments, name)
+        if value is not None:
+            entry.check(f'--{name.replace("_", "-")}', value)
+
+
+def write_json(result: object, target: str | os.PathLike[str]) -> None:
+    """
+    Write `result` as strict JSON to a file, whole or not at all, or to standard output.
+
+    NaN, which means that there is no value, becomes null; numpy scalars, arrays and paths
+    become numbers, lists and texts.
+
+    Parameters
+    ----------
+    result
+        made of mappings with texts as keys, sequences, numbers, texts, None
+    target
+        a file, or '-' for standard output
+
+    Raises
+    ------
+    ValueError : `result` holds an infinity
+    TypeError : `result` holds something that JSON has no word for
+    UserError : the file cannot be written
+
+    """
+    text = json.dumps(_plain(result), indent=2, allow_nan=False, ensure_ascii=False) + '\n'
+    if str(target) == STANDARD_OUTPUT:
+        sys.stdout.write(text)
+        return
+    with replaced(Path(target)) as stream:
+        stream.write(text.encode())
+
+
+@contextmanager
+def replaced(path: Path) -> Iterator[IO[bytes]]:
+    """
+    Give a stream whose content takes the place of `path` at the end, if all went well.
+
+    A reader of `path` sees the old content or the new, never a part of it.
+
+    Raises
+    ------
+    UserError : the file cannot be written there; the message names it and the reason
+
+    """
+    try:
+        with drafted(path) as stream:
+            yield stream
+    except OSError as error:
+        raise UserError(f'{path}: cannot be written, {error.strerror}') from error
+
+
+class Progress:
+    """
+    One line on standard error that shows how far long work has got.
+
+    Silent where nobody watches: standard error is not a terminal, or `quiet` is asked for.
+    """
+
+    REFRESH_S = 0.1
+
+    def __init__(self, label: str, total: float, *, quiet: bool = False,
+                 stream: TextIO | None = None) -> None:
+        """
+        Prepare to show `label` and the done part of `total`, in any unit.
+
+        Raises
+        ------
+        ValueError : `total` is not more than zero
+
+        """
+        if not total > 0:
+            raise ValueError(f'total is {total}, must be more than zero')
+        self._label = label
+        self._total = total
+        self._stream = sys.stderr if stream is None else stream
+        self._shown = not quiet and self._stream.isatty()
+        self._started = time.monotonic()
+        self._refreshed = -math.inf
+
+    def __enter__(self) -> Progress:
+        """Show the line at zero."""
+        self.update(0)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        """Leave the line complete, or as far as the work got."""
+        if self._shown:
+            if kind is None:
+                self._draw(self._total)
+            self._stream.write('\n')
+            self._stream.flush()
+
+    def update(self, done: float) -> None:
+        """Show that `done` of the total is done; cheap enough to call at every turn."""
+        now = time.monotonic()
+        if self._shown and now - self._refreshed >= self.REFRESH_S:
+            self._refreshed = now
+            self._draw(done)
+
+    def _draw(self, done: float) -> None:
+        part = min(1.0, max(0.0, done / self._total))
+        bar = '#' * round(30 * part)
+        spent = time.monotonic() - self._started
+        self._stream.write(f'\r{self._label}  [{bar:<30}] {100 * part:3.0f} %  {spent:.0f} s')
+        self._stream.flush()
+
+
+def _plain(value: object) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if isinstance(value, float) and math.isnan(value):
+        return None
+    return value

@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""A box-constrained quadratic programme by an active-set method: the step of a bounded fit."""
+
+from __future__ import annotations
+
+import numpy as np
+from simgap.fit.cholesky import factored, solved
+from simgap.machine.contract import FloatArray
+
+# For this many iterations all wrongly active bounds are released at once; after that one by one,
+# because releasing all of them may cycle.
+_ALL_AT_ONCE = 12
+# A gradient below this, in the metric of the scaled Hessian, gains nothing.
+_LEVEL = 1e-6
+
+
+class BoxQuadratic:
+    """
+    A quadratic programme within bounds, for one gradient or several.
+
+    Parameters
+    ----------
+    hessian
+        symmetric and positive semidefinite, shape (m, m)
+    low, high
+        bounds of the step, low <= 0 <= high, shape (m,)
+
+    """
+
+    def __init__(self, hessian: FloatArray, low: FloatArray, high: FloatArray) -> None:
+        """Scale the Hessian to a diagonal of ones."""
+        m = len(hessian)
+        diagonal = np.diag(hessian)
+        dead = diagonal <= 1e-30  # a variable that changes nothing stays where it is
+        self._scale = np.where(dead, 0.0, 1.0 / np.sqrt(np.where(dead, 1.0, diagonal)))
+        self._scaled = hessian * np.outer(self._scale, self._scale)
+        self._scaled[np.diag_indices(m)] += 1e-12
+        self._hessian, self._low, self._high = hessian, low, high
+        self._room = (high > low) & ~dead
+
+    def step(self, gradient: FloatArray, near: FloatArray | None = None) -> FloatArray:
+        """
+        Return the step d within bounds that maximises gradient d - d hessian d / 2.
+
+        Parameters
+        ----------
+        gradient
+            shape (m,)
+        near
+            the step of a similar gradient, shape (m,). The search begins with what it leaves free,
+            which takes a few factors where dozens are needed without it
+
+        """
+        hessian, low, high, scale = self._hessian, self._low, self._high, self._scale
+        if near is None:
+            step = np.zeros(gradient.size)
+            free = self._room & ~((low >= 0.0) & (gradient < 0.0)) & ~(
+                (high <= 0.0) & (gradient > 0.0))
+        else:
+            step, free = near.copy(), self._room & (near > low) & (near < high)
+        for iteration in range(4 * gradient.size):
+            index = np.flatnonzero(free)
+            if index.size:
+                rest = gradient - hessian @ np.where(free, 0.0, step)
+                step[index] = scale[index] * solved(
+                    factored(self._scaled[np.ix_(index, index)]), (scale * rest)[index])
+            out = free & ((step < low) | (step > high))
+            if out.any():
+                np.clip(step, low, high, out=step)
+                free &= ~out
+                continue
+            slope = gradient - hessian @ step
+            wrong = ~free & self._room & (
+                ((step <= low) & (slope > 0.0)) | ((step >= high) & (slope < 0.0)))
+            steepness = np.abs(slope) * scale
+            wrong &= steepness > _LEVEL
+            if not wrong.any():
+                break
+            if iteration < _ALL_AT_ONCE:
+                free |= wrong
+            else:
+                free[np.argmax(np.where(wrong, steepness, -1.0))] = True
+        return np.asarray(np.clip(step, low, high))
+
+
+def box_constrained_step(hessian: FloatArray, gradient: FloatArray, low: FloatArray,
+                         high: FloatArray) -> FloatArray:
+    """Return the step of one gradient, see `BoxQuadratic`."""
+    return BoxQuadratic(hessian, low, high).step(gradient)

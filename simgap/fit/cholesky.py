@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""The Cholesky factor of a Hessian that was summed in single precision."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import linalg
+from simgap.machine.contract import FloatArray
+
+# Rounding errors of such a Hessian, as shares of its diagonal.
+ROUNDING = 1e-6
+
+
+def factored(matrix: FloatArray, ridge: float = 0.0) -> FloatArray:
+    """
+    Return the lower Cholesky factor of a symmetric matrix with a diagonal of ones, shape (m, m).
+
+    A Hessian that was summed in single precision need not be positive definite. Along a direction
+    that is flat within its rounding nothing is known, and a ridge of that size goes nowhere there.
+
+    Parameters
+    ----------
+    matrix
+        shape (m, m)
+    ridge
+        added to the diagonal in any case; more is added as long as the matrix is not positive
+        definite
+
+    Raises
+    ------
+    ValueError : the matrix has NaN or infinity, which no ridge would mend
+
+    """
+    np.asarray_chkfinite(matrix)
+    while True:
+        raised = matrix + ridge * np.eye(len(matrix)) if ridge else matrix
+        factor, failed = linalg.lapack.dpotrf(raised, lower=1)
+        if not failed:
+            return np.asarray(factor)
+        ridge = max(10.0 * ridge, ROUNDING)
+
+
+def solved(factor: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve for a matrix by its factor; the right-hand side is of shape (m,) or (m, k)."""
+    return np.asarray(linalg.lapack.dpotrs(factor, right, lower=1)[0])

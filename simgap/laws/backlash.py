@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""Backlash: the torque of a pair of gears with a gap between their teeth, Eq. (1)."""
+
+from __future__ import annotations
+
+from simgap.laws.compiling import inner
+
+
+@inner
+def dead_zone(twist: float, half_gap: float) -> float:
+    """
+    Return how far the teeth are pressed into each other, Eq. (1) with k = 1.
+
+    Parameters
+    ----------
+    twist
+        angle between the two gears, at the shaft of the stiffness [rad]
+    half_gap
+        b, the gap reaches from -b to b [rad]
+
+    """
+    if twist > half_gap:
+        return twist - half_gap
+    if twist < -half_gap:
+        return twist + half_gap
+    return 0.0
+
+
+@inner
+def contact_side(
+        twist: float, twist_rate: float, half_gap: float, stiffness: float, damping: float,
+) -> int:
+    """
+    Return which flank pushes: +1, -1, or 0 for none; arguments as in `contact_torque`.
+
+    Flanks that move apart faster than they spring back no longer push, if still pressed a little.
+    """
+    if twist > half_gap and stiffness * (twist - half_gap) + damping * twist_rate > 0.0:
+        return 1
+    if twist < -half_gap and stiffness * (twist + half_gap) + damping * twist_rate < 0.0:
+        return -1
+    return 0
+
+
+@inner
+def contact_torque(
+        side: int, twist: float, twist_rate: float, half_gap: float, stiffness: float,
+        damping: float,
+) -> float:
+    """
+    Return the torque of the touching flanks, Eq. (1) with a contact damping beside the spring.
+
+    Parameters
+    ----------
+    side
+        the flank that pushes, from `contact_side`
+    twist, twist_rate
+        angle and rate between the two gears [rad], [rad/s]
+    half_gap
+        b [rad]
+    stiffness
+        k [N m/rad]
+    damping
+        torque per rate of approach while in contact [N m s/rad]; not in the article
+
+    Returns
+    -------
+    torque on the driven gear [N m]; a flank that pushes has the sign of its side
+
+    """
+    if side > 0:
+        return stiffness * (twist - half_gap) + damping * twist_rate
+    if side < 0:
+        return stiffness * (twist + half_gap) + damping * twist_rate
+    return 0.0
+
+
+@inner
+def contact_torque_rate(
+        torque: float, twist_rate: float, twist_acceleration: float, stiffness: float,
+        damping: float,
+) -> float:
+    """Return the time derivative of `contact_torque` [N m/s]: zero while nothing is pushed."""
+    if torque == 0.0:
+        return 0.0
+    return stiffness * twist_rate + damping * twist_acceleration

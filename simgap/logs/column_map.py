@@ -1,0 +1,309 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A map from somebody else's file to signals: columns, units, signs, clocks.
+
+docs/recording.md describes the map's entries with an example.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+import math
+from pathlib import Path
+from typing import Any
+
+from simgap.errors import one_line
+from simgap.inputs.labels import plain_value
+from simgap.inputs.plain_yaml import read_yaml
+from simgap.inputs.schema import Entry, mapping_of, nearest, ParameterError, quoted
+from simgap.logs.channel import check_name, NANOSECONDS, nanoseconds, RecordingError
+from simgap.logs.expression import Expression, MOST_COLUMNS, parse_expression, Reference
+from simgap.logs.tables import Layout
+
+# A unit in which a column may be written: the SI unit and how much of it one is.
+UNITS: dict[str, tuple[str, float]] = {
+    'rad': ('rad', 1.0), 'mrad': ('rad', 1e-3), 'urad': ('rad', 1e-6),
+    'deg': ('rad', math.pi / 180), 'arcmin': ('rad', math.pi / 10800),
+    'arcsec': ('rad', math.pi / 648000), 'mdeg': ('rad', math.pi / 180000),
+    'rad/s': ('rad/s', 1.0), 'mrad/s': ('rad/s', 1e-3), 'deg/s': ('rad/s', math.pi / 180),
+    'mdeg/s': ('rad/s', math.pi / 180000), 'arcsec/s': ('rad/s', math.pi / 648000),
+    'rpm': ('rad/s', math.pi / 30), 'rev/s': ('rad/s', 2 * math.pi),
+    'A': ('A', 1.0), 'mA': ('A', 1e-3), 'V': ('V', 1.0), 'mV': ('V', 1e-3),
+    'N m': ('N m', 1.0), 'kN m': ('N m', 1e3), 'N': ('N', 1.0), 'kN': ('N', 1e3),
+    'm': ('m', 1.0), 'mm': ('m', 1e-3), 'um': ('m', 1e-6),
+    'm/s': ('m/s', 1.0), 'mm/s': ('m/s', 1e-3), '1': ('1', 1.0),
+}
+COUNTS = 'counts'
+TIME_UNITS = {'s': NANOSECONDS, 'ms': 1_000_000, 'us': 1_000, 'ns': 1}
+ISO_8601 = 'iso8601'
+_TEXT_ENTRIES = ('delimiter', 'decimal', 'comment', 'encoding')
+_TOP = (*_TEXT_ENTRIES, 'skip_lines', 'header', 'time', 'signals')
+_TIME = ('column', 'unit', 'offset_s', 'origin', 'duplicates')
+_NUMBERS = {
+    'scale': Entry('1', -1e12, 1e12), 'offset': Entry(''),
+    'clock_offset_s': Entry('s', -9e9, 9e9),
+    'counts_per_revolution': Entry('1', 1.0, 2.0**64),
+}
+_WHOLE_NUMBERS = {
+    'index': Entry('1', 0, MOST_COLUMNS, whole=True),
+    'sign_magnitude_bits': Entry('1', 2, 53, whole=True),
+}
+_SIGNAL = ('column', 'expression', 'unit', 'sign', 'time_column', *_NUMBERS, *_WHOLE_NUMBERS)
+_SKIP_LINES = Entry('1', 0, 10000, whole=True)
+_PLACE = Entry('1', 0, MOST_COLUMNS, whole=True)
+
+
+@dataclass(frozen=True)
+class TimeMap:
+    """
+    How the time is written.
+
+    Attributes
+    ----------
+    column : name of the column, or its place, counted from 0
+    unit : one of TIME_UNITS, or iso8601 (without a zone it is taken for UTC)
+    offset_ns : added to every time stamp [ns]
+    from_first : count from the first time stamp of the file
+    duplicates : which row counts where a time stamp is repeated: refuse, first or last
+
+    """
+
+    column: str | int
+    unit: str = 's'
+    offset_ns: int = 0
+    from_first: bool = False
+    duplicates: str = 'refuse'
+
+
+@dataclass(frozen=True)
+class SignalMap:
+    """
+    How one signal is written: SI value = factor * (sign * scale * number + offset).
+
+    Attributes
+    ----------
+    number : the columns, and the number that they give
+    unit : SI unit of the signal
+    factor : SI units in the unit of the column
+    gain : sign * scale
+    offset : in the unit of the column
+    time_column : column of this signal's own time stamps; None for the common one
+    clock_offset_ns : added to this signal's time stamps [ns]
+    sign_bit : value of the bit that is the sign of a sign-magnitude register; 0 for none
+
+    """
+
+    number: Expression
+    unit: str
+    factor: float = 1.0
+    gain: float = 1.0
+    offset: float = 0.0
+    time_column: str | int | None = None
+    clock_offset_ns: int = 0
+    sign_bit: int = 0
+
+
+@dataclass(frozen=True)
+class ImportMap:
+    """What a file holds and how it is written."""
+
+    time: TimeMap
+    signals: Mapping[str, SignalMap]
+    layout: Layout = Layout()
+    source: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class KnownSignals:
+    """
+    Signals that a program knows already, before it reads a map.
+
+    Attributes
+    ----------
+    owner : who has them, for messages
+    units : their SI units by name
+    aliases : other names by which a map may call them
+
+    """
+
+    owner: str = ''
+    units: Mapping[str, str] = field(default_factory=dict)
+    aliases: Mapping[str, str] = field(default_factory=dict)
+
+
+NO_SIGNALS = KnownSignals()
+
+
+def load_map(path: str | Path, known: KnownSignals = NO_SIGNALS) -> ImportMap:
+    """
+    Read a map.
+
+    Parameters
+    ----------
+    path
+        of the map
+    known
+        signals whose units need not be stated
+
+    Raises
+    ------
+    ParameterError : the file cannot be read or an entry is not allowed; one line names the file,
+        the key and what is allowed
+
+    """
+    path = Path(path)
+    tree = read_yaml(path)
+    try:
+        return parse_map(tree, known)
+    except ParameterError as error:
+        raise ParameterError(f'{path}: {error}') from None
+
+
+def parse_map(tree: object, known: KnownSignals = NO_SIGNALS) -> ImportMap:
+    """
+    Check the plain data of a map; parameters as in `load_map`.
+
+    Raises
+    ------
+    ParameterError : an entry is missing, unknown or not allowed; the message names the key
+
+    """
+    top = mapping_of('the map', tree, _TOP)
+    texts = {key: _text(key, top[key]) for key in _TEXT_ENTRIES if key in top}
+    for key, allowed in (('delimiter', ',;\t| '), ('decimal', '.,')):
+        if key in texts and (len(texts[key]) != 1 or texts[key] not in allowed):
+            raise ParameterError(f'{key}: {quoted(texts[key])} given, allowed is one of '
+                                 + ' '.join(repr(c) for c in allowed))
+    if texts.get('decimal', '.') == texts.get('delimiter', ','):
+        raise ParameterError('decimal: the same as the delimiter')
+    try:
+        ''.encode(texts.get('encoding', 'utf-8'))
+    except (LookupError, ValueError, UnicodeError):
+        raise ParameterError(f'encoding: {quoted(texts["encoding"])} given, allowed is one that '
+                             'Python '
+                             'knows, such as utf-8 or latin-1') from None
+    skip = int(_SKIP_LINES.check('skip_lines', plain_value(  # type: ignore[arg-type]
+        top.get('skip_lines', 0))))
+    header = top.get('header', True)
+    if not isinstance(header, bool):
+        raise ParameterError(f'header: {quoted(plain_value(header))} given, allowed is true or '
+                             'false')
+    signals = {}
+    own = mapping_of('signals', top.get('signals'))
+    for name, body in own.items():
+        signal = known.aliases.get(str(name), str(name))
+        if signal in signals:
+            raise ParameterError(f'signals.{one_line(name)}: {signal} is given twice')
+        signals[signal] = _signal(f'signals.{one_line(name)}', signal, body, known)
+    if not signals:
+        raise ParameterError('signals: none is given')
+    return ImportMap(_time(top.get('time')), signals,
+                     Layout(**texts, skip_lines=skip, header=header), top)
+
+
+def _text(key: str, value: object, choices: tuple[str, ...] | None = None) -> str:
+    if choices is not None:
+        return str(Entry('', choices=choices).check(key, plain_value(value)))
+    if not isinstance(value, str) or not value:
+        raise ParameterError(f'{key}: {quoted(plain_value(value))} given, allowed is a text')
+    return value
+
+
+def _column(key: str, value: object) -> str | int:
+    """Return a column's name, or its place."""
+    if isinstance(value, int) and not isinstance(value, bool):
+        return int(_PLACE.check(key, plain_value(value)))  # type: ignore[arg-type]
+    if not isinstance(value, str) or not value:
+        raise ParameterError(f'{key}: {quoted(plain_value(value))} given, allowed is a text, or '
+                             'the number of a column, counted from 0')
+    return value
+
+
+def _time(body: object) -> TimeMap:
+    entries = mapping_of('time', body, _TIME)
+    return TimeMap(
+        _column('time.column', entries.get('column')),
+        _text('time.unit', entries.get('unit', 's'), (*TIME_UNITS, ISO_8601)),
+        nanoseconds(_number('time.offset_s', entries.get('offset_s', 0), 'clock_offset_s')),
+        _text('time.origin', entries.get('origin', 'keep'), ('keep', 'first')) == 'first',
+        _text('time.duplicates', entries.get('duplicates', 'refuse'),
+              ('refuse', 'first', 'last')))
+
+
+def _number(key: str, value: object, entry: str) -> float:
+    return float(_NUMBERS[entry].check(key, plain_value(value)))  # type: ignore[arg-type]
+
+
+def _signal(key: str, name: str, body: object, known: KnownSignals) -> SignalMap:
+    unit = known.units.get(name, '')
+    if not unit:
+        if name.partition('/')[0] in {other.partition('/')[0] for other in known.units}:
+            raise ParameterError(f'{key}: {known.owner} has no such signal'
+                                 f'{nearest(name, known.units)}')
+        try:
+            check_name(name)
+        except RecordingError as error:
+            raise ParameterError(f'signals: {error}') from None
+    entries = mapping_of(key, body, _SIGNAL)
+    numbers = {entry: _number(f'{key}.{entry}', entries[entry], entry)
+               for entry in _NUMBERS if entry in entries}
+    sign = entries.get('sign', 1)
+    if isinstance(sign, bool) or sign not in (1, -1):
+        raise ParameterError(f'{key}.sign: {quoted(plain_value(sign))} given, allowed is 1 or -1')
+    written = _text(f'{key}.unit', entries.get('unit', unit or None),
+                    (*UNITS, COUNTS))
+    if written == COUNTS:
+        if 'counts_per_revolution' in numbers:
+            si, factor = 'rad', 2 * math.pi / numbers['counts_per_revolution']
+        else:  # counts of a converter: the scale says what one is
+            if 'scale' not in numbers:
+                raise ParameterError(f'{key}: counts need counts_per_revolution (an angle) or '
+                                     'scale (anything else, in SI units for each count)')
+            si, factor = unit or '1', 1.0
+    else:
+        if 'counts_per_revolution' in numbers:
+            raise ParameterError(f'{key}.counts_per_revolution: goes with the unit counts only')
+        si, factor = UNITS[written]
+    if unit and si != unit:
+        known = [text for text, (target, _) in UNITS.items() if target == unit]
+        raise ParameterError(f'{key}.unit: {quoted(written)} given, but {name} is in {unit}; '
+                             'allowed is '
+                             f'one of {", ".join((*known, COUNTS))}')
+    own_time = entries.get('time_column')
+    return SignalMap(
+        _expression(key, entries), si, factor,
+        float(sign) * numbers.get('scale', 1.0), numbers.get('offset', 0.0),
+        None if own_time is None else _column(f'{key}.time_column', own_time),
+        nanoseconds(numbers.get('clock_offset_s', 0.0)), _sign_bit(key, entries))
+
+
+def _expression(key: str, entries: Mapping[str, Any]) -> Expression:
+    """Return what a signal is in the columns of the file."""
+    index = _whole(key, 'index', entries)
+    if 'expression' not in entries:
+        return Expression.of_column(Reference(_column(f'{key}.column', entries.get('column')),
+                                              index))
+    for entry in ('column', *_WHOLE_NUMBERS):
+        if entry in entries:
+            raise ParameterError(f'{key}.{entry}: does not go with expression')
+    if 'unit' not in entries:
+        raise ParameterError(f'{key}.unit: an expression needs the unit of its result')
+    found = parse_expression(f'{key}.expression',
+                             _text(f'{key}.expression', entries['expression']))
+    if not found.references:
+        raise ParameterError(f'{key}.expression: names no column')
+    return found
+
+
+def _whole(key: str, entry: str, entries: Mapping[str, Any]) -> int | None:
+    if entry not in entries:
+        return None
+    return int(_WHOLE_NUMBERS[entry].check(  # type: ignore[arg-type]
+        f'{key}.{entry}', plain_value(entries[entry])))
+
+
+def _sign_bit(key: str, entries: Mapping[str, Any]) -> int:
+    bits = _whole(key, 'sign_magnitude_bits', entries)
+    return 0 if bits is None else 1 << (bits - 1)

@@ -1,0 +1,201 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A number that a row of a file gives: a column, or a small expression over columns.
+
+An expression is parsed with Python's own grammar, and only the parts listed here are allowed. It
+is never evaluated as a program. Names are columns, as the file writes them. `v[2]` is the third
+number of a column of vectors. `column('T (ms)')` is a column whose name is no word, and
+`column(0)` is the first column of the file.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+import math
+import operator
+
+from simgap.errors import one_line
+from simgap.inputs.schema import nearest, ParameterError
+
+LONGEST = 1000       # characters
+MOST_COLUMNS = 10_000
+_DEEPEST = 60        # nested parts
+_COLUMN = 'column'
+
+OPERATORS: dict[type[ast.operator], Callable[[float, float], float]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
+    ast.Div: operator.truediv, ast.Mod: operator.mod, ast.Pow: math.pow,
+}
+SIGNS: dict[type[ast.unaryop], Callable[[float], float]] = {
+    ast.UAdd: operator.pos, ast.USub: operator.neg,
+}
+# Function and number of arguments; angles are in radians.
+FUNCTIONS: dict[str, tuple[Callable[..., float], int]] = {
+    'abs': (abs, 1), 'sqrt': (math.sqrt, 1), 'exp': (math.exp, 1), 'log': (math.log, 1),
+    'sin': (math.sin, 1), 'cos': (math.cos, 1), 'tan': (math.tan, 1), 'asin': (math.asin, 1),
+    'acos': (math.acos, 1), 'atan': (math.atan, 1), 'atan2': (math.atan2, 2),
+    'tanh': (math.tanh, 1), 'hypot': (math.hypot, 2), 'floor': (lambda x: float(math.floor(x)), 1),
+    'min': (min, 2), 'max': (max, 2),
+    'sign': (lambda x: float((x > 0.0) - (x < 0.0)), 1),
+}
+CONSTANTS = {'pi': math.pi}
+
+_Term = Callable[[Sequence[float]], float]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """
+    A column of a file.
+
+    Attributes
+    ----------
+    column : its name, or its place, counted from 0
+    index : which number of a vector in a cell, counted from 0; None for a cell with one number
+
+    """
+
+    column: str | int
+    index: int | None = None
+
+    def __str__(self) -> str:
+        """Return the column as a person would call it."""
+        column = self.column if isinstance(self.column, str) else f'number {self.column}'
+        return column if self.index is None else f'{column}[{self.index}]'
+
+
+@dataclass(frozen=True)
+class Expression:
+    """
+    A number as a function of columns.
+
+    Attributes
+    ----------
+    references : the columns, each of them once
+    value : returns the number from those of the columns, in this order; ArithmeticError or
+        ValueError where it has none, such as 1 / 0
+
+    """
+
+    references: tuple[Reference, ...]
+    value: _Term
+
+    @classmethod
+    def of_column(cls, reference: Reference) -> Expression:
+        """Return a column as it is."""
+        return cls((reference,), operator.itemgetter(0))
+
+
+def parse_expression(key: str, text: str) -> Expression:
+    """
+    Read an expression.
+
+    Parameters
+    ----------
+    key
+        of the entry, for errors
+    text
+        such as '0.1 * current - 0.02 * sign(rate)'
+
+    Raises
+    ------
+    ParameterError : it is none, or holds what is not allowed; the message names the key
+
+    """
+    if len(text) > LONGEST:
+        raise ParameterError(f'{key}: {len(text)} characters given, allowed are {LONGEST}')
+    try:
+        tree = ast.parse(text.strip(), mode='eval').body
+    except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
+        said = error.msg if isinstance(error, SyntaxError) else error
+        raise ParameterError(f'{key}: {one_line(repr(text), 60)} is no expression, '
+                             f'{one_line(str(said) or "nested too deeply")}') from None
+    parser = _Parser(key, text.strip())
+    value = parser.term(tree, 0)
+    return Expression(tuple(parser.places), value)
+
+
+class _Parser:
+    """Turns the parts of a syntax tree into functions, and collects the columns."""
+
+    def __init__(self, key: str, text: str) -> None:
+        self.places: dict[Reference, int] = {}
+        self._key, self._text = key, text
+
+    def term(self, node: ast.expr, depth: int) -> _Term:
+        """Return a part of an expression as a function of the columns' numbers."""
+        if depth > _DEEPEST:
+            raise ParameterError(f'{self._key}: nested too deeply, allowed are {_DEEPEST} levels')
+        if isinstance(node, ast.Constant):
+            return self._constant(node)
+        if isinstance(node, ast.Name) and node.id in CONSTANTS:
+            constant = CONSTANTS[node.id]
+            return lambda numbers: constant
+        if isinstance(node, ast.UnaryOp) and type(node.op) in SIGNS:
+            sign, operand = SIGNS[type(node.op)], self.term(node.operand, depth + 1)
+            return lambda numbers: sign(operand(numbers))
+        if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
+            combined = OPERATORS[type(node.op)]
+            left, right = self.term(node.left, depth + 1), self.term(node.right, depth + 1)
+            return lambda numbers: combined(left(numbers), right(numbers))
+        if isinstance(node, ast.Call) and self._name(node.func) in FUNCTIONS:
+            return self._call(node, depth)
+        place = self.places.setdefault(self._reference(node), len(self.places))
+        return lambda numbers: numbers[place]
+
+    def _constant(self, node: ast.Constant) -> _Term:
+        given = node.value
+        if isinstance(given, bool) or not isinstance(given, (int, float)):
+            raise self._refused(node)
+        try:
+            value = float(given)
+        except OverflowError:
+            raise self._refused(node) from None
+        if not math.isfinite(value):
+            raise self._refused(node)
+        return lambda numbers: value
+
+    def _call(self, node: ast.Call, depth: int) -> _Term:
+        name = self._name(node.func)
+        function, count = FUNCTIONS[name]
+        if len(node.args) != count or node.keywords:
+            raise ParameterError(f'{self._key}: {name} takes {count} '
+                                 f'{"number" if count == 1 else "numbers"}')
+        terms = [self.term(argument, depth + 1) for argument in node.args]
+        if count == 1:
+            [only] = terms
+            return lambda numbers: function(only(numbers))
+        return lambda numbers: function(*[term(numbers) for term in terms])
+
+    def _reference(self, node: ast.expr) -> Reference:
+        """Return the column that a part names."""
+        if isinstance(node, ast.Subscript):
+            index = node.slice.value if isinstance(node.slice, ast.Constant) else None
+            inner = self._reference(node.value)
+            if type(index) is not int or inner.index is not None:
+                raise self._refused(node)
+            return Reference(inner.column, index)
+        if isinstance(node, ast.Name):
+            return Reference(node.id)
+        if (isinstance(node, ast.Call) and self._name(node.func) == _COLUMN
+                and len(node.args) == 1 and not node.keywords):
+            [argument] = node.args
+            column = argument.value if isinstance(argument, ast.Constant) else None
+            if type(column) is str or type(column) is int and 0 <= column < MOST_COLUMNS:
+                return Reference(column)
+        raise self._refused(node)
+
+    @staticmethod
+    def _name(node: ast.expr) -> str:
+        return node.id if isinstance(node, ast.Name) else ''
+
+    def _refused(self, node: ast.expr) -> ParameterError:
+        called = self._name(node.func) if isinstance(node, ast.Call) else ''
+        part = ast.get_source_segment(self._text, node) or self._text
+        return ParameterError(
+            f'{self._key}: {one_line(repr(part), 60)} is not allowed'
+            f'{nearest(called, FUNCTIONS) if called else ""}; allowed are columns, numbers, '
+            f'+ - * / % **, {", ".join([*CONSTANTS, *FUNCTIONS])}, v[0] and {_COLUMN}("name")')

@@ -1,0 +1,261 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""Logs of tests, as they come from a file or from Python, and the test that a simulation gets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+import math
+from pathlib import Path
+
+import numpy as np
+from simgap.errors import UserError
+from simgap.inputs.labels import parse_labels, plain_value
+from simgap.inputs.limits import SAMPLES
+from simgap.inputs.plain_yaml import read_yaml
+from simgap.inputs.schema import Entry, mapping_of, nearest, ParameterError
+from simgap.logs.channel import NANOSECONDS, RecordingError
+from simgap.logs.column_map import ImportMap, load_map
+from simgap.logs.mapped import read_mapped
+from simgap.logs.tables import open_table, Text
+from simgap.logs.text import Cell, parse_number
+from simgap.machine.contract import FloatArray
+
+_TIME = ('time_s', 'time', 't')
+_LEAST_SAMPLES = 2
+_CONSTANT = Entry('')
+
+
+class LogError(UserError):
+    """A log cannot be used; the message names file, column and remedy."""
+
+
+@dataclass(frozen=True)
+class Log:
+    """
+    What was recorded in one test.
+
+    Attributes
+    ----------
+    name : for people
+    time : of the samples, rising, shape (n,) [s]
+    columns : shape (n,) each, as recorded; NaN where there is no sample
+    constants : what the tester knows of this test, such as a mass
+    labels : what was different in this test, such as load: A
+
+    """
+
+    name: str
+    time: FloatArray
+    columns: Mapping[str, FloatArray]
+    constants: Mapping[str, float] = field(default_factory=dict)
+    labels: Mapping[str, str] = field(default_factory=dict)
+    _held: dict[str, FloatArray] = field(init=False, repr=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """
+        Make the samples arrays of numbers.
+
+        Raises
+        ------
+        LogError : the time does not rise, or a column has another number of samples
+
+        """
+        time = np.array(self.time, float)
+        if time.ndim != 1 or time.size < _LEAST_SAMPLES or not np.all(np.diff(time) > 0.0):
+            raise LogError(f'{self.name}: time: two or more increasing times are needed')
+        columns = {name: np.array(values, float) for name, values in self.columns.items()}
+        for name, values in columns.items():
+            if values.shape != time.shape:
+                raise LogError(f'{self.name}: {name}: shape {values.shape} given, allowed is '
+                               f'{time.shape}, as the time has')
+        object.__setattr__(self, 'time', time)
+        object.__setattr__(self, 'columns', columns)
+        object.__setattr__(self, '_held', {name: _held(v) for name, v in columns.items()})
+
+    def __getitem__(self, column: str) -> FloatArray:
+        """
+        Return a column, shape (n,); where it has no sample, the last one before holds.
+
+        Raises
+        ------
+        LogError : there is no such column
+
+        """
+        try:
+            return self._held[column]
+        except KeyError:
+            raise LogError(f'{self.name}: no column {column}{nearest(column, self.columns)}; '
+                           f'there are {", ".join(self.columns)}') from None
+
+
+@dataclass(frozen=True)
+class OneTest:
+    """
+    What a simulation gets of a test.
+
+    Attributes
+    ----------
+    log : the test's log, perhaps only its beginning
+    push : what enters at each place of the model, shape (n,); zero unless something does
+
+    """
+
+    log: Log
+    push: Mapping[str, FloatArray]
+
+    @property
+    def name(self) -> str:
+        """Return the test's name."""
+        return self.log.name
+
+    @property
+    def time(self) -> FloatArray:
+        """Return the times of the samples, shape (n,) [s]."""
+        return self.log.time
+
+    @property
+    def constants(self) -> Mapping[str, float]:
+        """Return what the tester knows of this test."""
+        return self.log.constants
+
+    def __getitem__(self, column: str) -> FloatArray:
+        """Return a column of the log, shape (n,)."""
+        return self.log[column]
+
+
+def beginning(log: Log, until: float) -> Log:
+    """Return a log's samples up to a time after its first [s]."""
+    count = max(int(np.searchsorted(log.time, log.time[0] + until, side='right')),
+                _LEAST_SAMPLES)
+    if count >= log.time.size:
+        return log
+    return Log(log.name, log.time[:count],
+               {name: values[:count] for name, values in log.columns.items()},
+               log.constants, log.labels)
+
+
+def read_log(path: str | Path, import_map: ImportMap | None = None) -> Log:
+    """
+    Read a log, and NAME.yaml beside it if it is there: constants and labels of the test.
+
+    Parameters
+    ----------
+    path
+        a file of any kind that `recording.tables` knows; without a map its columns keep their
+        names, and time_s, time or t is the time
+    import_map
+        which column is which, and how it is written
+
+    Raises
+    ------
+    LogError, RecordingError : a cell, a row or a column cannot be read; one line says where
+
+    """
+    path = Path(path)
+    time, columns = _mapped(path, import_map) if import_map else _plain(path)
+    constants, labels = _sheet(path.with_suffix('.yaml'))
+    try:
+        return Log(path.stem, time, columns, constants, labels)
+    except LogError as error:
+        raise LogError(f'{path}: {str(error).partition(": ")[2]}') from None
+
+
+def read_logs(paths: Sequence[str | Path], map_path: str | Path | None = None) -> list[Log]:
+    """
+    Read several files with one map.
+
+    Raises
+    ------
+    LogError, RecordingError, ParameterError : as `read_log` and `load_map`; two files of one name
+
+    """
+    import_map = load_map(map_path) if map_path else None
+    logs = [read_log(path, import_map) for path in paths]
+    names = [log.name for log in logs]
+    for name in names:
+        if names.count(name) > 1:
+            raise LogError(f'{name}: two files of this name are given; rename one of them')
+    return logs
+
+
+def _plain(path: Path) -> tuple[FloatArray, dict[str, FloatArray]]:
+    with open_table(path) as table:
+        names = list(table.names)
+        if len(set(names)) < len(names):
+            raise LogError(f'{path}: {table.start}' + (
+                'a column is there twice' if any(names) else
+                'the columns have no names; --map says which is which'))
+        cells: dict[str, list[float]] = {name: [] for name in names}
+        room = SAMPLES.value()
+        for line, row in table.rows:
+            room -= len(names)
+            if room < 0:
+                raise RecordingError(f'{path}: {table.counted} {line}: {SAMPLES.exceeded()}')
+            for name, given in zip(names, row, strict=True):
+                if name not in cells:
+                    continue
+                try:
+                    cells[name].append(_number(given, Cell(path, line, name, table.counted)))
+                except RecordingError:
+                    if table.is_text:
+                        raise
+                    del cells[name]  # a column of another kind beside the numbers
+    return _with_time(path, {name: np.array(values[:table.lengths.get(name)])
+                             for name, values in cells.items()})
+
+
+def _number(given: Text, cell: Cell) -> float:
+    """Return the number in a cell; NaN if it is empty."""
+    if isinstance(given, list):
+        raise cell.refuse('a vector; --map takes numbers out of vectors')
+    text = given.strip()
+    return parse_number(text, cell) if text else math.nan
+
+
+def _with_time(path: Path, columns: dict[str, FloatArray],
+               ) -> tuple[FloatArray, dict[str, FloatArray]]:
+    time = next((name for name in _TIME if name in columns), '')
+    if not time:
+        raise LogError(f'{path}: no column {" or ".join(_TIME)}; with --map another column '
+                       'is the time')
+    return columns.pop(time), columns
+
+
+def _mapped(path: Path, import_map: ImportMap) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Read a file with a map; the signal with most samples gives the times."""
+    channels = read_mapped(path, import_map)
+    stamps = max((channel.time_ns for channel in channels.values()), key=len)
+    if len(stamps) < _LEAST_SAMPLES:
+        raise LogError(f'{path}: fewer than {_LEAST_SAMPLES} samples')
+    columns = {}
+    for name, channel in channels.items():
+        columns[name] = np.full(len(stamps), np.nan)
+        place = np.searchsorted(stamps, channel.time_ns)
+        columns[name][np.minimum(place, len(stamps) - 1)] = channel.values
+    return stamps / NANOSECONDS, columns
+
+
+def _sheet(path: Path) -> tuple[dict[str, float], dict[str, str]]:
+    """Return constants and labels of a test sheet, if there is one."""
+    if not path.is_file():
+        return {}, {}
+    try:
+        top = mapping_of('', read_yaml(path), ('constants', 'labels'))
+        constants = mapping_of('constants', top.get('constants', {}))
+        labels = dict(parse_labels('labels', top.get('labels', {})))
+        numbers = {name: float(_CONSTANT.check(f'constants.{name}', plain_value(  # type: ignore
+            value))) for name, value in constants.items()}
+    except ParameterError as error:
+        raise LogError(f'{path}: {error}') from None
+    return numbers, labels
+
+
+def _held(values: FloatArray) -> FloatArray:
+    """Return values with the last one before in the place of each that is missing."""
+    there = np.isfinite(values)
+    if there.all() or not there.any():
+        return values
+    last = np.maximum.accumulate(np.where(there, np.arange(values.size), 0))
+    return np.where(np.isfinite(values[last]), values[last], values[there][0])

@@ -1,0 +1,160 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""Text files of numbers: rows of cells, and the number or the time stamp in each cell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import csv
+from decimal import Decimal
+import math
+from pathlib import Path
+import re
+from typing import NamedTuple, TextIO
+import warnings
+
+from simgap.errors import one_line
+from simgap.inputs.limits import CSV_LINE, TEXT
+from simgap.logs.channel import NANOSECONDS, RecordingError, RecordingWarning
+
+_NUMBER = re.compile(r'[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?', re.ASCII)
+_LATEST_S = 9.2e9  # what 64 bits of nanoseconds hold
+
+
+class Cell(NamedTuple):
+    """Where in a file a number stands, for the message if it is none."""
+
+    path: Path
+    line: int
+    column: str
+    counted: str = 'line'
+
+    def refuse(self, problem: str) -> RecordingError:
+        """Return the error that names the place."""
+        column = one_line(self.column, 60)
+        return RecordingError(
+            f'{self.path}: {self.counted} {self.line}, column {column}: {problem}')
+
+
+def parse_number(text: str, cell: Cell) -> float:
+    """
+    Read one number.
+
+    Raises
+    ------
+    RecordingError : no finite number; the message names file, line and column
+
+    """
+    if not _NUMBER.fullmatch(text):
+        raise cell.refuse(f'{one_line(repr(text), 40)} is no number; leave the cell empty where '
+                          'there is no sample')
+    value = float(text)
+    if not math.isfinite(value):
+        raise cell.refuse(f'{one_line(repr(text), 40)} is too large a number')
+    return value
+
+
+def parse_nanoseconds(text: str, cell: Cell, per_unit: int = NANOSECONDS) -> int:
+    """
+    Read a time stamp, exact up to the nanosecond that it is rounded to.
+
+    Parameters
+    ----------
+    text
+        decimal number
+    cell
+        where it stands
+    per_unit
+        nanoseconds in the unit of the number; seconds if not given
+
+    Raises
+    ------
+    RecordingError : no number, or beyond 9.2e9 s; the message names file, line and column
+
+    """
+    value = parse_number(text, cell)
+    if abs(value) * per_unit > _LATEST_S * NANOSECONDS:
+        raise cell.refuse(f'{one_line(repr(text), 40)} is beyond {_LATEST_S:g} s')
+    return int((Decimal(text) * per_unit).to_integral_value())
+
+
+def format_nanoseconds(stamp: int) -> str:
+    """Return a time stamp in seconds: all its nanoseconds, no idle zeros."""
+    whole, rest = divmod(abs(stamp), NANOSECONDS)
+    fraction = f'{rest:09d}'.rstrip('0') or '0'
+    return f'{"-" if stamp < 0 else ""}{whole}.{fraction}'
+
+
+def rows(path: Path, stream: TextIO, delimiter: str = ',') -> Iterator[tuple[int, list[str]]]:
+    """
+    Yield the rows of a CSV file with the number of the line that each ends on.
+
+    Empty lines are left out. Warns if the last line is not ended: it may have been cut.
+
+    Raises
+    ------
+    RecordingError : no CSV, no text or too long a line; the message names file and line
+
+    """
+    last = ''
+
+    longest = CSV_LINE.value()
+
+    def lines() -> Iterator[str]:
+        nonlocal last
+        while line := stream.readline(longest + 1):
+            if len(line) > longest:
+                raise RecordingError(f'{path}: line {reader.line_num + 1}: '
+                                     f'{CSV_LINE.exceeded()}')
+            last = line
+            yield line
+
+    reader = csv.reader(lines(), delimiter=delimiter, strict=True)
+    while True:
+        try:
+            row = next(reader)
+        except StopIteration:
+            break
+        except csv.Error as error:
+            raise RecordingError(f'{path}: line {reader.line_num}: no CSV, {error}') from None
+        except UnicodeDecodeError:
+            raise RecordingError(f'{path}: after line {reader.line_num}: no text in '
+                                 f'{stream.encoding}') from None
+        if row:
+            yield reader.line_num, row
+    if last and not last.endswith(('\n', '\r')):
+        warnings.warn(f'{path}: line {reader.line_num} is not ended; was the file cut there?',
+                      RecordingWarning, stacklevel=2)
+
+
+def open_text(path: Path, encoding: str = 'utf-8-sig') -> TextIO:
+    """
+    Open a file for the csv module.
+
+    Raises
+    ------
+    RecordingError : it cannot be opened
+
+    """
+    try:
+        return open(path, encoding=encoding, newline='')
+    except OSError as error:
+        raise RecordingError(f'{path}: {error.strerror}') from error
+
+
+def read_text(path: Path) -> bytes:
+    """
+    Read a file of text that lies beside a recording.
+
+    Raises
+    ------
+    OSError : it cannot be read
+    RecordingError : it is longer than allowed
+
+    """
+    most = TEXT.value()
+    with path.open('rb') as file:
+        text = file.read(most + 1)
+    if len(text) > most:
+        raise RecordingError(f'{path}: {TEXT.exceeded()}')
+    return text

@@ -1,0 +1,252 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A machine whose effects may differ between labels of its tests.
+
+A label says what was different in a test: compensation on or off, load A or B, before or after a
+repair. An effect then has one more form for each label: a size of its own under each value. That
+form pays for each of its numbers, so it is chosen only where the sizes differ. An effect that
+exists under one value only, or has another sign under each, is found by it: with one size for all
+tests, the fit would give half the size, or none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+import math
+from statistics import fmean
+
+from simgap.machine.contract import (
+    Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Point, Regimes,
+    TimeScales,
+)
+
+# The values of a label by test; '' where a test lacks the label.
+Groups = Mapping[str, tuple[str, ...]]
+
+
+def groups_of(experiments: Sequence[Experiment]) -> dict[str, tuple[str, ...]]:
+    """
+    Return the labels with two or more values, with the value of each test.
+
+    Labels that divide the tests alike cannot be told apart: the first of them counts.
+    """
+    found: dict[str, tuple[str, ...]] = {}
+    seen = set()
+    for key in dict.fromkeys(key for e in experiments for key in e.labels):
+        values = tuple(e.labels.get(key, '') for e in experiments)
+        division = tuple(map(values.index, values))
+        if len(set(values)) > 1 and division not in seen:
+            seen.add(division)
+            found[key] = values
+    return found
+
+
+def by_label(machine: Machine) -> Machine:
+    """Return a machine whose effects may differ between labels; itself if there are none."""
+    groups = groups_of(machine.experiments)
+    return ByLabel(machine, groups, {}) if groups else machine
+
+
+def without_labels(machine: Machine) -> Machine:
+    """Return the machine as it was before `by_label`."""
+    return machine.inner if isinstance(machine, ByLabel) else machine
+
+
+def split(form: Form, key: str, values: Sequence[str]) -> Form:
+    """Return a form with sizes of its own under each value of a label, and one shape."""
+    sizes = [replace(p, name=_split_name(p.name, key, value), label=(key, value))
+             for value in dict.fromkeys(values) for p in form.sizes]
+    return replace(form, name=f'{form.name} by {key}'.strip(), parameters=(
+        *sizes, *(p for p in form.parameters if p.is_shape)))
+
+
+def _split_name(name: str, key: str, value: str) -> str:
+    return f'{name}[{key}={value}]'
+
+
+class ByLabel(Machine):
+    """
+    A machine with a further form of each effect for each label.
+
+    Parameters
+    ----------
+    inner
+        the machine
+    groups
+        from `groups_of`
+    whole
+        the form that each split form comes from, and the label; grows as forms are split
+
+    """
+
+    def __init__(self, inner: Machine, groups: Groups,
+                 whole: dict[Form, tuple[Form, str]]) -> None:
+        """Take over what the machine says of itself."""
+        super().__init__(inner.experiments, inner.nuisances, inner.effects.values())
+        self.inner, self.groups, self._whole = inner, groups, whole
+        self.disturbance_inputs, self.notes = inner.disturbance_inputs, inner.notes
+        self.diagram, self.advice = inner.diagram, inner.advice
+        self._own = {p.name for p in inner.nuisances}
+        self._endings = {_split_name('', key, value): (key, value)
+                         for key, values in groups.items() for value in values}
+
+    def base_of(self, form: Form) -> Form:
+        """Return the form that a split form comes from; any other form itself."""
+        return self._whole.get(form, (form, ''))[0]
+
+    def split(self, form: Form, key: str) -> Form:
+        """Return a form with sizes of its own under each value of a label."""
+        found = split(form, key, self.groups[key])
+        self._whole[found] = (form, key)
+        return found
+
+    # -- points --------------------------------------------------------------------------------
+
+    def _parts(self, name: str) -> tuple[str, tuple[str, str] | None]:
+        """Return the machine's own name of a number, and the label of its tests."""
+        if name.endswith(']') and name not in self._own:
+            for ending, label in self._endings.items():
+                if name.endswith(ending):
+                    return name.removesuffix(ending), label
+        return name, None
+
+    def at(self, point: Point, labels: Mapping[str, str]) -> dict[str, float]:
+        """Return a point as it is in a test with some labels, in the machine's own names."""
+        found, special = {}, {}
+        for name, value in point.items():
+            base, label = self._parts(name)
+            if label is None:
+                found[base] = value
+            elif labels.get(label[0], '') == label[1]:
+                special[base] = value
+        return {**found, **special}
+
+    def in_test(self, point: Point, experiment: int) -> dict[str, float]:
+        """Return a point as it is in one test, in the machine's own names."""
+        return self.at(point, self.experiments[experiment].labels)
+
+    def _is_split(self, point: Point) -> bool:
+        return any(self._parts(name)[1] is not None for name in point)
+
+    # -- readings ------------------------------------------------------------------------------
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return the readings of one test; see `Machine.predict`."""
+        return self.inner.predict(self.in_test(point, experiment), experiment)
+
+    def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
+                 until: float = math.inf) -> list[list[FloatArray | None]]:
+        """Return the readings of several variants; see `Machine.simulate`."""
+        count = len(self.experiments)
+        jobs: list[tuple[int, Point, int | None]] = []
+        for i, (point, one) in enumerate(zip(points, only or [None] * len(points), strict=True)):
+            if self._is_split(point):
+                jobs += [(i, self.in_test(point, k), k)
+                         for k in (range(count) if one is None else (one,))]
+            else:
+                jobs.append((i, point, one))
+        found = self.inner.simulate([point for _, point, _ in jobs], [k for *_, k in jobs], until)
+        rows: list[list[FloatArray | None]] = [[None] * count for _ in points]
+        for (i, _, one), row in zip(jobs, found, strict=True):
+            for k in range(count) if one is None else (one,):
+                rows[i][k] = row[k]
+        return rows
+
+    def simulate_disturbed(self, point: Point, place: DisturbanceInput,
+                           course: Course) -> list[FloatArray]:
+        """Return the readings with an unknown input; see `Machine.simulate_disturbed`."""
+        if not self._is_split(point):
+            return self.inner.simulate_disturbed(point, place, course)
+        return [self.inner.simulate_disturbed(self.in_test(point, k), place, course)[k]
+                for k in range(len(self.experiments))]
+
+    # -- variants of the machine ---------------------------------------------------------------
+
+    def _around(self, inner: Machine) -> Machine:
+        return self if inner is self.inner else ByLabel(inner, self.groups, self._whole)
+
+    def truncated(self) -> Machine:
+        """Return the machine with as much of each test as a search needs."""
+        return self._around(self.inner.truncated())
+
+    def low_fidelity(self) -> Machine:
+        """Return a faster machine."""
+        return self._around(self.inner.low_fidelity())
+
+    def with_experiments(self, experiments: Sequence[Experiment]) -> Machine:
+        """Return the machine with the same tests, of which more is known."""
+        return self._around(self.inner.with_experiments(experiments))
+
+    def without(self, effects: Collection[str]) -> Machine:
+        """Return the machine with a catalogue that lacks some effects."""
+        return self._around(self.inner.without(effects))
+
+    def with_noise_at(self, point: Point) -> Machine:
+        """Return the machine with the noise of a motion; sizes count with their mean."""
+        return self._around(self.inner.with_noise_at(self.mean(point)))
+
+    def mean(self, point: Point) -> dict[str, float]:
+        """Return a point with one size for all tests, the mean of those by label."""
+        parts: dict[str, list[float]] = {}
+        for name, value in point.items():
+            parts.setdefault(self._parts(name)[0], []).append(value)
+        return {name: fmean(values) for name, values in parts.items()}
+
+    # -- what the machine knows better ---------------------------------------------------------
+
+    @property
+    def time_scales(self) -> TimeScales:
+        """Return how fast the machine is."""
+        return self.inner.time_scales
+
+    def initial_conditions(self, experiment: int) -> Sequence[Sequence[Point]]:
+        """Return initial conditions that are tried out before a fit."""
+        return self.inner.initial_conditions(experiment)
+
+    def regimes(self, experiment: int) -> Regimes:
+        """Return the regime of motion of each sample."""
+        return self.inner.regimes(experiment)
+
+    def covariates(self, experiment: int) -> Mapping[str, FloatArray]:
+        """Return quantities that a residual may depend on."""
+        return self.inner.covariates(experiment)
+
+    def forms(self, effect: Effect, residuals: Sequence[FloatArray]) -> Sequence[Form]:
+        """Return the forms that are worth a fit, with one size for all tests and split."""
+        whole = self.inner.forms(effect, residuals)
+        return [*whole, *(self.split(form, key) for form in whole if _can_be_split(form)
+                          for key in self.groups)]
+
+    def typical_form(self, effect: Effect) -> Form:
+        """Return the form of an effect by which planned tests are judged."""
+        return self.inner.typical_form(effect)
+
+    def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
+        """Return the form of an effect's part that corresponds to a form of the effect."""
+        base, key = self._whole.get(form, (form, ''))
+        found = self.inner.counterpart(base, effect, part)
+        return self.split(found, key) if key else found
+
+    def absorb(self, point: Point, removed: Point) -> dict[str, float]:
+        """Return the nuisances that take over what they can; sizes count with their mean."""
+        return self.inner.absorb(point, self.mean(removed))
+
+    def take_over(self, point: Point, forms: Sequence[Form]) -> tuple[dict[str, float], set[str]]:
+        """Return a point at which effects alone stand for their numbers, under each label."""
+        bases = [self.base_of(form) for form in forms]
+        result, held = dict(point), set[str]()
+        for k in range(len(self.experiments)):
+            found, names = self.inner.take_over(self.in_test(point, k), bases)
+            result.update({name: value for name, value in found.items() if name in result})
+            held |= names
+            for p in (p for form in forms for p in form.parameters):
+                base, label = self._parts(p.name)
+                if label is None or self.groups[label[0]][k] == label[1]:
+                    result[p.name] = found[base]
+        return result, held
+
+
+def _can_be_split(form: Form) -> bool:
+    return not form.is_course and all(p.experiment is None for p in form.parameters)

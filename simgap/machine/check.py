@@ -1,0 +1,167 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a machine keeps its contract: what is missing or wrong is told by name, before a fit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+import math
+
+import numpy as np
+from simgap.errors import UserError
+from simgap.machine.contract import Effect, Experiment, Form, Machine, Parameter
+
+_RESERVED = ('none', 'unknown')
+
+
+class MachineError(UserError):
+    """A machine breaks the contract of `Machine`; the message names the part that does."""
+
+
+def check_machine(machine: Machine) -> None:
+    """
+    Check what a machine declares, and what it predicts without any effect.
+
+    Raises
+    ------
+    MachineError : something is missing or wrong
+
+    """
+    if not machine.experiments:
+        raise MachineError('experiments: there is none')
+    for k, experiment in enumerate(machine.experiments):
+        _check_experiment(experiment, machine.experiments[0])
+        if experiment.name in [other.name for other in machine.experiments[:k]]:
+            raise MachineError(f'experiment {experiment.name}: the name is there twice')
+    count = len(machine.experiments)
+    nuisances = [p.name for p in machine.nuisances]
+    for number, item in enumerate(machine.nuisances):
+        _check_parameter('nuisance', item, count)
+        if item.name in nuisances[:number]:
+            raise MachineError(f'nuisance {item.name}: the name is there twice')
+    for key, effect in machine.effects.items():
+        _check_effect(key, effect, machine, count)
+    if len(machine.nuisances) == 0 and not machine.effects:
+        raise MachineError('neither nuisances nor effects: nothing may differ from the model')
+    predicted = machine.simulate([{}])[0]
+    for experiment, readings in zip(machine.experiments, predicted, strict=True):
+        _check_readings(experiment, readings)
+
+
+def idle_effects(machine: Machine) -> Iterator[str]:
+    """
+    Yield what is wrong with effects in these experiments, an effect a line.
+
+    Each effect is simulated: one that changes no reading at half of its bounds cannot be found,
+    and one that changes a reading while its size is zero is not neutral.
+    """
+    neutral = machine.simulate([{}])[0]
+    for effect in machine.effects.values():
+        form = machine.typical_form(effect)
+        points = [form.start, *({**form.start, p.name: 0.5 * bound}
+                                for p in form.sizes for bound in (p.low, p.high) if bound)]
+        changes = [_change(machine, neutral, readings) for readings in machine.simulate(points)]
+        if changes[0] > 1e-6:
+            yield (f'effect {effect.id}: changes a reading by {changes[0]:.3g} standard '
+                   'deviations while its size is zero')
+        if max(changes[1:], default=0.0) == 0.0:
+            yield f'effect {effect.id}: changes no reading in these experiments'
+
+
+def _change(machine: Machine, neutral: Iterable[np.ndarray | None],  # type: ignore[type-arg]
+            readings: Iterable[np.ndarray | None]) -> float:  # type: ignore[type-arg]
+    found = 0.0
+    for experiment, before, after in zip(machine.experiments, neutral, readings, strict=True):
+        assert before is not None and after is not None
+        change = np.abs(after - before) / experiment.noise
+        found = max(found, float(np.nan_to_num(change, nan=math.inf).max(initial=0.0)))
+    return found
+
+
+def _check_experiment(item: Experiment, first: Experiment) -> None:
+    name = f'experiment {item.name}'
+    n, c = item.time.size, len(item.channels)
+    if item.time.shape != (n,) or n < 2 or not np.all(np.diff(item.time) > 0.0):
+        raise MachineError(f'{name}: time: {item.time.shape} given, allowed are two or more '
+                           'increasing times, shape (n,)')
+    if len(item.units) != c or c == 0:
+        raise MachineError(f'{name}: units: {len(item.units)} given for {c} channels')
+    if item.channels != first.channels:
+        raise MachineError(f'{name}: channels: {", ".join(item.channels)} given, allowed are '
+                           f'those of {first.name}: {", ".join(first.channels)}; a reading that '
+                           'was not recorded is NaN')
+    for key in ('measured', 'noise'):
+        shape = getattr(item, key).shape
+        if shape != (n, c):
+            raise MachineError(f'{name}: {key}: shape {shape} given, allowed is {(n, c)}: '
+                               f'{n} times, {c} channels')
+    there = np.isfinite(item.measured)
+    if not there.any():
+        raise MachineError(f'{name}: measured: no finite sample')
+    if np.isinf(item.measured).any():
+        raise MachineError(f'{name}: measured: infinite samples; a missing one is NaN')
+    for j, channel in enumerate(item.channels):
+        sigma = item.noise[there[:, j], j]
+        if not np.all((sigma > 0.0) & np.isfinite(sigma)):
+            raise MachineError(f'{name}: noise of {channel}: {sigma.min():g} given, allowed is '
+                               'a finite number above 0')
+    for channel in item.quantised:
+        if channel not in item.channels:
+            raise MachineError(f'{name}: quantised: {channel}: no such channel')
+
+
+def _check_parameter(kind: str, item: Parameter, experiments: int) -> None:
+    name = f'{kind} {item.name}'
+    if not item.low <= (item.start if item.is_shape else 0.0) <= item.high:
+        neutral = f'its start {item.start:g}' if item.is_shape else 'the neutral value 0'
+        raise MachineError(f'{name}: bounds {item.low:g} to {item.high:g} without {neutral}')
+    if not math.isfinite(item.low) or not math.isfinite(item.high):
+        raise MachineError(f'{name}: bounds {item.low:g} to {item.high:g} given, allowed are '
+                           'finite ones')
+    if not 0.0 < item.step < math.inf:
+        raise MachineError(f'{name}: step: {item.step:g} given, allowed is a number above 0')
+    if not 0.0 <= item.prior_sigma < math.inf:
+        raise MachineError(f'{name}: prior_sigma: {item.prior_sigma:g} given, allowed is 0 for '
+                           'none, or a number above 0')
+    if item.experiment is not None and not 0 <= item.experiment < experiments:
+        raise MachineError(f'{name}: experiment: {item.experiment} given, allowed is 0 to '
+                           f'{experiments - 1}')
+
+
+def _check_effect(key: str, effect: Effect, machine: Machine, experiments: int) -> None:
+    name = f'effect {key}'
+    if effect.id != key or '.' not in key or key in _RESERVED:
+        raise MachineError(f'{name}: id: {effect.id!r} given, allowed is component.effect')
+    for field in ('parts', 'simpler'):
+        for other in getattr(effect, field):
+            if other not in machine.effects:
+                raise MachineError(f'{name}: {field}: {other}: no such effect')
+    if not effect.forms:
+        raise MachineError(f'{name}: forms: there is none')
+    taken = {p.name for p in machine.nuisances}
+    for form in effect.forms:
+        _check_form(name, form, taken, experiments)
+
+
+def _check_form(name: str, form: Form, taken: set[str], experiments: int) -> None:
+    if not form.sizes:
+        raise MachineError(f'{name}: form {form.name!r}: has no parameter but shape parameters')
+    for number, item in enumerate(form.parameters):
+        _check_parameter(f'{name}: parameter', item, experiments)
+        if item.name in taken or item.name in [p.name for p in form.parameters[:number]]:
+            raise MachineError(f'{name}: parameter {item.name}: the name is there twice')
+
+
+def _check_readings(experiment: Experiment, readings: np.ndarray | None,  # type: ignore[type-arg]
+                    ) -> None:
+    name = f'prediction of {experiment.name}'
+    shape = None if readings is None else np.shape(readings)
+    if shape != experiment.measured.shape:
+        raise MachineError(f'{name}: shape {shape} given, allowed is '
+                           f'{experiment.measured.shape}: times, channels')
+    there = np.isfinite(experiment.measured)
+    for j, channel in enumerate(experiment.channels):
+        wrong = ~np.isfinite(np.asarray(readings)[there[:, j], j])
+        if wrong.any():
+            raise MachineError(f'{name}: {channel}: {np.count_nonzero(wrong)} of {wrong.size} '
+                               'samples are NaN or infinite without any effect')

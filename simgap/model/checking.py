@@ -1,0 +1,176 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""What is wrong with a model of one's own, found out before any fit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+import math
+import time
+
+import numpy as np
+from simgap.errors import UserError
+from simgap.logs.log import Log, OneTest
+from simgap.machine.check import check_machine, idle_effects
+from simgap.machine.contract import FloatArray, Parameter
+from simgap.model.declaration import Model
+from simgap.model.machine import OwnMachine
+from simgap.model.named_numbers import Numbers
+from simgap.model.response import NO_RESPONSE, StepResponse, tests_of, where_it_acts
+
+# Two difference quotients with a step and twice the step differ by less than this where the
+# simulation is smooth.
+_ROUGH = 0.5
+_LEAST_SAMPLES = 50
+# Simulations of a usual diagnosis, by which its duration is told.
+_RUNS = 6000
+
+
+@dataclass(frozen=True)
+class Checked:
+    """
+    What a check found.
+
+    Attributes
+    ----------
+    faults : what has to be mended, a line each
+    remarks : what should be known, a line each
+
+    """
+
+    faults: Sequence[str]
+    remarks: Sequence[str]
+
+
+def check_model(model: Model, logs: Sequence[Log]) -> Checked:
+    """Check a model with logs of its tests; the first fault of the contract ends the check."""
+    try:
+        machine = OwnMachine(model, logs)
+        before = [{name: log[name].copy() for name in log.columns} for log in machine.logs]
+        began = time.monotonic()
+        check_machine(machine)
+        compiling_s = time.monotonic() - began
+        faults = [*_unknown_numbers(machine), *_changed_inputs(machine, before),
+                  *_differs_in_itself(machine)]
+        if not faults:
+            faults += [*idle_effects(machine), *_idle_pushes(machine), *_rough(machine)]
+        remarks = list(_remarks(machine, compiling_s))
+        if not faults:
+            remarks += _rough_effects(machine)
+        return Checked(faults, remarks)
+    except UserError as error:
+        return Checked([str(error)], [])
+
+
+def _test(machine: OwnMachine, experiment: int) -> tuple[Numbers, OneTest]:
+    log = machine.logs[experiment]
+    return machine.numbers({}, experiment), OneTest(
+        log, {name: np.zeros(log.time.size) for name in machine.model.push})
+
+
+def _unknown_numbers(machine: OwnMachine) -> Iterator[str]:
+    """Yield numbers that the simulation never asks for."""
+    asked: set[str] = set()
+    for k in range(len(machine.logs)):
+        numbers, test = _test(machine, k)
+        machine.simulated(numbers, test)
+        asked |= numbers.asked_for
+    for name in machine.numbers({}, 0):
+        if name not in asked:
+            yield f'{name}: the simulation never asks for numbers.{name}'
+
+
+def _changed_inputs(machine: OwnMachine,
+                    before: Sequence[Mapping[str, FloatArray]]) -> Iterator[str]:
+    """Yield columns that the simulation has written into."""
+    for log, columns in zip(machine.logs, before, strict=True):
+        for name, values in columns.items():
+            if not np.array_equal(values, log[name], equal_nan=True):
+                yield (f"{log.name}: the simulation writes into test['{name}']; let it work on a "
+                       'copy')
+
+
+def _differs_in_itself(machine: OwnMachine) -> Iterator[str]:
+    """Yield tests whose readings differ from run to run."""
+    for k, experiment in enumerate(machine.experiments):
+        first, second = (machine.predict({}, k) for _ in range(2))
+        change = float(np.nanmax(np.abs(first - second) / experiment.noise))
+        if change > 0.0:
+            yield (f'{experiment.name}: two runs with the same numbers differ by {change:.2g} '
+                   'standard deviations; a simulation draws no random numbers and keeps no state')
+
+
+def _idle_pushes(machine: OwnMachine) -> Iterator[str]:
+    """Yield places where a push changes no reading, or far too much."""
+    neutral = [machine.predict({}, k) for k in range(len(machine.logs))]
+    for place in machine.disturbance_inputs:
+        pushed = machine.simulate_disturbed({}, place, np.ones_like)
+        change = max(_rms(one - other, e.noise) for one, other, e in zip(
+            pushed, neutral, machine.experiments, strict=True))
+        if change < NO_RESPONSE:
+            name = machine.push_at(place.name)
+            yield f"push {name}: changes no reading; add test.push['{name}'] where it enters"
+
+
+def _rough(machine: OwnMachine) -> Iterator[str]:
+    """Yield numbers by which the readings have no derivative, or that change nothing."""
+    for parameter in machine.nuisances:
+        responses = [StepResponse.at(machine, parameter, k, {})
+                     for k in tests_of(machine, parameter)]
+        if not any(item.acts for item in responses):
+            yield f'{parameter.name}: changes no reading in these tests; make it known()'
+        yield from _told(parameter, responses)
+
+
+def _rough_effects(machine: OwnMachine) -> Iterator[str]:
+    """Yield numbers of effects by which a fit will be hard."""
+    for effect in machine.effects.values():
+        form = effect.forms[0]
+        for parameter in form.sizes:
+            if not any(StepResponse.at(machine, parameter, k, form.start).acts
+                       for k in tests_of(machine, parameter)):
+                yield (f'{parameter.name}: a step of {parameter.step:g} {parameter.unit} from 0 '
+                       'changes no reading, and a search begins there; let it act from 0 on, or '
+                       'give a larger step=')
+            here = where_it_acts(form, parameter)
+            yield from _told(parameter, [StepResponse.at(machine, parameter, k, here)
+                                         for k in tests_of(machine, parameter)])
+
+
+def _told(parameter: Parameter, responses: Sequence[StepResponse]) -> Iterator[str]:
+    worst = max((item.roughness for item in responses), default=0.0)
+    if worst > _ROUGH:
+        yield (f'{parameter.name}: the derivative of the readings by it is noise: it changes by '
+               f'{100.0 * min(worst, 9.99):.0f} % where the step of {parameter.step:g} '
+               f'{parameter.unit} is doubled; leave digits out of the simulation, let it switch '
+               'between samples, or give a larger step=')
+
+
+def _rms(change: FloatArray, noise: FloatArray) -> float:
+    return math.sqrt(float(np.nanmean((change / noise) ** 2)))
+
+
+def _remarks(machine: OwnMachine, compiling_s: float) -> Iterator[str]:
+    began = time.monotonic()
+    before = machine.simulate([{}])[0]
+    run_s = time.monotonic() - began
+    for experiment, predicted in zip(machine.experiments, before, strict=True):
+        assert predicted is not None
+        rate = 1.0 / float(np.median(np.diff(experiment.time)))
+        yield (f'{experiment.name}: {experiment.time.size} samples are compared, {rate:.3g} per '
+               'second')
+        for j, channel in enumerate(experiment.channels):
+            measured = experiment.measured[:, j]
+            count = int(np.isfinite(measured).sum())
+            if count <= _LEAST_SAMPLES:
+                yield (f'{experiment.name}: {channel}: {count} samples, too few to judge; more '
+                       f'than {_LEAST_SAMPLES} are needed')
+                continue
+            gap = math.sqrt(float(np.nanmean((measured - predicted[:, j]) ** 2)))
+            yield (f'{experiment.name}: {channel}: measured {np.nanmin(measured):.4g} to '
+                   f'{np.nanmax(measured):.4g}, simulated {np.min(predicted[:, j]):.4g} to '
+                   f'{np.max(predicted[:, j]):.4g} {experiment.units[j]}; gap before any fit '
+                   f'{gap:.3g}, noise {experiment.noise[0, j]:.3g}')
+    yield (f'one run of all tests takes {run_s:.2g} s (the first one {compiling_s:.2g} s); a '
+           f'diagnosis takes a few thousand, about {_RUNS * run_s / 60.0:.2g} min')

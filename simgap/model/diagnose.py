@@ -1,0 +1,155 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The diagnosis of a machine of one's own.
+
+Examples
+--------
+>>> from simgap.model import diagnose_logs, load_model, read_log  # doctest: +SKIP
+>>> found = diagnose_logs(load_model('my_machine.py'), [read_log('a.csv')])     # doctest: +SKIP
+>>> print(found.summary())                                                      # doctest: +SKIP
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from simgap.errors import UserError
+from simgap.fit.least_squares import LeastSquares
+from simgap.inputs.schema import nearest
+from simgap.logs.log import Log
+from simgap.machine.by_label import ByLabel, without_labels
+from simgap.machine.contract import Machine, Point
+from simgap.model.declaration import Model
+from simgap.model.machine import OwnMachine
+from simgap.model.pushes import pushes
+from simgap.model.response import derivative_error
+from simgap.next_test.rivals import Rival
+from simgap.settings import DEFAULT, Settings
+from simgap.verdict.diagnosis import diagnose, Diagnosis, Progress
+
+# Pushes that the summary lists.
+_LISTED = 6
+# However smooth a simulation is, a fit is linear about its end only so far.
+_LEAST_ERROR = 0.01
+
+
+def diagnose_logs(model: Model, logs: Sequence[Log],
+                  progress: Progress = lambda share, doing: None, threads: int = 2,
+                  settings: Settings = DEFAULT, without: Sequence[str] = (),
+                  limits: Mapping[str, float] | None = None,
+                  earlier: Sequence[Rival] = ()) -> Diagnosis:
+    """
+    Say where a machine and its model part, which effect is behind it, and how far it goes.
+
+    Parameters
+    ----------
+    model
+        of the machine
+    logs
+        of its tests
+    progress
+        called with the share that is done, 0 to 1, and what is being done
+    threads
+        how many hypotheses are fitted at once
+    settings
+        thresholds
+    without
+        effects that the catalogue shall lack
+    limits
+        for some readings, the remainder beyond noise from which it matters
+    earlier
+        answers of a verdict on some of the logs, see `diagnosis.diagnose`
+
+    Returns
+    -------
+    the diagnosis. Its result has two more entries than docs/diagnosis.md lists: `numbers`, the
+    simulation's numbers as fitted, and, where something enters that no effect names, `pushes`:
+    test, place, from_s, until_s, size and unit of each push
+
+    Raises
+    ------
+    UserError : model or logs cannot be used; the message says what is wrong
+
+    """
+    machine = OwnMachine(model, logs)
+    for effect in without:
+        if effect not in machine.effects:
+            raise UserError(f'{effect}: no such effect{nearest(effect, machine.effects)}; there '
+                            f'are {", ".join(machine.effects)}')
+    for name in limits or ():
+        if name not in model.readings:
+            raise UserError(f'{name}: no such reading{nearest(name, model.readings)}; there are '
+                            f'{", ".join(model.readings)}')
+    found = diagnose(machine.without(without), progress, threads,
+                     _for_derivatives_of(machine, settings), limits, earlier)
+    found.result['numbers'] = numbers_as_fitted(found.machine, found.best.state.point())
+    found.result['pushes'] = pushes_found(found, settings)
+    return found
+
+
+def _for_derivatives_of(machine: OwnMachine, settings: Settings) -> Settings:
+    """Return thresholds with the error that this simulation's derivatives have."""
+    usual = settings.interval.derivative_error
+    error = min(max(derivative_error(machine), _LEAST_ERROR), usual)
+    return replace(settings, interval=replace(settings.interval, derivative_error=error))
+
+
+def numbers_as_fitted(machine: Machine, point: Point) -> dict[str, Any]:
+    """Return every number of the simulation as fitted, per test where it is a test's own."""
+    own = without_labels(machine)
+    assert isinstance(own, OwnMachine)
+    model = own.model
+    points = [machine.in_test(point, k) if isinstance(machine, ByLabel) else point
+              for k in range(len(own.logs))]
+    fitted = [own.numbers(here, k) for k, here in enumerate(points)]
+    numbers: dict[str, Any] = {
+        name: {'value': fitted[0][name], 'configured': item.value, 'unit': item.unit}
+        for name, item in model.base.items()}
+    for name, item in model.per_test.items():
+        for log, values in zip(own.logs, fitted, strict=True):
+            numbers[f'{name}[{log.name}]'] = {
+                'value': values[name], 'configured': item.value, 'unit': item.unit}
+    known = {p.name for p in own.nuisances}
+    for log, here, values in zip(own.logs, points, fitted, strict=True):
+        for parameter in here:
+            name = own.number_of(parameter)
+            if parameter in known or not name:
+                continue
+            # a number by label is one of each test
+            ending = '' if parameter in point else f'[{log.name}]'
+            numbers[name + ending] = {'value': values[name], 'configured': None}
+            if '@' in parameter:
+                order = f'{name.rpartition("_")[0]}_order'
+                numbers[order + ending] = {'value': values[order], 'configured': None,
+                                           'unit': '1/rev'}
+    return numbers
+
+
+def pushes_found(diagnosis: Diagnosis, settings: Settings = DEFAULT) -> list[dict[str, Any]]:
+    """Return when something enters that no effect names, and how strongly; empty for nothing."""
+    machine = without_labels(diagnosis.machine)
+    assert isinstance(machine, OwnMachine)
+    labels = {place.name: place for place in machine.disturbance_inputs}
+    best = next(iter(diagnosis.result['may_enter_at']), None)
+    if best is None or best['name'] not in labels:
+        return []
+    place = machine.model.push[machine.push_at(best['name'])]
+    problem = LeastSquares(machine, settings=settings)
+    return [{'place': best['name'], **vars(item), 'unit': place.unit} for item in pushes(
+        problem, diagnosis.none.state.point(), labels[best['name']])]
+
+
+def summary_of(diagnosis: Diagnosis) -> str:
+    """Return the verdict in a few lines, with what pushes and when."""
+    lines = [diagnosis.summary()]
+    for item in diagnosis.result['pushes'][:_LISTED]:
+        lines.append(f'  {item["test"]}: {item["place"]} {item["size"]:.3g} {item["unit"]} from '
+                     f'{item["from_s"]:.2f} to {item["until_s"]:.2f} s')
+    more = len(diagnosis.result['pushes']) - _LISTED
+    if more > 0:
+        lines.append(f'  and {more} more, see the JSON')
+    return '\n'.join(lines)

@@ -1,0 +1,365 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""A model of one's own and the logs of its tests, as a `Machine` of the diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+import math
+from threading import RLock
+import traceback
+
+import numpy as np
+from simgap.errors import UserError
+from simgap.inputs.schema import nearest
+from simgap.logs.log import beginning, Log, LogError, OneTest
+from simgap.machine.contract import (
+    Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point,
+    Regimes, TimeScales,
+)
+from simgap.machine.diagram import Diagram
+from simgap.machine.motion import Motion
+from simgap.model.declaration import Model, ModelError, Number, OwnEffect, Reading
+from simgap.model.named_numbers import Numbers
+from simgap.model.orders import likely_orders, USUAL_ORDERS
+
+# Samples of a test that are compared unless the model says how many per second.
+_SAMPLES = 3000
+# Stands between the stem of a ripple's numbers and its order.
+_ORDER_MARK = '@'
+_CYCLES = ' cycles'
+# Orders of a ripple that a fit is tried with where they are not given.
+_FOUND_ORDERS = 4
+
+
+class OwnMachine(Machine):
+    """
+    A model of one's own in the tests that were logged.
+
+    Parameters
+    ----------
+    model
+        see `declaration.machine`
+    logs
+        the tests
+
+    Raises
+    ------
+    LogError : a log lacks a reading
+
+    """
+
+    def __init__(self, model: Model, logs: Sequence[Log]) -> None:
+        """Prepare the experiments, the numbers and the catalogue."""
+        self.model = model
+        self.logs = [model.log(log) if model.log else log for log in logs]
+        self._strides = [_stride(log, model.judged_hz) for log in self.logs]
+        self._lock = None if model.parallel else RLock()
+        self._values = {
+            **{name: item.value for name, item in (*model.base.items(), *model.per_test.items())},
+            **{name: value for effect in model.effects for name, value in _absent(effect)}}
+        super().__init__([self._experiment(log, stride) for log, stride
+                          in zip(self.logs, self._strides, strict=True)],
+                         self._nuisances(), [_effect(item) for item in model.effects])
+        # which number, and of which test, each parameter stands for
+        self._places: dict[str, tuple[str, int | None]] = {
+            **{name: (name, None) for name in model.base},
+            **{f'{name}[{log.name}]': (name, k) for name in model.per_test
+               for k, log in enumerate(self.logs)},
+            **{f'{item.name}.{name}': (name, None) for item in model.effects
+               for name, _ in _absent(item)}}
+        self.disturbance_inputs = tuple(
+            DisturbanceInput(item.label, item.component) for item in model.push.values())
+        self.advice = tuple(((), text) for text in model.advice)
+        self.diagram = _diagram(model)
+
+    # -- numbers -------------------------------------------------------------------------------
+
+    def numbers(self, point: Point, experiment: int) -> Numbers:
+        """Return the numbers of the simulation in one test at a point of the diagnosis."""
+        values = dict(self._values)
+        for full, change in point.items():
+            name, _, order = full.partition(_ORDER_MARK)
+            number, test = self._places.get(full) or self._places.get(name) or ('', None)
+            if not number or test not in (None, experiment):
+                continue  # an error of a reading, or of another test
+            values[number] = change
+            if number in self.model.base or number in self.model.per_test:
+                values[number] += self._values[number]
+            if order:
+                values[number.rpartition('_')[0] + '_order'] = float(order)
+        return Numbers(values)
+
+    def number_of(self, parameter: str) -> str:
+        """Return which number of the simulation a parameter is or changes; '' for none."""
+        name = parameter.partition(_ORDER_MARK)[0]
+        return (self._places.get(parameter) or self._places.get(name) or ('', None))[0]
+
+    def _nuisances(self) -> list[Parameter]:
+        found = [_offset(name, item, None) for name, item in self.model.base.items()
+                 if not item.is_known]
+        for k, log in enumerate(self.logs):
+            found += [_offset(name, item, k, f'{name}[{log.name}]')
+                      for name, item in self.model.per_test.items() if not item.is_known]
+        for name, item in self.model.readings.items():
+            if item.gain > 0.0:
+                found.append(_error_of_reading(f'gain of {name}', '1', item.gain, None))
+            if item.zero > 0.0:
+                found += [_error_of_reading(f'zero of {name}[{log.name}]', item.unit, item.zero,
+                                            k) for k, log in enumerate(self.logs)]
+        return found
+
+    # -- readings ------------------------------------------------------------------------------
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return the readings of one log at its judged samples; see `Machine.predict`."""
+        return self.pushed(point, experiment, {})
+
+    def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
+                 until: float = math.inf) -> list[list[FloatArray | None]]:
+        """Return the readings of several variants; no more than is wanted is simulated."""
+        results: list[list[FloatArray | None]] = []
+        for point, one in zip(points, only or [None] * len(points), strict=True):
+            row: list[FloatArray | None] = [None] * len(self.experiments)
+            for k in range(len(row)) if one is None else (one,):
+                row[k] = self.pushed(point, k, {}, until)
+            results.append(row)
+        return results
+
+    def simulate_disturbed(self, point: Point, place: DisturbanceInput,
+                           course: Course) -> list[FloatArray]:
+        """Return the readings with an unknown input; see `Machine.simulate_disturbed`."""
+        name = self.push_at(place.name)
+        size = self.model.push[name].size
+        return [self.pushed(point, k, {name: size * course(log.time)})
+                for k, log in enumerate(self.logs)]
+
+    def push_at(self, label: str) -> str:
+        """Return the name of the place with a label."""
+        return next(name for name, item in self.model.push.items() if item.label == label)
+
+    def pushed(self, point: Point, experiment: int, push: Mapping[str, FloatArray],
+               until: float = math.inf) -> FloatArray:
+        """
+        Return the readings of one test in which something pushes, as `predict` does.
+
+        Parameters
+        ----------
+        point
+            parameter values by name
+        experiment
+            its index
+        push
+            what enters at some of the model's places, for each sample of the log
+        until
+            end of the simulation after the first sample [s]; later readings are NaN
+
+        """
+        log = self.logs[experiment]
+        part = beginning(log, until) if math.isfinite(until) else log
+        count = part.time.size
+        still = np.zeros(count)
+        test = OneTest(part, {name: push.get(name, still)[:count] for name in self.model.push})
+        readings = self.simulated(self.numbers(point, experiment), test)
+        columns = []
+        for name, item in self.model.readings.items():
+            values = np.full(log.time.size, np.nan)
+            values[:count] = readings[name]
+            if item.gain > 0.0:
+                values *= 1.0 + point.get(f'gain of {name}', 0.0)
+            if item.zero > 0.0:
+                values += point.get(f'zero of {name}[{log.name}]', 0.0)
+            columns.append(values[::self._strides[experiment]])
+        return np.column_stack(columns)
+
+    def simulated(self, numbers: Numbers, test: OneTest) -> dict[str, FloatArray]:
+        """
+        Return what the model's simulation says, checked, shape (n,) for each reading.
+
+        Raises
+        ------
+        ModelError : it failed, or gave something else than its readings
+
+        """
+        try:
+            if self._lock is None:
+                found = self.model.simulate(numbers, test)
+            else:
+                with self._lock:
+                    found = self.model.simulate(numbers, test)
+        except UserError:
+            raise
+        except Exception as error:
+            raise ModelError(f'simulate({test.name}): {_place(error)}{type(error).__name__}: '
+                             f'{error}') from error
+        return _checked(found, self.model.readings, test)
+
+    # -- what the machine knows better ---------------------------------------------------------
+
+    @property
+    def time_scales(self) -> TimeScales:
+        """Return how fast the machine is, from the time in which it settles."""
+        longest = max(float(e.time[-1] - e.time[0]) for e in self.experiments)
+        settles = self.model.settles_s
+        if settles is None:
+            return TimeScales.of_duration(longest)
+        return TimeScales(start_s=settles, scan_s=min(longest, max(20.0 * settles,
+                                                                   0.27 * longest)),
+                          pulse_s=0.1 * settles, response_s=settles, block_s=settles)
+
+    def form_named(self, effect: Effect, name: str) -> Form:
+        """Return the form of an effect by its name; that of a ripple says its order."""
+        own = next(item for item in self.model.effects if item.name == effect.id)
+        if own.ripple is None:
+            return super().form_named(effect, name)
+        try:
+            return _ripple_form(own, float(name.removesuffix(_CYCLES)))
+        except ValueError:
+            raise KeyError(f'{effect.id}: {name}') from None
+
+    def forms(self, effect: Effect, residuals: Sequence[FloatArray]) -> Sequence[Form]:
+        """Return the forms that are worth a fit: of a ripple, orders that stand out."""
+        own = next(item for item in self.model.effects if item.name == effect.id)
+        if own.ripple is None or own.ripple.orders:
+            return effect.forms
+        angles = [own.ripple.angle(log)[::stride]
+                  for log, stride in zip(self.logs, self._strides, strict=True)]
+        orders = likely_orders(self.experiments, residuals, angles, _FOUND_ORDERS)
+        return tuple(_ripple_form(own, order) for order in orders)
+
+    def regimes(self, experiment: int) -> Regimes:
+        """Return the regime of motion of each sample."""
+        return self._motion(experiment).regimes()
+
+    def covariates(self, experiment: int) -> Mapping[str, FloatArray]:
+        """Return rate, direction, angle, time and acceleration, as measured."""
+        found = dict(self._motion(experiment).covariates())
+        del found['load']
+        return found
+
+    def _motion(self, experiment: int) -> Motion:
+        """Return the motion by the first reading, which is taken for a position."""
+        log, time = self.logs[experiment], self.experiments[experiment].time
+        name, item = next(iter(self.model.readings.items()))
+        position = log[item.column or name][::self._strides[experiment]]
+        rate = np.gradient(position, time)
+        return Motion(time, rate=rate, load=np.zeros_like(time), angle=position,
+                      reversal_s=min(0.4, 2.0 * self.time_scales.start_s))
+
+    def _experiment(self, log: Log, stride: int) -> Experiment:
+        columns = []
+        for name, item in self.model.readings.items():
+            column = item.column or name
+            if column not in log.columns:
+                raise LogError(f'{log.name}: no column {column} for the reading {name}'
+                               f'{nearest(column, log.columns)}; there are '
+                               f'{", ".join(log.columns)}')
+            columns.append(log.columns[column][::stride])
+        measured = np.column_stack(columns)
+        readings = self.model.readings.values()
+        errors = [np.nan if item.model_error is None else item.model_error for item in readings]
+        usual = 3e-3 * np.nanstd(measured, axis=0)
+        return Experiment(
+            log.name, log.time[::stride], tuple(self.model.readings),
+            tuple(item.unit for item in readings), measured,
+            np.tile([item.sigma for item in readings], (len(measured), 1)),
+            model_error=np.where(np.isnan(errors), usual, errors), labels=log.labels)
+
+
+def _stride(log: Log, judged_hz: float | None) -> int:
+    """Return every how many samples of a log one is compared."""
+    if judged_hz is None:
+        return max(1, math.ceil(log.time.size / _SAMPLES))
+    return max(1, round(1.0 / judged_hz / float(np.median(np.diff(log.time)))))
+
+
+def _offset(name: str, item: Number, experiment: int | None, full: str = '') -> Parameter:
+    return Parameter(full or name, item.unit, item.low - item.value, item.high - item.value,
+                     item.quotient_step, item.sigma, experiment, least_step=item.step)
+
+
+def _error_of_reading(name: str, unit: str, by: float, experiment: int | None) -> Parameter:
+    return Parameter(name, unit, -by, by, 0.01 * by, 0.5 * by, experiment)
+
+
+def _absent(effect: OwnEffect) -> Iterator[tuple[str, float]]:
+    """Yield the numbers of an effect as they are without it."""
+    if effect.ripple is not None:
+        yield f'{effect.ripple.stem}_order', 1.0
+        yield from dict.fromkeys((*effect.ripple.fundamental, *effect.ripple.higher), 0.0).items()
+    for form in effect.forms:
+        yield from ((name, item.value) for name, item in form.numbers.items())
+
+
+def _effect(item: OwnEffect) -> Effect:
+    if item.ripple is not None:
+        forms = [_ripple_form(item, order) for order in item.ripple.orders or USUAL_ORDERS]
+    else:
+        forms = [Form(form.name, tuple(_parameter(f'{item.name}.{name}', number)
+                                       for name, number in form.numbers.items()))
+                 for form in item.forms]
+    return Effect(item.name, item.component, item.cause, item.look, tuple(forms),
+                  simpler=(item.simpler,) if item.simpler else ())
+
+
+def _parameter(name: str, item: Number) -> Parameter:
+    return Parameter(name, item.unit, item.low, item.high, item.quotient_step, start=item.value,
+                     is_shape=item.is_shape, tolerance=item.tolerance, least_step=item.step)
+
+
+def _ripple_form(item: OwnEffect, order: float) -> Form:
+    wave = item.ripple
+    assert wave is not None
+    # higher harmonics mean nothing without the fundamental, as the shape of other effects
+    numbers = {**dict.fromkeys(wave.fundamental, wave.amplitude),
+               **dict.fromkeys(wave.higher, replace(wave.amplitude, is_shape=True))}
+    return Form(f'{order:g}{_CYCLES}', tuple(
+        _parameter(f'{item.name}.{name}{_ORDER_MARK}{order:g}', number)
+        for name, number in numbers.items()), scanned=True, is_wave=True)
+
+
+def _diagram(model: Model) -> Diagram:
+    """Return the blocks in the order of the signal, each with a line to the next."""
+    named = [*(effect.component for effect in model.effects),
+             *(item.component for item in model.push.values())]
+    found = Diagram.of([*model.blocks, *named])
+    chain = found.blocks[:len(dict.fromkeys(model.blocks))]
+    middle = 0.5 * Diagram.height
+    lines = []
+    for one, other in zip(chain, chain[1:], strict=False):
+        if other.y == one.y:
+            lines.append((one.x + one.width, one.y + middle, other.x, other.y + middle))
+        else:
+            lines.append((one.x + 0.5 * one.width, one.y + Diagram.height,
+                          other.x + 0.5 * other.width, other.y))
+    return Diagram(found.blocks, tuple(lines))
+
+
+def _checked(found: object, readings: Mapping[str, Reading],
+             test: OneTest) -> dict[str, FloatArray]:
+    """Return what a simulation gave as arrays of shape (n,)."""
+    if not isinstance(found, Mapping):
+        raise ModelError(f'simulate({test.name}): {type(found).__name__} returned, allowed is a '
+                         f'mapping from {", ".join(readings)} to arrays')
+    if set(found) != set(readings):
+        missing = [name for name in readings if name not in found]
+        further = [str(name) for name in found if name not in readings]
+        raise ModelError(f'simulate({test.name}): '
+                         + ' and '.join([f'{name} is missing' for name in missing]
+                                        + [f'{name} is not in readings' for name in further]))
+    arrays = {}
+    for name in readings:
+        values = np.asarray(found[name], float)
+        if values.shape != test.time.shape:
+            raise ModelError(f'simulate({test.name}): {name}: shape {values.shape} returned, '
+                             f'allowed is {test.time.shape}, one value for each of test.time')
+        arrays[name] = values
+    return arrays
+
+
+def _place(error: Exception) -> str:
+    """Return the line of the user's file that an error came from."""
+    frames = traceback.extract_tb(error.__traceback__)
+    inner = [frame for frame in frames if frame.filename != __file__]
+    return f'line {inner[0].lineno}: ' if inner else ''

@@ -1,0 +1,226 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A MuJoCo model (MJCF) as the simulation of a machine.
+
+A place is KIND.NAME.FIELD, or KIND.NAME.FIELD[INDEX] where the field has several values:
+joint.motor.damping, tendon.shaft.stiffness, actuator.servo.biasprm[1], joint.motor.qpos (where it
+starts), or option.gravity[2]. The fields are those of MuJoCo's mjModel without their prefix.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+import copy
+from pathlib import Path
+import re
+from threading import local
+
+import mujoco
+from mujoco.rollout import Rollout
+import numpy as np
+from simgap.inputs.schema import nearest
+from simgap.machine.contract import FloatArray
+from simgap.model.declaration import ModelError
+from simgap.model.simulator import Ports
+
+_PLACE = re.compile(r'(?P<kind>\w+)\.(?:(?P<name>.+)\.)?(?P<field>\w+)(?:\[(?P<index>\d+)\])?')
+# Prefixes of the arrays of mjModel, and the kind by which an object is found.
+_KINDS = {
+    'joint': ('jnt_', mujoco.mjtObj.mjOBJ_JOINT), 'body': ('body_', mujoco.mjtObj.mjOBJ_BODY),
+    'geom': ('geom_', mujoco.mjtObj.mjOBJ_GEOM), 'site': ('site_', mujoco.mjtObj.mjOBJ_SITE),
+    'tendon': ('tendon_', mujoco.mjtObj.mjOBJ_TENDON),
+    'actuator': ('actuator_', mujoco.mjtObj.mjOBJ_ACTUATOR),
+    'equality': ('eq_', mujoco.mjtObj.mjOBJ_EQUALITY),
+}
+# Coordinates and degrees of freedom of a joint of each type: free, ball, slide, hinge.
+_COORDINATES, _FREEDOMS = (7, 4, 1, 1), (6, 3, 1, 1)
+# Fields of the state, in which a run starts.
+_STARTS = ('qpos', 'qvel', 'act')
+_STATE = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
+# What MuJoCo says of a run that diverges.
+_DIVERGED = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL,
+             mujoco.mjtWarning.mjWARN_BADQACC)
+_INPUTS = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+
+# A fit also tries numbers with which a run diverges. MuJoCo would write each to standard error
+# and to a file in the working directory.
+mujoco.set_mju_user_warning(lambda text: None)
+
+
+class MujocoModel:
+    """
+    A simulation with MuJoCo; see `Simulator`.
+
+    Parameters
+    ----------
+    path
+        of the MJCF file
+    ports
+        places as above; inputs are actuators, pushes joints, outputs sensors with one value
+
+    Raises
+    ------
+    ModelError : the file cannot be read, or has no such place, actuator, joint or sensor
+
+    """
+
+    parallel = True
+
+    def __init__(self, path: Path, ports: Ports) -> None:
+        """Read the file and find the ports."""
+        try:
+            self._model = mujoco.MjModel.from_xml_path(str(path))
+        except ValueError as error:
+            raise ModelError(f'{path}: {error}') from None
+        # a run that diverges ends in NaN, and does not begin anew
+        self._model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        self.longest_step_s = float(self._model.opt.timestep)
+        self._places = tuple(ports.places)
+        spare = _Worker(self._model)
+        self.defaults = np.array([float(spare.cell(place, key)[0])
+                                  for place, key in ports.places.items()])
+        # since MuJoCo 4 an actuator may have several controls; its first one is meant
+        controls = getattr(self._model, 'actuator_ctrladr', range(self._model.nu))
+        actuators = [controls[self._id(mujoco.mjtObj.mjOBJ_ACTUATOR, 'actuator', *item)]
+                     for item in ports.inputs.items()]
+        joints = [self._id(mujoco.mjtObj.mjOBJ_JOINT, 'joint', *item)
+                  for item in ports.pushes.items()]
+        self._columns = [*actuators, *(self._model.nu + self._model.jnt_dofadr[joints])]
+        self._sensors = [self._sensor(*item) for item in ports.outputs.items()]
+        self._local = local()
+
+    def run(self, values: FloatArray, start_s: float, step_s: float,
+            inputs: FloatArray) -> FloatArray:
+        """Simulate; see `Simulator.run`."""
+        if not hasattr(self._local, 'worker'):
+            self._local.worker = _Worker(self._model, self._places)
+        controls = np.zeros((len(inputs), self._model.nu + self._model.nv))
+        controls[:, self._columns] = inputs
+        return self._local.worker.run(values, start_s, step_s, controls)[:, self._sensors]
+
+    def _id(self, kind: mujoco.mjtObj, word: str, name: str, key: str) -> int:
+        found = mujoco.mj_name2id(self._model, kind, name)
+        if found < 0:
+            raise ModelError(f'{key}: no {word} {name}'
+                             f'{_nearest(self._model, kind, name)}; name it in the MJCF file')
+        return int(found)
+
+    def _sensor(self, name: str, key: str) -> int:
+        found = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_SENSOR, name)
+        if found < 0:
+            raise ModelError(
+                f'{key}: no sensor {name}'
+                f'{_nearest(self._model, mujoco.mjtObj.mjOBJ_SENSOR, name)}; add one such as '
+                f'<sensor><jointpos name="{name}" joint="..."/></sensor>')
+        if self._model.sensor_dim[found] != 1:
+            raise ModelError(f'{key}: sensor {name} has {self._model.sensor_dim[found]} values, '
+                             'allowed is 1')
+        return int(self._model.sensor_adr[found])
+
+
+class _Worker:
+    """A model and its data that one thread uses, run after run."""
+
+    def __init__(self, model: mujoco.MjModel, places: Iterable[str] = ()) -> None:
+        self._model = copy.copy(model)
+        self._data = mujoco.MjData(self._model)
+        cells = [(place, self.cell(place, '')) for place in places]
+        self._parameters = [(k, cell) for k, (place, cell) in enumerate(cells)
+                            if not _is_start(place)]
+        self._starts = [(k, cell) for k, (place, cell) in enumerate(cells) if _is_start(place)]
+        self._rollout = Rollout(nthread=0)
+
+    def run(self, values: FloatArray, start_s: float, step_s: float,
+            controls: FloatArray) -> FloatArray:
+        """Return the data of all sensors at the beginning of each step, shape (n, sensors)."""
+        for k, cell in self._parameters:
+            cell[0] = values[k]
+        self._model.opt.timestep = step_s
+        mujoco.mj_setConst(self._model, self._data)
+        mujoco.mj_resetData(self._model, self._data)
+        for k, cell in self._starts:
+            cell[0] = values[k]
+        self._data.time = start_s
+        state = np.empty(mujoco.mj_stateSize(self._model, _STATE))
+        mujoco.mj_getState(self._model, self._data, state, _STATE)
+        # a step reads the sensors before it moves the bodies
+        _, sensors = self._rollout.rollout(self._model, self._data, state, controls[np.newaxis],
+                                           control_spec=_INPUTS)
+        found = np.asarray(sensors[0])
+        if any(self._data.warning[kind].number for kind in _DIVERGED):
+            found[round((self._data.time - start_s) / step_s):] = np.nan
+        return found
+
+    def cell(self, place: str, key: str) -> FloatArray:
+        """
+        Return the cell of the model or its data that a place names, shape (1,), to be written.
+
+        Raises
+        ------
+        ModelError : there is no such place
+
+        """
+        parts = _PLACE.fullmatch(place)
+        if parts is None or (parts['name'] is None) != (parts['kind'] == 'option'):
+            raise ModelError(f'{key}: {place}: give KIND.NAME.FIELD, such as joint.motor.damping, '
+                             'or option.FIELD')
+        values = self._field(place, key, parts['kind'], parts['name'], parts['field'])
+        if values is None or values.dtype != np.float64:
+            raise ModelError(f'{key}: {place}: no number {parts["field"]} in {parts["kind"]}; '
+                             "the fields are those of MuJoCo's mjModel")
+        index = int(parts['index'] or 0)
+        if index >= values.size or (values.size > 1 and parts['index'] is None):
+            raise ModelError(f'{key}: {place}: {parts["field"]} has {values.size} values; give '
+                             f'{parts["field"]}[0] to [{values.size - 1}]')
+        return values[index:index + 1]
+
+    def _field(self, place: str, key: str, kind: str, name: str,
+               field: str) -> FloatArray | None:
+        """Return the values of a field of an object, shape (k,); None if there is none."""
+        model = self._model
+        if kind == 'option':
+            found = getattr(model.opt, field, None)
+            if field == 'timestep':
+                raise ModelError(f'{key}: {place}: give step_s in the model file')
+            return found if isinstance(found, np.ndarray) else None
+        if kind not in _KINDS:
+            raise ModelError(f'{key}: {place}: no such kind{nearest(kind, _KINDS)}; there are '
+                             f'{", ".join(_KINDS)}, option')
+        prefix, code = _KINDS[kind]
+        number = mujoco.mj_name2id(model, code, name)
+        if number < 0:
+            raise ModelError(f'{key}: {place}: no {kind} {name}{_nearest(model, code, name)}; '
+                             'name it in the MJCF file')
+        if kind == 'joint':
+            shape = model.jnt_type[number]
+            first, freedom = model.jnt_qposadr[number], model.jnt_dofadr[number]
+            coordinates = slice(first, first + _COORDINATES[shape])
+            freedoms = slice(freedom, freedom + _FREEDOMS[shape])
+            if field in ('qpos', 'qvel'):
+                return self._data.qpos[coordinates] if field == 'qpos' else (
+                    self._data.qvel[freedoms])
+            if field in ('qpos0', 'qpos_spring'):
+                return getattr(model, field)[coordinates]
+            if hasattr(model, f'dof_{field}'):
+                return getattr(model, f'dof_{field}')[freedoms].reshape(-1)
+        if kind == 'actuator' and field == 'act':
+            first = model.actuator_actadr[number]
+            return self._data.act[first:first + 1] if first >= 0 else None
+        found = getattr(model, prefix + field, None)
+        return found[number:number + 1].reshape(-1) if isinstance(found, np.ndarray) else None
+
+
+def _is_start(place: str) -> bool:
+    parts = _PLACE.fullmatch(place)
+    return parts is not None and parts['field'] in _STARTS
+
+
+def _nearest(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> str:
+    """Return ', did you mean ...?' for an object of the model whose name is near."""
+    names = []
+    number = 0
+    while (found := mujoco.mj_id2name(model, kind, number)) is not None:
+        names.append(found)
+        number += 1
+    return nearest(name, names)

@@ -1,0 +1,60 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""The numbers that a simulation gets, by name: `numbers.inertia`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from simgap.inputs.schema import nearest
+from simgap.model.declaration import ModelError
+
+
+class Numbers(Mapping[str, float]):
+    """
+    Numbers of a simulation as attributes; it remembers which were asked for.
+
+    Attributes
+    ----------
+    asked_for : names that the simulation has read
+
+    """
+
+    def __init__(self, values: Mapping[str, float]) -> None:
+        """Take the values by name."""
+        self._values = values
+        self.asked_for: set[str] = set()
+
+    def __getattr__(self, name: str) -> float:
+        """
+        Return a number.
+
+        Raises
+        ------
+        ModelError : no entry of the model declares it
+
+        """
+        if name.startswith('__'):
+            raise AttributeError(name)
+        return self[name]
+
+    def __getitem__(self, name: str) -> float:
+        """Return a number; see `__getattr__`."""
+        self.asked_for.add(name)
+        try:
+            return self._values[name]
+        except KeyError:
+            raise ModelError(f'numbers.{name}: no entry of the model declares it'
+                             f'{nearest(name, self._values)}') from None
+
+    def __contains__(self, name: object) -> bool:
+        """Return whether there is a number of this name."""
+        return name in self._values
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names."""
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self._values)

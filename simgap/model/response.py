@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""How the readings of a machine of one's own answer to its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+
+import numpy as np
+from simgap.machine.contract import Form, Parameter, Point
+from simgap.model.machine import OwnMachine
+
+# A response below this is none, in standard deviations of the noise.
+NO_RESPONSE = 1e-6
+
+
+@dataclass(frozen=True)
+class StepResponse:
+    """
+    How readings answer to a step of a number, in standard deviations.
+
+    Attributes
+    ----------
+    acts : False if nothing changes
+    roughness : how much the difference quotient changes when its step is doubled, as a share
+
+    """
+
+    acts: bool
+    roughness: float
+
+    @classmethod
+    def at(cls, machine: OwnMachine, parameter: Parameter, experiment: int,
+           point: Point) -> StepResponse:
+        """Return the response of one test at a point."""
+        here = point.get(parameter.name, 0.0)
+        signed = parameter.step if here + 2.0 * parameter.step <= parameter.high else (
+            -parameter.step)
+        noise = machine.experiments[experiment].noise
+        before = machine.predict(point, experiment)
+        one, two = ((machine.predict({**point, parameter.name: here + count * signed}, experiment)
+                     - before) / noise for count in (1.0, 2.0))
+        there = np.isfinite(one) & np.isfinite(two)
+        if not there.any() or float(np.abs(one[there]).max()) < NO_RESPONSE:
+            return cls(False, 0.0)
+        size = 0.5 * math.sqrt(float(np.mean(two[there] ** 2)))
+        off = math.sqrt(float(np.mean((one[there] - 0.5 * two[there]) ** 2)))
+        return cls(True, off / size)
+
+
+def tests_of(machine: OwnMachine, parameter: Parameter) -> Sequence[int]:
+    """Return the tests on which a number acts."""
+    return [k for k in range(len(machine.logs)) if parameter.experiment in (None, k)]
+
+
+def where_it_acts(form: Form, parameter: Parameter) -> dict[str, float]:
+    """Return a point where an effect is there: at its edge many a law has a corner."""
+    return {**form.start, parameter.name: 0.25 * max(parameter.low, parameter.high, key=abs)}
+
+
+def derivative_error(machine: OwnMachine) -> float:
+    """
+    Return the share of a derivative of the readings that may be wrong, by the worst number.
+
+    It is how much a difference quotient changes where its step is doubled: next to nothing where a
+    simulation is smooth, and much where it sticks and slips.
+    """
+    places: list[tuple[Parameter, Point]] = [(parameter, {}) for parameter in machine.nuisances]
+    places += [(parameter, where_it_acts(form, parameter))
+               for effect in machine.effects.values() for form in effect.forms
+               for parameter in form.sizes]
+    return max((StepResponse.at(machine, parameter, k, point).roughness
+                for parameter, point in places for k in tests_of(machine, parameter)),
+               default=0.0)

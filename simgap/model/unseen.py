@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The proof of a diagnosis: a log that it never saw, predicted without fitting anything to it.
+
+A diagnosis weighs whitened residuals, in which a slow error counts little. A free run is judged by
+its rms, so the numbers are fitted once more to the diagnosed logs, by plain least squares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+import math
+
+import numpy as np
+from scipy.optimize import least_squares
+from simgap.logs.log import Log
+from simgap.machine.by_label import ByLabel, without_labels
+from simgap.machine.contract import FloatArray, Machine, Point
+from simgap.model.machine import OwnMachine
+from simgap.search.hypothesis import Hypothesis
+from simgap.verdict.diagnosis import Diagnosis
+
+_RUNS = 40
+
+
+@dataclass(frozen=True)
+class Unseen:
+    """
+    How far a reading of an unseen log is from its predictions, as rms in the reading's unit.
+
+    Attributes
+    ----------
+    configured : of the model as configured
+    before : of the model fitted to the logs of the diagnosis by least squares, without any effect
+    after : the same with the effects of the best answer
+    unit : of the reading
+
+    """
+
+    configured: float
+    before: float
+    after: float
+    unit: str
+
+
+def unseen(diagnosis: Diagnosis, log: Log,
+           push: Mapping[str, FloatArray] | None = None) -> dict[str, Unseen]:
+    """
+    Return how well a log that was not used is predicted, by reading.
+
+    Nothing is fitted to the log: a number that each test has of its own is the mean of those of
+    the diagnosed tests. An effect that has a size by label has that of the log's label.
+
+    Parameters
+    ----------
+    diagnosis
+        from `diagnose_logs`
+    log
+        another test of the same machine
+    push
+        what is known to have entered at some of the model's places, shape (n,) each
+
+    """
+    whole, machine = diagnosis.machine, without_labels(diagnosis.machine)
+    assert isinstance(machine, OwnMachine)
+    other = OwnMachine(machine.model, [log])
+    measured = other.experiments[0].measured
+    found = {}
+    points: list[Point] = [{}, *(refitted(whole, h) for h in (diagnosis.none, diagnosis.best))]
+    if isinstance(whole, ByLabel):
+        points = [whole.at(point, log.labels) for point in points]
+    readings = [other.pushed(_carried(machine, log.name, point), 0, push or {})
+                for point in points]
+    for j, (name, item) in enumerate(machine.model.readings.items()):
+        configured, before, after = (math.sqrt(float(np.nanmean(
+            (values[:, j] - measured[:, j]) ** 2))) for values in readings)
+        found[name] = Unseen(configured, before, after, item.unit)
+    return found
+
+
+def refitted(machine: Machine, hypothesis: Hypothesis) -> dict[str, float]:
+    """Return the values of a hypothesis as fitted to the machine's logs by least squares."""
+    point = hypothesis.state.point()
+    numbers = [p for p in (*machine.nuisances, *(p for form in hypothesis.forms
+                                                 for p in form.parameters)) if p.name in point]
+    low, high = (np.array([getattr(p, end) for p in numbers]) for end in ('low', 'high'))
+    sigmas = np.array([p.prior_sigma or math.inf for p in numbers])
+    steps = np.array([p.step for p in numbers])
+
+    def residuals(x: FloatArray) -> FloatArray:
+        here = {p.name: float(value) for p, value in zip(numbers, x, strict=True)}
+        parts = [x / sigmas]
+        for k, experiment in enumerate(machine.experiments):
+            parts.append(np.nan_to_num((machine.predict(here, k) - experiment.measured)
+                                       / experiment.noise).ravel())
+        return np.concatenate(parts)
+
+    def slopes(x: FloatArray) -> FloatArray:
+        here = residuals(x)
+        signed = np.where(x + steps <= high, steps, -steps)
+        return np.array([(residuals(x + step) - here) / signed[i]
+                         for i, step in enumerate(np.diag(signed))]).T
+
+    start = np.array([point[p.name] for p in numbers])
+    inside = 1e-9 * (high - low)
+    found = least_squares(residuals, np.clip(start, low + inside, high - inside), slopes,
+                          bounds=(low, high), x_scale=high - low, max_nfev=_RUNS)
+    return {p.name: float(value) for p, value in zip(numbers, found.x, strict=True)}
+
+
+def _carried(machine: OwnMachine, test: str, point: Point) -> dict[str, float]:
+    """Return the values of a point for another test."""
+    own = {f'{name}[{log.name}]' for name in machine.model.per_test for log in machine.logs}
+    carried = {name: value for name, value in point.items() if name not in own}
+    for name in machine.model.per_test:
+        carried[f'{name}[{test}]'] = float(np.mean(
+            [point.get(f'{name}[{log.name}]', 0.0) for log in machine.logs]))
+    return carried

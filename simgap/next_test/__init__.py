@@ -1,0 +1,3 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""The design of the next test, and the loop of test and verdict."""

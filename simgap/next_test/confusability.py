@@ -1,0 +1,221 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which effects a set of tests can and cannot tell apart, before the tests are made.
+
+An effect shows if it does more than its price even where the nuisances imitate as much of it as
+their tolerances allow. All derivatives are taken at one point, and what may be their error shows
+nothing. The angle between what the nuisances cannot imitate of two effects says whether one passes
+for the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+import math
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+from simgap.fit.box_qp import BoxQuadratic
+from simgap.fit.cholesky import factored, ROUNDING, solved
+from simgap.fit.least_squares import FitState, LeastSquares, prior_precision, proper_precision
+from simgap.fit.noise import with_model_error
+from simgap.machine.contract import FloatArray, Machine, Parameter
+from simgap.settings import DEFAULT, Settings
+
+# a size is told to this share of itself
+_SHARE = 0.01
+
+
+@dataclass(frozen=True)
+class Confusability:
+    """
+    What a set of tests can tell.
+
+    Attributes
+    ----------
+    effects : ids, m of them
+    detectable : least size that shows in any case, in the unit of the effect's first parameter;
+        infinite if none within its bounds does; shape (m,)
+    units : of that size
+    alike : share of the squared remainder of one effect that another can imitate, shape (m, m)
+    limit : share from which two effects count as alike
+
+    """
+
+    effects: tuple[str, ...]
+    detectable: FloatArray
+    units: tuple[str, ...]
+    alike: FloatArray
+    limit: float
+
+    def passing_for(self, index: int, most: int) -> list[str]:
+        """Return the effects that pass for one of them, the most alike first."""
+        return [self.effects[j] for j in np.argsort(-self.alike[index])
+                if j != index and self.alike[index, j] > self.limit][:most]
+
+    def groups(self) -> list[list[str]]:
+        """Return the groups of effects that pass for each other."""
+        left = set(range(len(self.effects)))
+        found = []
+        while left:
+            group = [min(left)]
+            left.discard(group[0])
+            for member in group:
+                near = [j for j in sorted(left) if self.alike[member, j] > self.limit]
+                group += near
+                left -= set(near)
+            if len(group) > 1:
+                found.append([self.effects[j] for j in group])
+        return found
+
+    def separated(self) -> float:
+        """Return the share of all pairs of effects that can be told apart."""
+        m = len(self.effects)
+        pairs = self.alike[np.triu_indices(m, 1)]
+        return float(np.mean(pairs < self.limit)) if pairs.size else 1.0
+
+
+def confusability(machine: Machine, progress: Callable[[float], None] = lambda share: None,
+                  settings: Settings = DEFAULT, inflated: float = 1.0) -> Confusability:
+    """
+    Say which effects the tests of a machine can tell apart.
+
+    Parameters
+    ----------
+    machine
+        whose measured readings are those that its model predicts
+    progress
+        called with the share that is done
+    settings
+        thresholds
+    inflated
+        by what differences of the cost are divided
+
+    """
+    problem = LeastSquares(machine.with_experiments(
+        with_model_error(machine.experiments, settings.noise)), settings=settings)
+    return visibility(problem, problem.start(machine.nuisances, {}), progress, inflated)
+
+
+def visibility(problem: LeastSquares, state: FitState,
+               progress: Callable[[float], None] = lambda share: None,
+               inflated: float = 1.0) -> Confusability:
+    """
+    Say how large each effect must be to show beside a fit of the nuisances, and what it is like.
+
+    Parameters
+    ----------
+    problem, state
+        the tests, and a fit of the nuisances with its Jacobian
+    progress
+        called with the share that is done
+    inflated
+        by what differences of the cost are divided
+
+    """
+    machine, settings = problem.machine, problem.settings
+    jacobian = state.jacobian
+    known = state.hessian + np.diag(proper_precision(state.parameters))
+    scale = np.sqrt(np.diag(known))
+    factor = factored(known / np.outer(scale, scale), ROUNDING)
+    ids, units, sizes, remainders = [], [], [], []
+    price = inflated * (settings.penalty.effect + settings.penalty.parameter)
+    imitation = _Imitation(state, settings.interval.derivative_error)
+    for i, effect in enumerate(machine.effects.values()):
+        progress(i / len(machine.effects))
+        form = machine.typical_form(effect)
+        first = form.parameters[0]
+        column = problem.jacobian({**state.point(), **form.start}, [first], state.residual,
+                                  central=False)[:, 0]
+        cross = (jacobian.T @ column).astype(float)
+        imitated = solved(factor, cross / scale) / scale
+        ids.append(effect.id)
+        units.append(first.unit)
+        sizes.append(imitation.least_visible(first, float(column @ column), cross, price))
+        remainders.append(column - jacobian @ imitated)
+    matrix = np.array(remainders)
+    gram = matrix @ matrix.T
+    size = np.sqrt(np.maximum(np.diag(gram), 1e-30))
+    alike = (gram / np.outer(size, size)) ** 2
+    return Confusability(tuple(ids), np.array(sizes), tuple(units), np.asarray(alike),
+                         settings.confusability.alike)
+
+
+class _Imitation:
+    """What nuisances within their bounds leave of an effect, by derivatives at one point."""
+
+    def __init__(self, state: FitState, derivative_error: float) -> None:
+        self._error = derivative_error
+        self._hessian = state.hessian + np.diag(prior_precision(state.parameters))
+        self._programme = BoxQuadratic(
+            self._hessian, np.array([p.low for p in state.parameters]) - state.x,
+            np.array([p.high for p in state.parameters]) - state.x)
+
+    def least_visible(self, number: Parameter, power: float, cross: FloatArray,
+                      price: float) -> float:
+        """
+        Return the size from which an effect is named, whichever sign it has.
+
+        It is then larger than its tolerance, and more than its price is left of it.
+
+        Parameters
+        ----------
+        number
+            the effect's first
+        power, cross
+            products of its column with itself and with those of the nuisances, shape (m,)
+        price
+            in halves of a chi-square
+
+        """
+        # where nothing imitates it; a little less, so that rounding does not make it visible
+        least = (1.0 - _SHARE) * math.sqrt(2.0 * price / power) if power > 0.0 else math.inf
+        least = max(least, number.tolerance)
+
+        def of_sign(sign: float, bound: float) -> float:
+            step: FloatArray | None = None
+
+            # the root finder asks for both ends again
+            @cache
+            def surplus(size: float) -> float:
+                nonlocal step
+                left, step = self._left(sign * size, power, cross, step)
+                return left - price
+
+            if bound <= least:
+                return math.inf
+            if surplus(least) >= 0.0:
+                return least
+            # What is left over the square of the size grows with it, so there is one such size. It
+            # is approached from below in small steps, each of which helps with the next.
+            low, high = least, least
+            while surplus(high) < 0.0:
+                if high >= bound:
+                    return math.inf
+                low, high = high, min(2.0 * high, bound)
+            return float(brentq(surplus, low, high, xtol=_SHARE * low))
+
+        return max(of_sign(sign, bound)
+                   for sign, bound in ((-1.0, -number.low), (1.0, number.high)) if bound > 0.0)
+
+    def _left(self, size: float, power: float, cross: FloatArray,
+              near: FloatArray | None) -> tuple[float, FloatArray]:
+        """Return what is surely left of a size, in halves of a chi-square, and who imitates it."""
+        gradient = -size * cross
+        step = self._programme.step(gradient, near)
+        whole = 0.5 * size ** 2 * power
+        imitated = float(gradient @ step - 0.5 * step @ self._hessian @ step)
+        return whole * (1.0 - self._error ** 2) - imitated, step
+
+
+def could_hide(problem: LeastSquares, state: FitState,
+               inflated: float = 1.0) -> list[dict[str, Any]]:
+    """Return how large each effect could be and still hide in these tests, for the JSON."""
+    found = visibility(problem, problem.refreshed(state), inflated=inflated)
+    return [{'effect': effect, 'size': float(size) if np.isfinite(size) else None, 'unit': unit}
+            for effect, size, unit in zip(found.effects, found.detectable, found.units,
+                                          strict=True)]

@@ -1,0 +1,285 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What a verdict knows of its rivals: the next test is designed from it, see `discrimination`.
+
+Each rival is a hypothesis with its numbers as fitted and how well the tests so far determine them.
+Numbers of a single test, such as where it starts, are integrated out: the next test has its own.
+
+Two answers may come from the same fit, where it is not sure that one of its effects is larger than
+its tolerance. Each of them is then taken at its mean in its own region: what it names is beyond
+the tolerances, and the rest is within them. A rival also holds these doubts: they say what it
+would take to end them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+import math
+from typing import Any
+
+import numpy as np
+from scipy.stats import truncnorm
+from simgap.fit.least_squares import LeastSquares
+from simgap.machine.contract import FloatArray, Form, Machine, Parameter, Point
+from simgap.search.hypothesis import Hypothesis
+from simgap.settings import PlanningSettings, Settings
+from simgap.verdict.doubts import Doubt
+from simgap.verdict.intervals import covariance
+from simgap.verdict.verdict import Answer
+
+# Digits of a covariance in a file: a number's deviation is known to a few percent at best.
+_DIGITS = 5
+# Variance that a number keeps at least within bounds, as a share of what it had.
+_LEAST_VARIANCE = 1e-6
+# No variance is less than this.
+_LEAST = 1e-30
+
+
+@dataclass(frozen=True)
+class Rival:
+    """
+    An answer of a verdict.
+
+    Attributes
+    ----------
+    named : effects that it names; none for 'none'
+    effects, forms : what was fitted, with the name of the form of each
+    probability : of the answer, in the verdict
+    names, values : numbers of the machine and of the effects, shape (m,)
+    covariance : of the values, shape (m, m)
+    doubts : what tells whether effects that it names are larger than their tolerances, by effect
+
+    """
+
+    named: tuple[str, ...]
+    effects: tuple[str, ...]
+    forms: tuple[str, ...]
+    probability: float
+    names: tuple[str, ...]
+    values: FloatArray
+    covariance: FloatArray
+    doubts: Mapping[str, Doubt] = field(default_factory=dict)
+
+    @property
+    def point(self) -> dict[str, float]:
+        """Return the values by name."""
+        return dict(zip(self.names, self.values.tolist(), strict=True))
+
+    def forms_of(self, machine: Machine) -> list[Form]:
+        """
+        Return the forms of the effects in a machine.
+
+        Raises
+        ------
+        KeyError : the machine's catalogue lacks an effect or a form
+
+        """
+        return [machine.form_named(machine.effects[effect], form)
+                for effect, form in zip(self.effects, self.forms, strict=True)]
+
+    def is_known_to(self, machine: Machine) -> bool:
+        """Return whether a machine has the effects in these forms."""
+        try:
+            self.forms_of(machine)
+        except KeyError:
+            return False
+        return True
+
+    def deviation(self, name: str) -> float:
+        """Return the standard deviation of one of the values."""
+        place = self.names.index(name)
+        return math.sqrt(max(float(self.covariance[place, place]), _LEAST))
+
+    def covariance_of(self, names: Sequence[str]) -> FloatArray:
+        """Return the covariance of some of the values."""
+        places = [self.names.index(name) for name in names]
+        return self.covariance[np.ix_(places, places)]
+
+    def as_data(self) -> dict[str, Any]:
+        """
+        Return the rival as plain data, for the JSON.
+
+        Of the covariance it has the lower triangle, each row a text: thousands of numbers, a line
+        each, would bury the verdict.
+        """
+        rows = [' '.join(f'{x:.{_DIGITS}g}' for x in row[:i + 1])
+                for i, row in enumerate(self.covariance)]
+        return {'named': list(self.named), 'effects': list(self.effects),
+                'forms': list(self.forms), 'probability': self.probability,
+                'names': list(self.names), 'values': self.values.tolist(), 'covariance': rows,
+                'doubts': {effect: asdict(doubt) for effect, doubt in self.doubts.items()}}
+
+    @classmethod
+    def of_data(cls, data: Mapping[str, Any]) -> Rival:
+        """
+        Take a rival from plain data.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError, AttributeError : it is none
+
+        """
+        names = tuple(data['names'])
+        lower = np.zeros((len(names), len(names)))
+        for i, row in enumerate(data['covariance']):
+            lower[i, :i + 1] = [float(x) for x in row.split()]
+        return cls(tuple(data['named']), tuple(data['effects']), tuple(data['forms']),
+                   float(data['probability']), names, np.array(data['values'], float),
+                   lower + np.tril(lower, -1).T,
+                   {effect: Doubt(**doubt) for effect, doubt in data.get('doubts', {}).items()})
+
+
+@dataclass(frozen=True)
+class Findings:
+    """
+    What the design of a further test takes from the tests so far.
+
+    Attributes
+    ----------
+    rivals : answers of the verdict; none before the first test
+    inflated : by what differences of the cost are divided
+    noise : of each sensor, see `noise.found_noise`; by default that of its data sheet
+    shown : smallest size at which an effect shows in these tests, in the unit of its first
+        parameter, by effect; where answers are open nobody asks for it
+    unnamed : probability that something without a name acts in a part of the machine, by part;
+        what they leave of 1 is spread over the whole catalogue
+
+    """
+
+    rivals: Sequence[Rival] = ()
+    inflated: float = 1.0
+    noise: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    shown: Mapping[str, float] = field(default_factory=dict)
+    unnamed: Mapping[str, float] = field(default_factory=dict)
+
+    def are_open(self, settings: Settings) -> bool:
+        """
+        Return whether there are answers to tell apart: several, and none of them sure.
+
+        Nor is there anything to tell apart if all others have less than `unknown` has at least,
+        or if it is likelier than each of them. What is open then is whether any effect of the
+        catalogue is true.
+        """
+        known = [rival.probability for rival in self.rivals]
+        return len(known) > 1 and self.unlisted < max(known) < min(
+            settings.planning.sure, (1.0 - settings.verdict.least_unknown) * sum(known))
+
+    @property
+    def unlisted(self) -> float:
+        """Return the probability that none of the answers is true."""
+        return 1.0 - sum(rival.probability for rival in self.rivals)
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the findings as plain data: the entry `planning` of a verdict."""
+        return {'inflation': self.inflated, 'noise': dict(self.noise), 'shown': dict(self.shown),
+                'unnamed': dict(self.unnamed),
+                'rivals': [rival.as_data() for rival in self.rivals]}
+
+    @classmethod
+    def of_data(cls, planning: Mapping[str, Any]) -> Findings:
+        """
+        Take the findings from the entry `planning` of a verdict.
+
+        A verdict of an earlier version lacks noise, doubts, what has shown or where something
+        unnamed may be, which is no error.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError, AttributeError : it holds none
+
+        """
+        return cls([Rival.of_data(item) for item in planning['rivals']],
+                   float(planning['inflation']), dict(planning.get('noise', {})),
+                   {effect: float(size) for effect, size in planning.get('shown', {}).items()},
+                   {part: float(share) for part, share in planning.get('unnamed', {}).items()})
+
+
+def rivals_of(problem: LeastSquares, answers: Sequence[Answer], inflated: float,
+              settings: PlanningSettings,
+              doubted: Callable[[Hypothesis], Mapping[str, Doubt]] = lambda hypothesis: {},
+              ) -> list[Rival]:
+    """
+    Return the likeliest answers of a verdict with what is known of their numbers.
+
+    Parameters
+    ----------
+    problem
+        the whole tests
+    answers
+        of the verdict, the likeliest first
+    inflated
+        variance over that with independent noise, see `intervals.inflation`
+    settings
+        thresholds
+    doubted
+        returns what tells whether a hypothesis' effects are larger than their tolerances
+
+    """
+    found = []
+    for answer in answers[:settings.rivals]:
+        if answer.probability < settings.least_probability:
+            continue
+        hypothesis, state = answer.hypothesis, answer.hypothesis.state
+        if state.kept_hessian is None:
+            state = hypothesis.with_jacobian(problem).state
+        shared = [j for j, p in enumerate(state.parameters) if p.experiment is None]
+        posterior = covariance(state, inflated, problem.settings.interval)
+        names = tuple(state.parameters[j].name for j in shared)
+        values, known = state.x[shared], posterior[np.ix_(shared, shared)]
+        for effect, form in zip(hypothesis.effects, hypothesis.forms, strict=True):
+            for size, low, high in _regions(form, state.point(), effect in answer.effects):
+                if size.name in names:
+                    values, known = within(values, known, names.index(size.name), low, high)
+        found.append(Rival(
+            answer.effects, hypothesis.effects, tuple(form.name for form in hypothesis.forms),
+            answer.probability, names, values, known,
+            {effect: doubt for effect, doubt in doubted(hypothesis).items()
+             if effect in answer.effects and doubt.size in names}))
+    return found
+
+
+def _regions(form: Form, point: Point, named: bool) -> list[tuple[Parameter, float, float]]:
+    """Return the sizes of an effect with the bounds that they have where it is named, or not."""
+    if form.is_course:
+        return []
+    if not named:
+        return [(p, -p.tolerance, p.tolerance) for p in form.sizes]
+    most = max(form.sizes, key=lambda p: abs(point[p.name]) - p.tolerance)
+    return [(most, most.tolerance, math.inf) if point[most.name] > 0.0 else
+            (most, -math.inf, -most.tolerance)]
+
+
+def within(values: FloatArray, known: FloatArray, place: int, low: float, high: float,
+           ) -> tuple[FloatArray, FloatArray]:
+    """
+    Return the mean and the covariance of normal numbers, given that one is within bounds.
+
+    The others follow it by regression (N. L. Johnson, S. Kotz, N. Balakrishnan, Continuous
+    Univariate Distributions, volume 1, chapter 13, section 10.1).
+
+    Parameters
+    ----------
+    values, known
+        mean, shape (m,), and covariance, shape (m, m)
+    place
+        of the one
+    low, high
+        its bounds; they may be equal or infinite
+
+    """
+    variance = known[place, place]
+    if variance <= 0.0:
+        return values, known
+    deviation = math.sqrt(variance)
+    a, b = (low - values[place]) / deviation, (high - values[place]) / deviation
+    mean, spread = a, 0.0
+    if a < b:
+        with np.errstate(invalid='ignore'):
+            mean, spread = (float(x) for x in truncnorm.stats(a, b))
+    # rounding may leave them; and none is known for sure: the covariance is inverted
+    mean, spread = min(max(mean, a), b), min(max(spread, _LEAST_VARIANCE), 1.0)
+    along = known[:, place] / deviation
+    return (np.asarray(values + along * mean),
+            np.asarray(known - (1.0 - spread) * np.outer(along, along)))

@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""What repeats with an angle: torque ripple, a cyclic error of a scale, a bent screw."""
+
+from __future__ import annotations
+
+import math
+
+from simgap.laws.compiling import inner
+
+
+@inner
+def wave(angle: float, order: float, cosine: float, sine: float) -> float:
+    """
+    Return a wave in the unit of its amplitudes.
+
+    Parameters
+    ----------
+    angle
+        that it follows [rad]
+    order
+        cycles per revolution
+    cosine, sine
+        amplitudes of its two parts
+
+    """
+    if cosine == 0.0 and sine == 0.0:
+        return 0.0
+    return cosine * math.cos(order * angle) + sine * math.sin(order * angle)
+
+
+@inner
+def harmonics(angle: float, order: float, amplitudes: tuple[float, ...]) -> float:
+    """
+    Return a wave with harmonics, in the unit of its amplitudes.
+
+    Parameters
+    ----------
+    angle
+        that it follows [rad]
+    order
+        of the fundamental, cycles per revolution
+    amplitudes
+        cosine and sine part of the fundamental, of the second harmonic, and so on
+
+    """
+    total = 0.0
+    for k in range(len(amplitudes) // 2):
+        total += wave(angle, (k + 1.0) * order, amplitudes[2 * k], amplitudes[2 * k + 1])
+    return total

@@ -1,0 +1,144 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a page about a diagnosis says to an engineer with two minutes, as plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+import math
+from typing import Any
+
+import numpy as np
+from simgap.machine.contract import Experiment, FloatArray
+from simgap.machine.diagram import Diagram, DiagramBlock
+from simgap.verdict.diagnosis import Diagnosis, share_text, value_lines
+
+_VERDICTS = {
+    'no_gap': ('No gap', 'Machine and model agree within tolerance and noise.'),
+    'too_few_to_judge': ('Too few samples', 'No gap shows, and none could.'),
+    'explained': ('Explained', 'A known effect closes the gap.'),
+    'partly_explained': ('Partly explained', 'A known effect closes some of the gap.'),
+    'unknown_effect': ('Unknown effect', 'Nothing in the catalogue closes the gap.'),
+}
+# How many hypotheses are shown, and how probable each has to be.
+_SHOWN, _LEAST = 8, 0.001
+# An effect so probable is still open.
+_OPEN = 0.05
+
+# Name, times [s] and values of a curve, shape (n,); group, title, unit and curves of a panel.
+Curve = tuple[str, FloatArray, FloatArray]
+Panel = tuple[str, str, str, Sequence[Curve]]
+
+
+@dataclass(frozen=True)
+class Likely:
+    """
+    A hypothesis.
+
+    Attributes
+    ----------
+    effects : their ids
+    probability : 0 to 1
+    causes : the physical cause of each effect that the catalogue knows
+    values : of the parameters, a line each
+
+    """
+
+    effects: Sequence[str]
+    probability: float
+    causes: Sequence[str]
+    values: list[str]
+
+
+@dataclass(frozen=True)
+class Contents:
+    """
+    All that the page says.
+
+    Attributes
+    ----------
+    title, lead : the verdict in two words and in a sentence
+    explained : how much of the gap its effects explain; empty if it names none
+    result : the JSON of docs/diagnosis.md, which holds the tables and notes
+    diagram : of the machine
+    blocks : its blocks, each with the probability that an effect sits there
+    likely : the likeliest hypotheses
+    panels : for each experiment the channel that gains most, measured and simulated, and the
+        difference
+    advice : tests that would settle what is open
+
+    """
+
+    title: str
+    lead: str
+    explained: str
+    result: Mapping[str, Any]
+    diagram: Diagram
+    blocks: Sequence[tuple[DiagramBlock, float]]
+    likely: Sequence[Likely]
+    panels: Sequence[Panel]
+    advice: Sequence[str]
+
+
+def contents(diagnosis: Diagnosis) -> Contents:
+    """Return what the page about a diagnosis says."""
+    result, effects = diagnosis.result, diagnosis.machine.effects
+    title, lead = _VERDICTS[result['verdict']]
+    suspicion = dict.fromkeys((effect.component for effect in effects.values()), 0.0)
+    for entry in result['which']:
+        for component in {effects[name].component for name in entry['effects']
+                          if name in effects}:
+            suspicion[component] += entry['probability']
+    diagram = diagnosis.machine.diagram or Diagram.of(suspicion)
+    shares = diagram.shares(suspicion)
+    likely = [Likely(entry['effects'], entry['probability'],
+                     [effects[name].cause for name in entry['effects'] if name in effects],
+                     value_lines(entry['parameters']))
+              for entry in result['which'][:_SHOWN] if entry['probability'] >= _LEAST]
+    fraction = result['how_far']['explained_fraction']
+    explained = '' if fraction['value'] is None else share_text(fraction)
+    return Contents(
+        title, lead, explained, result, diagram,
+        [(block, min(shares.get(block.component, 0.0), 1.0)) for block in diagram.blocks],
+        likely, _panels(diagnosis), _advice(diagnosis))
+
+
+def _panels(diagnosis: Diagnosis) -> list[Panel]:
+    machine = diagnosis.machine
+    before, after = machine.simulate([diagnosis.none.state.point(), diagnosis.best.state.point()])
+    panels: list[Panel] = []
+    for experiment, first, second in zip(machine.experiments, before, after, strict=True):
+        assert first is not None and second is not None
+        panels += _of_experiment(experiment, first, second)
+    return panels
+
+
+def _of_experiment(experiment: Experiment, before: FloatArray,
+                   after: FloatArray) -> tuple[Panel, Panel]:
+    gain = np.nansum(((experiment.measured - before) / experiment.noise) ** 2
+                     - ((experiment.measured - after) / experiment.noise) ** 2, axis=0)
+    gain[~np.isfinite(experiment.measured).any(axis=0)] = -math.inf
+    channel = int(np.argmax(gain))
+    name, unit, time = experiment.channels[channel], experiment.units[channel], experiment.time
+    measured = experiment.measured[:, channel]
+    simulated = {'before': before[:, channel], 'after': after[:, channel]}
+    return ((experiment.name, name, unit,
+             [(key, time, values)
+              for key, values in {'measured': measured, **simulated}.items()]),
+            (experiment.name, 'measured less simulated', unit,
+             [(key, time, measured - values) for key, values in simulated.items()]))
+
+
+def _advice(diagnosis: Diagnosis) -> list[str]:
+    """Return which tests would settle what is open, as the machine knows them."""
+    result = diagnosis.result
+    names = {name for group in result['confusable'] for name in group}
+    for entry in result['which']:
+        if entry['probability'] > _OPEN:
+            names |= {name for name in entry['effects'] if name in diagnosis.machine.effects}
+    if len(names) < 2 and result['verdict'] in ('explained', 'no_gap'):
+        return []
+    kinds = {name.partition('.')[2] for name in names}
+    return [text for effects, text in diagnosis.machine.advice
+            if not effects or kinds & set(effects)]

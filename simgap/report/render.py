@@ -1,0 +1,56 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Builds every page: plain data go into a template, one file of HTML comes out.
+
+A page needs no network and no program but a browser. Templates escape whatever they are given,
+so no text from a recording can become a part of the page itself.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+from simgap.report.curves import plotted
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+FOLDER = Path(__file__).parent
+TEMPLATES = FOLDER / 'templates'
+
+
+def render(template: str, folder: Path = TEMPLATES, **contents: object) -> str:
+    """
+    Return a page as HTML.
+
+    Parameters
+    ----------
+    template
+        name of a file whose first lines list the contents that it needs
+    folder
+        where it lies; what it extends or includes may lie in this room's templates/
+    contents
+        plain data by name
+
+    Raises
+    ------
+    jinja2.UndefinedError : the template needs something that was not given
+
+    """
+    return _environment(folder).get_template(template).render(contents)
+
+
+@cache
+def _environment(folder: Path) -> Environment:
+    environment = Environment(
+        loader=FileSystemLoader([folder, TEMPLATES]), undefined=StrictUndefined, autoescape=True,
+        trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
+    environment.globals.update(file=_file, plotted=plotted)
+    environment.policies['json.dumps_kwargs'] = {'allow_nan': False}
+    return environment
+
+
+def _file(name: str) -> Markup:
+    """Return a file of this room as it is: a style or a script of our own or of a library."""
+    return Markup((FOLDER / name).read_text(encoding='utf-8'))

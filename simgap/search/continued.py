@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Answers of an earlier verdict, fitted to more tests than it has seen.
+
+A test in which motors creep and stick may hold every fit that begins at the model as configured in
+a wrong minimum. An answer of the earlier tests begins near its optimum. Where the new test leaves
+much at first, the noise counts as louder for one fit: the hills between the minima are lower then
+(graduated non-convexity: A. Blake, A. Zisserman, Visual Reconstruction, 1987).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+from simgap.fit.least_squares import LeastSquares, settled, with_initial_conditions
+from simgap.next_test.rivals import Rival
+from simgap.search.hypothesis import Hypothesis
+
+
+def continued(problem: LeastSquares, rivals: Sequence[Rival],
+              concurrently: Callable[..., Iterable[Any]] = map) -> list[Hypothesis]:
+    """
+    Return answers of an earlier verdict as they fit all tests, at the sensors' own noise.
+
+    Two answers of the same fit are one. One whose effects the machine does not know is left out.
+
+    Parameters
+    ----------
+    problem
+        all tests, those of the earlier verdict and others
+    rivals
+        its answers
+    concurrently
+        maps a function over them
+
+    """
+    unique = {(rival.effects, rival.forms): rival for rival in rivals
+              if rival.is_known_to(problem.machine)}
+    return list(concurrently(lambda rival: _continued(problem, rival), unique.values()))
+
+
+def _continued(problem: LeastSquares, rival: Rival) -> Hypothesis:
+    machine, options = problem.machine, problem.settings.search
+    forms = tuple(rival.forms_of(machine))
+    parameters = (*machine.nuisances, *(p for form in forms for p in form.parameters))
+    names = {p.name for p in parameters}
+    point = {name: value for name, value in rival.point.items() if name in names}
+    point = with_initial_conditions(problem, point)
+    if problem.noise_level(problem.residuals(point)) > options.continued_noise:
+        noisy = problem.at_scale(options.continued_noise)
+        state = noisy.fit(noisy.start(parameters, point), options.settling_iterations)
+        point = with_initial_conditions(problem, state.point())
+    state = problem.fit(problem.start(parameters, point), options.settling_iterations)
+    return Hypothesis(rival.effects, forms, settled(
+        problem, state, options, options.settling_passes, options.settling_iterations))

@@ -1,0 +1,198 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Stepwise selection: whether each effect of a hypothesis is needed, and whether another one is.
+
+A fit of a hundred nuisances may stop before it has converged, and that looks like a weak effect.
+Where an effect gains little, the fit without it is therefore run until it has converged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+import math
+from typing import Protocol
+
+from simgap.search.hypothesis import Hypothesis
+from simgap.settings import Settings
+from simgap.verdict import verdict
+
+
+class Fits(Protocol):
+    """What runs fits until they have converged, see `full_fits.FullFits`."""
+
+    def converged(self, hypothesis: Hypothesis) -> Hypothesis:
+        """Go on with a fit."""
+
+    def without(self, hypothesis: Hypothesis, effect: str) -> Hypothesis:
+        """Return a hypothesis without one of its effects, fitted until it has converged."""
+
+    def simpler(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
+        """Return which effects could be simpler ones that they become, each with such a one."""
+
+    def elsewhere(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
+        """Return which effects could act in another place, each with the effect there."""
+
+    def exchanged(self, hypothesis: Hypothesis, effect: str, other: str) -> Hypothesis:
+        """Return a hypothesis with another effect in the place of one, fitted to its end."""
+
+    def joined(self, hypothesis: Hypothesis) -> Hypothesis | None:
+        """Return one effect in place of the same one in each of its places; None if not so."""
+
+    def with_another(self, hypothesis: Hypothesis) -> list[Hypothesis]:
+        """Return a hypothesis whose fit has converged with each of a few more effects."""
+
+    def leaves_much(self, hypothesis: Hypothesis) -> bool:
+        """Return whether a hypothesis leaves more than noise."""
+
+    def judged_by(self, best: Hypothesis,
+                  hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return hypotheses with their costs at the noise that one of them leaves."""
+
+
+def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings: Settings,
+                         ) -> tuple[list[Hypothesis], Hypothesis]:
+    """
+    Test each doubtful effect of the best hypothesis, until the best has none.
+
+    Where its effects are one effect in each of its places, this one is tried, too, and so is a
+    simpler effect that one of them becomes at an end of its range.
+
+    Parameters
+    ----------
+    fits
+        to the whole tests, which the hypotheses come from
+    hypotheses
+        fitted ones, the nuisances alone first
+    settings
+        thresholds
+
+    Returns
+    -------
+    the hypotheses in their order, and the best of them with a fit that has converged
+
+    """
+    found = {frozenset(h.effects): h for h in hypotheses}
+    tried: set[frozenset[str]] = set()
+    best = verdict.best(hypotheses, settings)
+    converged = fits.converged(best)
+    while True:
+        rests = {effect: frozenset(best.effects) - {effect} for effect in best.effects}
+        # A hypothesis that is far behind may have stopped early. Then the curvature tells that
+        # the effect gains little.
+        doubtful = {effect: rest for effect, rest in rests.items() if rest not in tried and min(
+            found[rest].cost - best.cost if rest in found else math.inf,
+            converged.loss_without(effect)) < settings.search.doubtful * best.cost}
+        simplified = [fits.without(converged, effect) for effect in doubtful]
+        tried.update(doubtful.values())
+        for effect, other in fits.simpler(converged):
+            if (key := rests[effect] | {other}) not in tried:
+                tried.add(key)
+                simplified.append(fits.exchanged(converged, effect, other))
+        if (key := frozenset(best.effects)) not in tried and (whole := fits.joined(converged)):
+            tried.add(key)
+            simplified.append(whole)
+        if not simplified:
+            return list(found.values()), converged
+        for simpler in simplified:
+            # all other fits are taken to be as far from convergence as that of the best was
+            behind = simpler.cost + best.cost - converged.cost
+            rest = frozenset(simpler.effects)
+            if rest not in found or behind < found[rest].cost:
+                found[rest] = replace(simpler, state=replace(simpler.state, cost=behind))
+        leading = verdict.best(list(found.values()), settings)
+        if leading is not best:
+            best, converged = leading, fits.converged(leading)
+
+
+def settled_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
+                   settings: Settings) -> tuple[list[Hypothesis], Hypothesis]:
+    """
+    Take fits close behind the best to their ends, too: only there can they be told apart.
+
+    A rival may be close only together with a partner that is no larger than its tolerance. It is
+    then fitted without the partner, and so is the best itself. An effect in another place is a
+    rival, too, also where the search has given it up: of two motors, far from its end, the wrong
+    one may win. It begins where the best has ended, because its own fit may have got stuck.
+
+    Parameters and what is returned are those of `forward_selection`.
+    """
+    options, price = settings.search, settings.penalty
+    found = {frozenset(h.effects): h for h in hypotheses}
+    first = found[frozenset(best.effects)]
+    behind = first.cost - best.cost
+    size = len(best.effects)
+    close = max(options.close, options.close_share * first.cost)
+    rivals = [h for h in hypotheses if h is not first and len(h.effects) == size > 0
+              and h.penalised(price) < first.penalised(price) + close]
+    # a member that is no larger than its tolerance only helped the fit of the others along
+    helped = [(h, effect) for h in hypotheses for effect in sorted(set(h.effects) - set(h.named))
+              if len(h.effects) == size + 1 > 1 and h.cost < first.cost + close]
+    ways: list[tuple[float, frozenset[str], Callable[[], Hypothesis]]] = [
+        *((h.cost, frozenset(h.effects), partial(fits.converged, h)) for h in rivals),
+        *((h.cost, frozenset(h.effects) - {effect}, partial(fits.without, h, effect))
+          for h, effect in helped)]
+    # several ways may lead to the same effects: only the nearest one is taken
+    nearest: dict[frozenset[str], Callable[[], Hypothesis]] = {}
+    for _, effects, taken in sorted(ways, key=lambda way: way[0]):
+        nearest.setdefault(effects, taken)
+    own = frozenset(best.effects)
+    others = [effects for effects in nearest if effects != own][:options.rivals]
+    ends = [nearest[effects] for effects in (own, *others) if effects in nearest]
+    ends += [partial(fits.exchanged, best, effect, other)
+             for effect, other in fits.elsewhere(best)
+             if (there := found.get(own - {effect} | {other})) is None
+             or there.cost < first.cost + close]
+    for taken in ends:
+        end = taken()
+        rival = found.get(frozenset(end.effects))
+        if rival is None or end.cost + behind < rival.cost:
+            found[frozenset(end.effects)] = replace(
+                end, state=replace(end.state.without_jacobian(keep_hessian=True),
+                                   cost=end.cost + behind))
+        if end.penalised(price) < best.penalised(price):
+            best = end
+    return list(found.values()), best
+
+
+def forward_selection(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
+                      settings: Settings) -> tuple[list[Hypothesis], Hypothesis]:
+    """
+    Add effects one after the other, until none is worth its price.
+
+    A single effect is left alone if it leaves only noise: the search has tried its partners.
+
+    Parameters
+    ----------
+    fits
+        to the whole tests, which the hypotheses come from
+    hypotheses
+        from `backward_elimination`
+    best
+        the best of them, with a fit that has converged
+    settings
+        thresholds
+
+    Returns
+    -------
+    the hypotheses, and the best of them with a fit that has converged
+
+    """
+    found = list(hypotheses)
+    while (0 < len(best.effects) < settings.search.most_effects
+           and (len(best.effects) > 1 or fits.leaves_much(best))):
+        # the best as it has converged, so that it does not lose to fits that went further
+        found = [best if set(h.effects) == set(best.effects) else h for h in found]
+        more = fits.with_another(best)
+        if not more:
+            break
+        found = fits.judged_by(min(more, key=lambda h: h.cost), [*found, *more])
+        leading = verdict.best(found, settings)
+        if len(leading.effects) <= len(best.effects):
+            found = fits.judged_by(leading, found)
+            best = next(h for h in found if set(h.effects) == set(best.effects))
+            break
+        best = fits.converged(leading)
+    return found, best

@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""A ranking of hypotheses without a verdict, for callers that judge them in their own way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from simgap.fit.blas import one_blas_thread
+from simgap.fit.least_squares import LeastSquares
+from simgap.machine.contract import Machine
+from simgap.search.full_fits import FullFits
+from simgap.search.search import Search
+from simgap.settings import DEFAULT, Settings
+from simgap.verdict import verdict
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """
+    Hypotheses by probability, 'unknown' left out.
+
+    Attributes
+    ----------
+    answers : the likeliest first
+    confusable : groups of effects that the data cannot tell apart
+
+    """
+
+    answers: Sequence[verdict.Answer]
+    confusable: Sequence[Sequence[str]]
+
+
+def _untold(share: float, doing: str) -> None:
+    """Tell nobody how far it is."""
+
+
+def rank_hypotheses(machine: Machine, settings: Settings = DEFAULT) -> Ranking:
+    """Search for the effects that a machine lacks, and rank what was found."""
+    with one_blas_thread():
+        whole = LeastSquares(machine, settings=settings)
+        found = FullFits(whole, _untold).compared(*Search(whole, _untold).run())
+    return Ranking(verdict.rank(found, 0.0, settings), verdict.confusable(found, settings))

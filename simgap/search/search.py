@@ -1,0 +1,450 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The search for effects: from the nuisances alone over single effects to pairs.
+
+1. The nuisances are fitted without any effect: the hypothesis 'none'. While something strong is
+   missing, the misfit counts as noise, and the nuisances stay close to their priors.
+2. A screening by derivatives says how much of the residual each effect could explain.
+3. The best dozen are fitted, each together with all nuisances. While they leave much, the
+   effect that each single test promises most of is fitted, too. If the best explains much, the
+   noise is lowered to what it leaves, and the best are fitted again.
+4. Several of the best are given partners, and the pairs are fitted.
+
+The answers of an earlier verdict on some of the tests are fitted as well, each from where it has
+ended there.
+
+All this is done with coarser steps of the simulation. The best are then fitted to the whole tests
+and compared (`full_fits`).
+"""
+
+from __future__ import annotations
+
+from bisect import insort
+from collections.abc import Callable, Collection, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+from typing import Any, TypeVar
+
+import numpy as np
+from simgap.fit.least_squares import (
+    FitState, Jacobian, LeastSquares, led, settled, with_initial_conditions,
+)
+from simgap.machine.contract import Effect, Form, Point
+from simgap.next_test.rivals import Rival
+from simgap.search.continued import continued
+from simgap.search.hypothesis import Hypothesis
+from simgap.search.refitting import dropped, refitted, shared_jacobian
+from simgap.search.screening import (
+    jacobian_of_form, rescaled, scan, screened, sensitivities, Sensitivity,
+)
+
+Item = TypeVar('Item')
+
+
+def _others(hypothesis: Hypothesis, form: Form) -> list[int]:
+    """Return which of a hypothesis' parameters are not a form's."""
+    return [j for j, p in enumerate(hypothesis.state.parameters) if p not in form.parameters]
+
+
+def _put(items: tuple[Item, ...], place: int, item: Item) -> tuple[Item, ...]:
+    """Return a tuple with another item in a place."""
+    return (*items[:place], item, *items[place + 1:])
+
+
+class Search:
+    """
+    The search for the effects that a model lacks.
+
+    Parameters
+    ----------
+    problem
+        the machine in its experiments
+    progress
+        called with the share that is done, 0 to 1, and what is being done
+    threads
+        how many hypotheses are fitted at once
+    earlier
+        answers of a verdict on some of the tests
+
+    """
+
+    def __init__(self, problem: LeastSquares, progress: Callable[[float, str], None],
+                 threads: int = 1, earlier: Sequence[Rival] = ()) -> None:
+        """Prepare to search."""
+        self._pool, self._earlier = ThreadPoolExecutor(threads), earlier
+        self.settings = problem.settings.search
+        self.machine = problem.machine.truncated()
+        self.problem = LeastSquares(self.machine, settings=problem.settings)
+        self.progress = progress
+        self.sensitivities: list[Sensitivity] = []
+        # what the earlier answers do for all tests, at the sensors' own noise
+        self._earlier_fits: list[Hypothesis] = []
+
+    def run(self) -> tuple[Hypothesis, list[Hypothesis], list[Hypothesis]]:
+        """Return the nuisances alone, and what one effect and two can do, each the best first."""
+        self.progress(0.0, 'nuisances')
+        self._earlier_fits = continued(self.problem, self._earlier, self._pool.map)
+        none, singles = self._none_and_singles()
+        singles = self._at_lower_noise(singles)
+        singles = self._leading_settled(singles, self._to_settle(singles[0]))
+        if self.problem.scale > 1.0:
+            singles = self._at_lower_noise(self._exchanged(singles))
+        self.progress(0.5, 'pairs of effects')
+        pairs = self._pairs(singles)
+        if pairs:
+            scale = self.problem.scale
+            pairs = self._improved(self._at_lower_noise(pairs))
+            # costs compare at one and the same noise only
+            singles = [replace(h, state=self.problem.rescaled(h.state, scale)) for h in singles]
+        self.progress(0.7, 'the best in full')
+        return none, singles, pairs
+
+    def _none_and_singles(self) -> tuple[Hypothesis, list[Hypothesis]]:
+        """Fit the nuisances alone and with single effects, again where the former got stuck."""
+        none = self._nuisances_alone()
+        singles = self._singles(none)
+        for _ in range(self.settings.fresh_starts):
+            freed = self._freed(none, singles[0])
+            if freed is None:
+                break
+            none, singles = freed, self._singles(freed)
+        return none, singles
+
+    def _earlier_answers(self) -> list[Hypothesis]:
+        """Return the earlier answers as they fit all tests, with costs at the present noise."""
+        return [replace(h, state=self.problem.rescaled(h.state, 1.0)) for h in self._earlier_fits]
+
+    # -- the nuisances, and the noise ------------------------------------------------------------
+
+    def _nuisances_alone(self) -> Hypothesis:
+        """Fit the nuisances alone; the misfit counts as noise."""
+        iterations = self.settings.iterations
+        point = self._beginning()
+        first = self.problem.start(self.machine.nuisances, point)
+        self.problem = self._at_noise(self.problem.noise_level(first.residual))
+        state = self.problem.start(self.machine.nuisances, point,
+                                   first.jacobian / self.problem.scale)
+        return Hypothesis((), (), self._at_falling_noise(self.problem.fit(state, iterations)))
+
+    def _beginning(self) -> dict[str, float]:
+        """Return the nuisances as configured, or as the earlier answer has them that fits best."""
+        names = {p.name for p in self.machine.nuisances}
+        begins: list[Point] = [{}, *(
+            {name: value for name, value in known.state.point().items() if name in names}
+            for known in self._earlier_fits)]
+        return min((with_initial_conditions(self.problem, dict(begin)) for begin in begins),
+                   key=lambda point: self.problem.loss(self.problem.residuals(point)))
+
+    def _at_falling_noise(self, state: FitState) -> FitState:
+        """Go on with a fit of the nuisances alone, with the noise that it leaves."""
+        iterations = self.settings.iterations
+        for _ in range(self.settings.first_passes):
+            before, cost = self.problem.scale, state.cost
+            self.problem = self._at_noise(min(before, self.problem.noise_level(state.residual)))
+            point = with_initial_conditions(self.problem, state.point())
+            state = self.problem.fit(self.problem.start(self.machine.nuisances, point), iterations)
+            if self.problem.scale > self.settings.sharper * before and (
+                    before > 1.0 or cost - state.cost < self.settings.first_gain * cost):
+                break
+        return state
+
+    def _freed(self, none: Hypothesis, best: Hypothesis) -> Hypothesis | None:
+        """
+        Return the nuisances alone from where the best single effect has ended; None if as before.
+
+        An effect of next to no size may gain much, because its fit went round what held the fit
+        of the nuisances alone. By its curvature the effect itself gains little.
+        """
+        gain = none.cost - best.cost
+        own = self.settings.stuck * gain
+        if best.has_course or best.loss_without(best.effects[0]) > own:
+            return None
+        bare = dropped(self.machine, best, best.effects[0]).state
+        state = self.problem.fit(
+            self.problem.start(bare.parameters, bare.point()), self.settings.iterations)
+        if state.cost > best.cost + own:
+            return None
+        return Hypothesis((), (), self._at_falling_noise(state))
+
+    def _at_noise(self, level: float) -> LeastSquares:
+        """Return the problem with the misfit as noise, or the sensors' noise if it is small."""
+        return self.problem.at_scale(level if level > self.settings.strong else 1.0)
+
+    def _at_lower_noise(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Lower the noise to what the best hypothesis leaves, and fit the best again."""
+        found = list(hypotheses)
+        for _ in range(self.settings.scale_passes):
+            best = found[0].state
+            level = self.problem.noise_level(best.residual)
+            problem = self._at_noise(min(self.problem.scale, level))
+            if problem.scale > self.settings.sharper * self.problem.scale:
+                break
+            self.sensitivities = rescaled(self.sensitivities, self.problem.scale / problem.scale)
+            self.problem = problem
+            finalists = found[:self.settings.most_finalists]
+            shared = shared_jacobian(problem, best, finalists)
+            found = self._sorted(partial(
+                refitted, problem, shared, self.settings.iterations), finalists)
+        return found
+
+    # -- single effects ------------------------------------------------------------------------
+
+    def _take_sensitivities(self, state: FitState) -> None:
+        self.sensitivities = sensitivities(self.problem, state, self._pool.map)
+
+    def _sorted(self, fitted: Callable[[Any], Hypothesis], of: Iterable[Any],
+                full: int | None = None) -> list[Hypothesis]:
+        """
+        Fit several hypotheses at once; return the best first.
+
+        Only the first `full` keep their Jacobians, which take most of the memory; None for all.
+        """
+        found: list[Hypothesis] = []
+        for hypothesis in self._pool.map(fitted, of):
+            insort(found, hypothesis, key=self._priced)
+            if full is not None:
+                found[full:] = [h.without_jacobian() for h in found[full:]]
+        return found
+
+    def _priced(self, hypothesis: Hypothesis) -> float:
+        return hypothesis.penalised(self.problem.settings.penalty)
+
+    def _singles(self, none: Hypothesis) -> list[Hypothesis]:
+        options = self.settings
+        self.progress(0.15, 'sensitivity to each effect')
+        self._take_sensitivities(none.state)
+        self.progress(0.25, 'single effects')
+        found = self._sorted(
+            lambda entry: self._added(none, entry[1], entry[1].jacobian),
+            screened(self.problem, none.state, self.sensitivities)[:options.singles],
+            options.finalists)
+        if self.problem.leaves_much(none.state):
+            found += self._sorted(
+                lambda entry: self._added_at(none, *entry),
+                scan(self.problem, none.state, self.sensitivities), options.finalists)
+            found.sort(key=self._priced)
+        self.progress(0.35, 'single effects')
+        leading = self._sorted(lambda h: self._continued(h, options.iterations),
+                               found[:options.finalists])
+        if self.problem.leaves_much(leading[0].state):
+            leading = self._with_better(leading, self._led_by_tests(
+                none, [h.effects[0] for h in leading[:options.bases]]))
+        leading = self._with_better(
+            leading, (h for h in self._earlier_answers() if len(h.effects) == 1))
+        leading[:2] = self._sorted(self._settled, leading[:2])
+        leading = self._with_relatives(leading)
+        return [*leading[:options.bases], *(h.without_jacobian() for h in leading[options.bases:])]
+
+    def _led_by_tests(self, none: Hypothesis, known: Collection[str]) -> list[Hypothesis]:
+        """
+        Return the effects that single tests promise, each fitted to its test and then to all.
+
+        A creep in which motors stick holds every fit to all tests in one of its minima, and what
+        it promises there is wrong. Another test alone may still show what is missing.
+        """
+        asked: dict[str, tuple[int, Form]] = {}
+        for k in range(len(self.problem.experiments)):
+            weight = np.zeros_like(none.state.weight)
+            weight[self.problem.rows(k)] = none.state.weight[self.problem.rows(k)]
+            promises = screened(
+                self.problem, replace(none.state, weight=weight), self.sensitivities)
+            best = next((item for _, item in promises if not item.form.is_course), None)
+            if best is not None and best.effect not in known:
+                asked.setdefault(best.effect, (k, best.form))
+
+        def fitted(entry: tuple[str, tuple[int, Form]]) -> Hypothesis:
+            effect, (k, form) = entry
+            part = self.problem.of_experiment(k)
+            start = part.start(
+                (*none.state.parameters, *form.parameters),
+                with_initial_conditions(part, {**none.state.point(), **form.start}))
+            state = part.fit(start, self.settings.settling_iterations)
+            return self._settled(Hypothesis((effect,), (form,), state))
+
+        return list(self._pool.map(fitted, asked.items()))
+
+    def _added(self, base: Hypothesis, item: Sensitivity, columns: Jacobian) -> Hypothesis:
+        """Fit an effect on top of a hypothesis, with these derivatives, for a few iterations."""
+        state = self.problem.extended(
+            base.state, item.form.parameters, [p.start for p in item.form.parameters], columns)
+        state = self.problem.fit(state, self.settings.first_iterations)
+        return Hypothesis((*base.effects, item.effect), (*base.forms, item.form), state)
+
+    def _added_at(self, base: Hypothesis, item: Sensitivity, sizes: Point) -> Hypothesis:
+        """Fit an effect on top of a hypothesis, from sizes that a scan has found."""
+        form = item.form
+        state = self.problem.start_from(
+            base.state.parameters, base.state.jacobian, form.parameters,
+            {**base.state.point(), **form.start, **sizes})
+        return Hypothesis((*base.effects, item.effect), (*base.forms, form),
+                          self.problem.fit(state, self.settings.iterations))
+
+    def _continued(self, hypothesis: Hypothesis, iterations: int) -> Hypothesis:
+        """Go on with a fit; where the effect is there, its shape has derivatives of its own."""
+        state, own = hypothesis.state, hypothesis.forms[-1].parameters
+        if any(p.is_shape for p in own):
+            names = {p.name for p in own}
+            indices = [j for j, p in enumerate(state.parameters) if p.name in names]
+            state = self.problem.with_columns(state, indices, self.problem.jacobian(
+                state.point(), own, state.residual, central=True))
+        return replace(hypothesis, state=self.problem.fit(state, iterations))
+
+    def _settled(self, hypothesis: Hypothesis) -> Hypothesis:
+        """Fit with a fresh Jacobian."""
+        point = with_initial_conditions(self.problem, hypothesis.state.point())
+        state = self.problem.start(hypothesis.state.parameters, point)
+        return replace(hypothesis, state=self.problem.fit(
+            state, self.settings.settling_iterations))
+
+    def _to_settle(self, best: Hypothesis) -> int:
+        """Return how many fits to go on with: more if the best leaves much and may be wrong."""
+        return (self.settings.most_finalists if self.problem.leaves_much(best.state)
+                else self.settings.bases)
+
+    def _leading_settled(self, hypotheses: Sequence[Hypothesis], count: int) -> list[Hypothesis]:
+        """Go on with the best fits: one that has stopped early hides what its effect can do."""
+        options = self.settings
+
+        def went_on(hypothesis: Hypothesis) -> Hypothesis:
+            state = settled(self.problem, hypothesis.state, options, options.settling_passes,
+                            options.settling_iterations)
+            if self.problem.leaves_much(state) and not hypothesis.has_course:
+                state = led(self.problem, state, options)
+            return replace(hypothesis, state=state)
+
+        leading = self._pool.map(went_on, hypotheses[:count])
+        return sorted([*leading, *hypotheses[count:]], key=self._priced)
+
+    def _with_relatives(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """
+        Return hypotheses with those whose effects do the same in other places, the best first.
+
+        Each begins with the nuisances of the best and at a size that does as much. From far away
+        its fit may have ended elsewhere, and 'both motors' then lost to one.
+        """
+        best = hypotheses[0]
+        return self._with_better(hypotheses, self._pool.map(
+            lambda item: self._moved(best, *item),
+            [(place, *item) for place in range(len(best.effects))
+             for item in self.machine.relatives(best.effects[place])
+             if item[0].id not in best.effects]))
+
+    def _exchanged(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """
+        Return hypotheses with those that a scan finds in the place of an effect of the best one.
+
+        The nuisances alone were bent by the effect that is missing. With those of the best effect
+        another one may fit better: gravity in place of a steady wind.
+        """
+        best = hypotheses[0]
+        if best.has_course:
+            return list(hypotheses)
+        found: list[Hypothesis] = []
+        for place, effect in enumerate(best.effects):
+            bare, kept = dropped(self.machine, best, effect), _others(best, best.forms[place])
+            bare = replace(bare, state=self.problem.start(
+                bare.state.parameters, bare.state.point(), best.state.jacobian[:, kept]))
+            found += self._pool.map(
+                partial(lambda base, entry: self._added_at(base, *entry), bare),
+                scan(self.problem, bare.state, self.sensitivities, bare.effects))
+        return self._with_better(hypotheses, found)
+
+    def _with_better(self, hypotheses: Sequence[Hypothesis],
+                     others: Iterable[Hypothesis]) -> list[Hypothesis]:
+        """Return hypotheses and others, of those with the same effects the better, sorted."""
+        found = {frozenset(zip(h.effects, h.forms, strict=True)): h for h in hypotheses}
+        for new in others:
+            key = frozenset(zip(new.effects, new.forms, strict=True))
+            if key not in found or self._priced(new) < self._priced(found[key]):
+                found[key] = new
+        return sorted(found.values(), key=self._priced)
+
+    def _moved(self, base: Hypothesis, place: int, effect: Effect, factor: float) -> Hypothesis:
+        """Fit an effect in the place of one of a hypothesis', from its size times a factor."""
+        was = base.forms[place]
+        form = self.machine.counterpart(was, self.machine.effects[base.effects[place]], effect)
+        point = base.state.point()
+        for old, new in zip(was.parameters, form.parameters, strict=True):
+            point[new.name] = point.pop(old.name) * (1.0 if new.is_shape else factor)
+        return Hypothesis(
+            _put(base.effects, place, effect.id), _put(base.forms, place, form),
+            self._in_place_of(base, was, (form,), point))
+
+    def _in_place_of(self, base: Hypothesis, was: Form, forms: Sequence[Form],
+                     point: dict[str, float]) -> FitState:
+        """Fit effects in the place of one of a hypothesis', from a point."""
+        state, kept = base.state, _others(base, was)
+        start = self.problem.start_from(
+            [state.parameters[j] for j in kept], state.jacobian[:, kept],
+            [p for form in forms for p in form.parameters], point)
+        return self.problem.fit(start, self.settings.iterations)
+
+    # -- pairs ---------------------------------------------------------------------------------
+
+    def _pairs(self, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Give the best singles a few partners each."""
+        options = self.settings
+        best = singles[0]
+        # beside the best, another effect may look different: it may have hidden a ripple
+        if self.problem.leaves_much(best.state):
+            self._take_sensitivities(best.state)
+        worth = max(options.partner_gain, options.partner_gain_share * best.cost)
+        found = {tuple(sorted(pair.effects)): pair
+                 for pair in self._earlier_answers() if len(pair.effects) > 1}
+        for i, base in enumerate(singles[:options.bases]):
+            self.progress(0.5 + 0.2 * i / options.bases, 'pairs of effects')
+            far = self._priced(base) > options.base_ratio * self._priced(best) + options.reach
+            if far or (base.has_course and base is not best):
+                continue
+            # settled, an effect may pay more, and fall behind one that has not been
+            base = base.with_jacobian(self.problem)
+            partners: list[tuple[Sensitivity, Point | None]] = [
+                (item, None) for gain, item in screened(
+                    self.problem, base.state, self.sensitivities,
+                    base.effects)[:options.partners] if gain > worth]
+            pairs = self._sorted(partial(self._partnered, best, base), partners, 0)
+            if self.problem.scale > 1.0 and not i:
+                pairs += self._sorted(partial(self._partnered, best, base), scan(
+                    self.problem, base.state, self.sensitivities, base.effects), 0)
+            pairs += [pair.without_jacobian() for pair in self._split(base)]
+            for pair in pairs:
+                key = tuple(sorted(pair.effects))
+                if key not in found or self._priced(pair) < self._priced(found[key]):
+                    found[key] = pair
+        return sorted(found.values(), key=self._priced)
+
+    def _improved(self, pairs: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Go on with the best pair, and try others in the place of each of its effects."""
+        found = self._with_relatives(self._leading_settled(pairs, self.settings.bases))
+        if self.problem.scale > 1.0:
+            found = self._at_lower_noise(self._exchanged(found))
+        return found
+
+    def _partnered(self, best: Hypothesis, base: Hypothesis,
+                   partner: tuple[Sensitivity, Point | None]) -> Hypothesis:
+        """Give a hypothesis a partner, from sizes if they are given."""
+        item, sizes = partner
+        if sizes is None:
+            pair = self._added(base, item, jacobian_of_form(self.problem, base.state, item.form))
+        else:
+            pair = self._added_at(base, item, sizes)
+        if pair.cost < best.cost:
+            return self._continued(pair, self.settings.pair_iterations)
+        return pair
+
+    def _split(self, base: Hypothesis) -> list[Hypothesis]:
+        """Return an effect that acts in several places as one effect in each, or nothing."""
+        effect = self.machine.effects[base.effects[0]]
+        if not effect.parts:
+            return []
+        forms = tuple(self.machine.counterpart(base.forms[0], effect, self.machine.effects[part])
+                      for part in effect.parts)
+        point = base.state.point()
+        whole = base.forms[0].parameters
+        for p, *own in zip(whole, *(form.parameters for form in forms), strict=True):
+            value = point.pop(p.name)
+            point.update({part.name: value for part in own})
+        state = self._in_place_of(base, base.forms[0], forms, point)
+        return [Hypothesis(effect.parts, forms, state)]

@@ -1,0 +1,180 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""Fits to a part of the tests, which begin at the model as configured and see nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+import math
+from types import MappingProxyType
+
+import numpy as np
+from simgap.fit.least_squares import (
+    FitState, Jacobian, LeastSquares, settled, with_initial_conditions,
+)
+from simgap.machine.contract import (
+    Experiment, FloatArray, Form, Machine, Parameter, Point, TimeScales,
+)
+from simgap.settings import Settings
+
+
+class Part(Machine):
+    """
+    A machine in some of its experiments. What is not among them cannot reach a fit.
+
+    Parameters
+    ----------
+    machine
+        in all experiments
+    chosen
+        indices of those that count
+    experiments
+        what was measured in them; None for all that the machine has
+    held
+        values of parameters that are held, by name
+
+    """
+
+    def __init__(self, machine: Machine, chosen: Sequence[int],
+                 experiments: Sequence[Experiment] | None = None,
+                 held: Point = MappingProxyType({})) -> None:
+        """Take a part of the experiments."""
+        super().__init__(experiments or [machine.experiments[k] for k in chosen])
+        self.chosen = tuple(chosen)
+        self._machine = machine
+        self._held = held
+
+    def holding(self, held: Point) -> Part:
+        """Return the same part with the values of some parameters held."""
+        return Part(self._machine, self.chosen, self.experiments, held)
+
+    @property
+    def time_scales(self) -> TimeScales:
+        """Return the time scales of the whole machine."""
+        return self._machine.time_scales
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """Return the readings of one experiment."""
+        return self._machine.predict({**self._held, **point}, self.chosen[experiment])
+
+    def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
+                 until: float = math.inf) -> list[list[FloatArray | None]]:
+        """Return the readings of several variants; see `Machine.simulate`."""
+        wanted = [(i, k) for i, one in enumerate(only or [None] * len(points))
+                  for k in (range(len(self.chosen)) if one is None else (one,))]
+        found = self._machine.simulate([{**self._held, **points[i]} for i, _ in wanted],
+                                       [self.chosen[k] for _, k in wanted], until)
+        rows: list[list[FloatArray | None]] = [[None] * len(self.chosen) for _ in points]
+        for (i, k), row in zip(wanted, found, strict=True):
+            rows[i][k] = row[self.chosen[k]]
+        return rows
+
+    def low_fidelity(self) -> Machine:
+        """Return the part of the faster machine."""
+        faster = self._machine.low_fidelity()
+        return self if faster is self._machine else Part(
+            faster, self.chosen, self.experiments, self._held)
+
+    def initial_conditions(self, experiment: int) -> Sequence[Sequence[Point]]:
+        """Return initial conditions of one experiment that are tried out before a fit."""
+        return self._machine.initial_conditions(self.chosen[experiment])
+
+    def parameters(self, of: Sequence[Parameter]) -> tuple[Parameter, ...]:
+        """Return the parameters that act on these experiments, with the indices of this part."""
+        return tuple(p if p.experiment is None else
+                     replace(p, experiment=self.chosen.index(p.experiment))
+                     for p in of if p.experiment is None or p.experiment in self.chosen)
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """
+    Derivatives that were taken once for all experiments, to begin fits with.
+
+    Attributes
+    ----------
+    parameters : what the columns belong to
+    rows : of each experiment
+    jacobian : at the sensors' own noise, shape (n, m)
+
+    """
+
+    parameters: tuple[Parameter, ...]
+    rows: tuple[slice, ...]
+    jacobian: Jacobian
+
+    @classmethod
+    def of(cls, problem: LeastSquares, state: FitState) -> Slopes:
+        """Take the derivatives of a fit to all experiments."""
+        return cls(state.parameters, tuple(map(problem.rows, range(len(problem.experiments)))),
+                   state.jacobian)
+
+    def for_part(self, part: Part, parameters: Sequence[Parameter]) -> Jacobian:
+        """Return the rows of a part and the columns of some parameters, in their order."""
+        column = {p.name: j for j, p in enumerate(self.parameters)}
+        return np.concatenate([self.jacobian[self.rows[k]] for k in part.chosen])[
+            :, [column[p.name] for p in parameters]]
+
+
+def begun(part: Part, forms: Sequence[Form], point: Mapping[str, float],
+          settings: Settings) -> dict[str, float]:
+    """
+    Return a point with the sizes of effects at which a fit to a part of the tests may begin.
+
+    A strong effect may bend the misfit so much that its derivative at zero leads nowhere. Where an
+    effect's form has values to try out, the best is taken.
+    """
+    at = dict(point)
+    problem = LeastSquares(part, settings=settings)
+    problem = problem.at_scale(max(problem.noise_level(problem.residuals(at)), 1.0))
+    for form in forms:
+        at = min((at, *({**at, **trial} for trial in form.trials)),
+                 key=lambda point: problem.loss(problem.residuals(point)))
+    return at
+
+
+def trained(part: Part, parameters: Sequence[Parameter], point: Mapping[str, float],
+            slopes: Sequence[Jacobian], settings: Settings) -> FitState:
+    """
+    Fit parameters to a part of the tests, from a point far from the optimum to the end.
+
+    While much is left, the misfit counts as noise, and the noise is lowered as the fit proceeds:
+    at the sensors' own noise a robust loss does not lead across a large misfit. The derivatives
+    in `slopes` only begin the fit; at its end they are taken anew as long as that gains much.
+
+    Parameters
+    ----------
+    part
+        the tests
+    parameters
+        what is fitted
+    point
+        where the fit begins
+    slopes
+        derivatives for the beginning, and for what follows, shape (n, m) each
+    settings
+        thresholds
+
+    """
+    options, search = settings.held_out, settings.search
+    at = with_initial_conditions(LeastSquares(part, settings=settings), dict(point))
+    scale = math.inf
+    number = 0
+    while scale > 1.0:
+        level = LeastSquares(part, settings=settings)
+        lower = level.noise_level(level.residuals(at))
+        lowered = lower < search.sharper * scale
+        scale = lower if lower > search.strong and lowered else 1.0
+        problem = LeastSquares(part, scale=scale, settings=settings)
+        if number == 1:
+            # what was taken for the place in a gap may have been the effect
+            at = with_initial_conditions(problem, at)
+        given = slopes[min(number, len(slopes) - 1)] / np.float32(scale)
+        if scale > 1.0:
+            # far from the sizes, a shape would be turned the wrong way: the order of a ripple
+            given[:, [p.is_shape for p in parameters]] = 0.0
+        state = problem.fit(problem.start(parameters, at, given), options.iterations)
+        at = state.point()
+        number += 1
+    return settled(problem, state, search, options.passes, options.iterations)

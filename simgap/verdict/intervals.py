@@ -1,0 +1,194 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Intervals of fitted values, by Laplace's approximation with a cluster-robust variance.
+
+What a fit leaves is never quite independent noise: a model's own error lasts, an event concerns
+one second. The scores of the likelihood are therefore summed over blocks of time, and the scatter
+of these sums is compared with what independent noise would give (K.-Y. Liang, S. L. Zeger,
+Biometrika 73, 1986).
+
+Where the law of an effect is another one, each test asks for another value, however little noise
+there is. The jackknife over the tests sees that: the effect was fitted without each test in turn
+to judge it there (J. W. Tukey, Annals of Mathematical Statistics 29, 1958, 614). The larger of the
+two deviations sets the interval.
+
+Difference quotients of a drive that sticks and slips are right to a tenth. A Hessian of them knows
+nothing of directions in which two columns differ by less. There the priors alone count: without
+that, a change of a number and the tolerance of the same number would be told apart by the error of
+a difference quotient.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+import math
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from simgap.fit.least_squares import FitState, LeastSquares, proper_precision
+from simgap.machine.contract import FloatArray, Parameter
+from simgap.search.hypothesis import Hypothesis
+from simgap.settings import IntervalSettings
+
+TWO_SIDED_95 = 1.96
+# Share of a variance that data of single precision can account for.
+_BY_DATA = 1e-6
+
+
+def inflation(problem: LeastSquares, state: FitState) -> FloatArray:
+    """
+    Return the variance of each fitted value over that with independent noise, shape (m,).
+
+    It is 1 at least.
+
+    Parameters
+    ----------
+    problem
+        that was fitted
+    state
+        of a fit that has converged, with its Jacobian
+
+    """
+    posterior = covariance(state, 1.0, problem.settings.interval)
+    return _inflation(problem, state, posterior)
+
+
+def contrast_deviation(problem: LeastSquares, state: FitState, contrast: FloatArray) -> float:
+    """
+    Return the standard deviation of a sum of fitted values, robust to dependent residuals.
+
+    Parameters
+    ----------
+    problem, state
+        as in `inflation`
+    contrast
+        factor of each value in the sum, shape (m,)
+
+    """
+    settings = problem.settings.interval
+    along = covariance(state, 1.0, settings) @ contrast[:, np.newaxis]
+    [inflated] = _inflation(problem, state, along)
+    return float(np.sqrt(contrast @ covariance(state, float(inflated), settings) @ contrast))
+
+
+def _inflation(problem: LeastSquares, state: FitState, posterior: FloatArray) -> FloatArray:
+    """Return the inflation along the columns of a product with the covariance, shape (k,)."""
+    jacobian, weight = state.jacobian, state.weight
+    block_s = problem.machine.time_scales.block_s
+    labels = np.concatenate([
+        k * 1e6 + np.repeat(np.floor(e.time / block_s), e.measured.shape[1])
+        for k, e in enumerate(problem.experiments)])
+    starts = np.flatnonzero(np.diff(labels, prepend=-1.0))
+    scores = np.add.reduceat(
+        jacobian * (weight * state.residual).astype(np.float32)[:, np.newaxis], starts, axis=0)
+    found = np.sum(np.square(scores.astype(float) @ posterior), axis=0)
+    independent = np.sum((state.hessian @ posterior) * posterior, axis=0)
+    prior = proper_precision(state.parameters) @ np.square(posterior)
+    # a value that priors alone determine has no scatter to compare
+    by_data = independent > _BY_DATA * (independent + prior)
+    return np.where(by_data, np.maximum(found / np.where(by_data, independent, 1.0), 1.0), 1.0)
+
+
+def covariance(state: FitState, inflated: float, settings: IntervalSettings) -> FloatArray:
+    """
+    Return the covariance of fitted values, shape (m, m).
+
+    Parameters
+    ----------
+    state
+        of a fit that has converged
+    inflated
+        variance over that with independent noise, 1 or more
+    settings
+        thresholds
+
+    """
+    return _covariance(state, _known(state, settings) / inflated)
+
+
+def _covariance(state: FitState, known: FloatArray) -> FloatArray:
+    total = known + np.diag(proper_precision(state.parameters))
+    unit = np.sqrt(np.diag(total))
+    return np.asarray(np.linalg.inv(total / np.outer(unit, unit)) / np.outer(unit, unit))
+
+
+def _known(state: FitState, settings: IntervalSettings) -> FloatArray:
+    """Return the Hessian without the directions that derivatives do not determine."""
+    scale = np.sqrt(np.maximum(np.diag(state.hessian), 1e-30))
+    values, vectors = np.linalg.eigh(state.hessian / np.outer(scale, scale))
+    sure = np.maximum(values - settings.derivative_error ** 2, 0.0)
+    return np.asarray(np.outer(scale, scale) * ((vectors * sure) @ vectors.T))
+
+
+def jackknife(values: Sequence[float]) -> float:
+    """
+    Return the standard deviation of an estimate, 0 from less than two values.
+
+    Parameters
+    ----------
+    values
+        of the estimate without each test in turn
+
+    """
+    count = len(values)
+    return math.sqrt((count - 1) * float(np.var(values))) if count > 1 else 0.0
+
+
+def deviations(hypothesis: Hypothesis, inflated: Callable[[str], float],
+               settings: IntervalSettings,
+               between_tests: Mapping[str, float] = MappingProxyType({})) -> dict[str, float]:
+    """
+    Return the standard deviations of the values of a hypothesis' effects, by name.
+
+    Parameters
+    ----------
+    hypothesis
+        whose fit has converged
+    inflated
+        returns the variance of a parameter over that with independent noise
+    settings
+        thresholds
+    between_tests
+        deviations by the jackknife, of some of the values by name
+
+    """
+    state = hypothesis.state
+    names = [p.name for p in state.parameters]
+    known = _known(state, settings)
+    found = {}
+    for parameter, value in hypothesis.values:
+        place = names.index(parameter.name)
+        variance = _covariance(state, known / inflated(parameter.name))[place, place]
+        found[parameter.name] = math.hypot(
+            max(float(variance) ** 0.5, between_tests.get(parameter.name, 0.0)),
+            same_number(parameter, value), settings.model_error * value)
+    return found
+
+
+def values_with_intervals(hypothesis: Hypothesis,
+                          deviating: Mapping[str, float]) -> dict[str, Any]:
+    """
+    Return the values of a hypothesis' effects with 95 percent intervals, for the JSON.
+
+    Parameters
+    ----------
+    hypothesis
+        whose fit has converged
+    deviating
+        standard deviations of its values, from `deviations`
+
+    """
+    return {p.name: {'value': value, 'unit': p.unit, 'ci95': [
+        max(value - TWO_SIDED_95 * deviating[p.name], p.low),
+        min(value + TWO_SIDED_95 * deviating[p.name], p.high)]} for p, value in hypothesis.values}
+
+
+def same_number(parameter: Parameter, value: float) -> float:
+    """
+    Return the standard deviation that the tolerance of the same number adds to a change.
+
+    The effect has taken over what the tolerance would account for.
+    """
+    return parameter.tolerance / 3.0 ** 0.5 * (abs(1.0 + value) if parameter.unit == '1' else 1.0)

@@ -1,0 +1,210 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What an intervention changes: the numbers of the named effects under each value of a label.
+
+For each label the named effects are fitted once more, with a size of their own under each of its
+values, beside all else that the best hypothesis has. The difference between two values has an
+interval of its own, because the sizes share the nuisances. Withholding by label says whether an
+effect that was learned under one value is there under another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import math
+from typing import Any
+
+import numpy as np
+from simgap.fit.least_squares import FitState, LeastSquares
+from simgap.machine.by_label import ByLabel
+from simgap.machine.contract import FloatArray, Form, Parameter
+from simgap.search.hypothesis import Hypothesis
+from simgap.verdict.held_out import held_out
+from simgap.verdict.intervals import contrast_deviation, same_number, TWO_SIDED_95
+
+_ROUNDS = 2
+
+
+def interventions(problem: LeastSquares, none: Hypothesis, best: Hypothesis,
+                  threads: int = 1) -> list[dict[str, Any]]:
+    """
+    Return what each label changes, for the JSON; empty without labels.
+
+    Parameters
+    ----------
+    problem
+        the whole tests
+    none, best
+        the hypotheses without and with the likeliest effects
+    threads
+        how many tests are withheld at once
+
+    """
+    machine = problem.machine
+    if not isinstance(machine, ByLabel):
+        return []
+    return [_of_label(problem, machine, none, best, key, threads) for key in machine.groups]
+
+
+def simplified(problem: LeastSquares, hypotheses: Sequence[Hypothesis],
+               best: Hypothesis) -> tuple[list[Hypothesis], Hypothesis]:
+    """
+    Return hypotheses whose best has sizes by label only for effects that differ between them.
+
+    The search takes an effect's form where others are still missing, and a missing effect that
+    differs makes it look as if this one did.
+
+    Parameters
+    ----------
+    problem
+        the whole tests
+    hypotheses, best
+        from the search
+
+    """
+    machine = problem.machine
+    if not isinstance(machine, ByLabel):
+        return list(hypotheses), best
+    whole = best.with_jacobian(problem)
+    forms = []
+    for form in best.forms:
+        base, own = machine.base_of(form), [p.label for p in form.sizes if p.label]
+        values = [value for _, value in dict.fromkeys(own)]
+        differs = any(_compared(
+            problem, whole.state, size, [_of_value(form, own[0][0], value)[j] for value in values],
+            values)['differs'] for j, size in enumerate(base.sizes)) if own else True
+        forms.append(form if differs else base)
+    if tuple(forms) == best.forms:
+        return list(hypotheses), best
+    point = {**machine.mean(best.state.point()), **best.state.point()}
+    simpler = Hypothesis(best.effects, tuple(forms), _fitted(problem, best, forms, point))
+    return [simpler if set(h.effects) == set(best.effects) else h for h in hypotheses], simpler
+
+
+def _of_label(problem: LeastSquares, machine: ByLabel, none: Hypothesis, best: Hypothesis,
+              key: str, threads: int) -> dict[str, Any]:
+    groups = machine.groups[key]
+    numbers = _numbers(problem, machine, best, key) if best.named else []
+    common = _in_common(problem, machine, best)
+    reach = held_out(problem, none, common, threads, groups,
+                     f'each value of {key} in turn, with the effect as the others have it; '
+                     'offsets within the tolerance were fitted to it, with the effect and without')
+    return {
+        'label': key,
+        'tests': {value: [e.name for e, own in zip(problem.experiments, groups, strict=True)
+                          if own == value] for value in dict.fromkeys(groups)},
+        'differ': _effects(numbers, True), 'stay': _effects(numbers, False), 'numbers': numbers,
+        'explained_fraction': reach['explained_fraction'], 'held_out': reach['held_out'],
+        'folds': reach['folds']}
+
+
+def _effects(numbers: Sequence[Mapping[str, Any]], differ: bool) -> list[str]:
+    """Return the effects of which a number differs between the values, or those of which none."""
+    differing = {item['effect'] for item in numbers if item['differs']}
+    return [effect for effect in dict.fromkeys(item['effect'] for item in numbers)
+            if (effect in differing) == differ]
+
+
+def _numbers(problem: LeastSquares, machine: ByLabel, best: Hypothesis,
+             key: str) -> list[dict[str, Any]]:
+    """Return the sizes of the named effects under each value, and their differences."""
+    values = list(dict.fromkeys(machine.groups[key]))
+    bases = {effect: machine.base_of(form) for effect, form in zip(
+        best.effects, best.forms, strict=True)}
+    chosen = {effect: machine.split(form, key) for effect, form in bases.items()
+              if effect in best.named and not form.is_course
+              and all(p.experiment is None for p in form.parameters)}
+    point = {value: machine.in_test(best.state.point(), machine.groups[key].index(value))
+             for value in values}
+    start = {p.name: point[value][base.name] for effect, form in chosen.items()
+             for value in values for base, p in zip(
+                 bases[effect].sizes, _of_value(form, key, value), strict=True)}
+    forms = [chosen.get(effect, form) for effect, form in zip(
+        best.effects, best.forms, strict=True)]
+    state = _fitted(problem, best, forms, {**point[values[0]], **best.state.point(), **start})
+    found = []
+    for effect, form in chosen.items():
+        for j, base in enumerate(bases[effect].sizes):
+            parameters = [_of_value(form, key, value)[j] for value in values]
+            found.append({'effect': effect, 'number': base.name, 'unit': base.unit,
+                          **_compared(problem, state, base, parameters, values)})
+    return found
+
+
+def _of_value(form: Form, key: str, value: str) -> list[Parameter]:
+    return [p for p in form.sizes if p.label == (key, value)]
+
+
+def _in_common(problem: LeastSquares, machine: ByLabel, best: Hypothesis) -> Hypothesis:
+    """Return the best hypothesis with one size for all tests."""
+    forms = tuple(machine.base_of(form) for form in best.forms)
+    if forms == best.forms:
+        return best
+    return Hypothesis(best.effects, forms, _fitted(
+        problem, best, forms, machine.mean(best.state.point())))
+
+
+def _fitted(problem: LeastSquares, best: Hypothesis, forms: Sequence[Form],
+            point: dict[str, float]) -> FitState:
+    """Fit effects in other forms, beside the nuisances of a hypothesis."""
+    gone = {p.name for form in best.forms for p in form.parameters}
+    parameters = (*(p for p in best.state.parameters if p.name not in gone),
+                  *(p for form in forms for p in form.parameters))
+    state = problem.start(parameters, {p.name: point[p.name] for p in parameters}, central=True)
+    for _ in range(_ROUNDS):
+        state = problem.refreshed(problem.fit(
+            state, problem.settings.search.full_iterations))
+    return state
+
+
+def _compared(problem: LeastSquares, state: FitState, base: Parameter,
+              parameters: Sequence[Parameter], values: Sequence[str]) -> dict[str, Any]:
+    """Return a number under each value, and what differs from the first of them."""
+    names = [p.name for p in state.parameters]
+    places = [names.index(p.name) for p in parameters]
+    contrasts = np.eye(len(names))[places]
+
+    # a difference is worth the price of a parameter; that is stricter than its interval
+    worth = math.sqrt(2.0 * problem.settings.penalty.parameter)
+
+    def told(contrast: FloatArray) -> tuple[float, float]:
+        return float(contrast @ state.x), math.hypot(
+            contrast_deviation(problem, state, contrast),
+            problem.settings.interval.model_error * float(np.abs(contrast) @ np.abs(state.x)))
+
+    by_value = {}
+    for name, contrast in zip(values, contrasts, strict=True):
+        value, deviation = told(contrast)
+        # the tolerance of the same number cancels in a difference, and not here
+        low, high = _interval(value, math.hypot(deviation, same_number(base, value)))
+        by_value[name] = {'value': value, 'ci95': [max(low, base.low), min(high, base.high)]}
+    differences = []
+    for name, contrast in zip(values[1:], contrasts[1:], strict=True):
+        value, deviation = told(contrast - contrasts[0])
+        differences.append({
+            'from': values[0], 'to': name, 'value': value, 'ci95': _interval(value, deviation),
+            'differs': abs(value) > max(worth * deviation, base.tolerance)})
+    return {'values': by_value, 'differences': differences,
+            'differs': any(item['differs'] for item in differences)}
+
+
+def _interval(value: float, deviation: float) -> list[float]:
+    return [value - TWO_SIDED_95 * deviation, value + TWO_SIDED_95 * deviation]
+
+
+def lines(labels: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what the labels change as people read it, a line for each number."""
+    found = []
+    for label in labels:
+        for item in label['numbers']:
+            name, key = item['number'].split('.', 2)[-1], label['label']
+            unit = '' if item['unit'] == '1' else f' {item["unit"]}'
+            sizes = ', '.join(f'{one["value"]:.3g}{unit} under {key} {value or "not given"}'
+                              for value, one in item['values'].items())
+            told = [f'{one["value"]:+.3g}{unit} ({one["ci95"][0]:.3g} to {one["ci95"][1]:.3g}) '
+                    f'from {one["from"] or "not given"} to {one["to"] or "not given"}'
+                    for one in item['differences'] if one['differs']]
+            word = 'differs by ' + ', '.join(told) if told else 'stays'
+            found.append(f'{item["effect"]}: {name} {word}: {sizes}')
+    return found

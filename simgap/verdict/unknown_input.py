@@ -1,0 +1,260 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Where an unknown input acts: the part of the machine that a gap sits in, whatever its cause.
+
+An input of any course over time is let into each part in turn: a torque on a shaft, a voltage in
+an amplifier, a wrong reading. The machine's response to it is taken pulse by pulse, and the
+responses are fitted to what the nuisances leave of the gap. The part whose input explains the
+gap with the least effort is the likeliest. Pulses that are far enough apart for the machine to
+settle between them share a run.
+
+The measure is the evidence (marginal likelihood) of a linear model whose inputs are random, with
+a variance chosen for each place (D. J. C. MacKay, Bayesian interpolation, Neural Computation 4,
+1992, Eq. 2.9 and 3.2). The nuisances, with their priors, are projected out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from scipy import linalg
+from simgap.fit.least_squares import LeastSquares, prior_precision
+from simgap.fit.noise import whitened
+from simgap.machine.contract import DisturbanceInput, Experiment, FloatArray, TimeScales
+
+# Variances of the input over that of the noise that are tried.
+_RATIOS = np.logspace(-4.0, 4.0, 25)
+
+
+@dataclass(frozen=True)
+class Place:
+    """
+    A place where an unknown input may act.
+
+    Attributes
+    ----------
+    name : for people
+    component : the part of the machine
+    evidence : natural logarithm of how much likelier the gap is with an input there than without
+    explained : share of the gap's energy that an input there explains, 0 to 1
+
+    """
+
+    name: str
+    component: str
+    evidence: float
+    explained: float
+
+
+def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
+    """
+    Return where an unknown input may act, the likeliest place first.
+
+    Parameters
+    ----------
+    problem
+        the machine in its experiments
+    point
+        the nuisances as fitted without any effect
+
+    """
+    evidence = _Evidence.at(problem, point)
+    found = []
+    for place in problem.machine.disturbance_inputs:
+        responses, _ = _columns(problem, point, place, evidence.residual)
+        found.append(Place(place.name, place.component, *evidence.judged(responses, problem)))
+    scales = problem.machine.time_scales
+    for c, channel in enumerate(problem.experiments[0].channels):
+        found.append(Place(f'reading of {channel}', channel, *evidence.judged(
+            [_pulses_of_reading(experiment, c, scales) for experiment in problem.experiments],
+            problem)))
+    return sorted(found, key=lambda place: -place.evidence)
+
+
+def courses(problem: LeastSquares, point: Mapping[str, float],
+            place: DisturbanceInput) -> list[tuple[FloatArray, FloatArray]]:
+    """
+    Return what would have to enter at a place to explain a gap, over time.
+
+    Parameters
+    ----------
+    problem
+        the machine in its experiments
+    point
+        the nuisances as fitted without any effect
+    place
+        one of the machine's disturbance inputs
+
+    Returns
+    -------
+    for each experiment times, shape (m,) [s], and the likeliest values at them, shape (m,), with
+    straight lines between, in the unit of the machine's `simulate_disturbed`
+
+    """
+    evidence = _Evidence.at(problem, point)
+    responses, times = _columns(problem, point, place, evidence.residual)
+    heights = evidence.heights(responses, problem)
+    found, first = [], 0
+    for moments in times:
+        order = np.argsort(moments)
+        found.append((moments[order], heights[first:first + moments.size][order]))
+        first += moments.size
+    return found
+
+
+def _columns(problem: LeastSquares, point: Mapping[str, float], place: DisturbanceInput,
+             residual: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
+    """
+    Return the response to each pulse at a place, and when each pulse has its peak [s].
+
+    Both are for each experiment; responses have the shape (n c, pulses), peaks (pulses,).
+    """
+    here, scales = dict(point), problem.machine.time_scales
+    responses: list[list[FloatArray]] = [[] for _ in problem.experiments]
+    peaks: list[list[float]] = [[] for _ in problem.experiments]
+    for shift in np.arange(0.0, scales.response_s - 0.5 * scales.pulse_s, scales.pulse_s):
+        disturbed = problem.machine.simulate_disturbed(
+            here, place, partial(_comb, shift=float(shift), scales=scales))
+        for k, experiment in enumerate(problem.experiments):
+            change = (residual[problem.rows(k)] - problem.standardised(k, disturbed[k])).reshape(
+                experiment.measured.shape)
+            for start, response in _responses(experiment, change, float(shift), scales):
+                responses[k].append(response)
+                peaks[k].append(start + scales.pulse_s)
+    return ([np.array(columns).T for columns in responses],
+            [np.array(moments) for moments in peaks])
+
+
+def components(found: Sequence[Place], caution: float) -> dict[str, float]:
+    """
+    Return how likely each part of the machine is, by its best place; all sum to 1.
+
+    Parameters
+    ----------
+    found
+        from `places`
+    caution
+        share of the evidence that counts, because residuals are not white
+
+    """
+    best: dict[str, float] = {}
+    for place in found:
+        best[place.component] = max(best.get(place.component, 0.0), place.evidence)
+    top = max(best.values(), default=0.0)
+    weight = {name: float(np.exp(caution * (value - top))) for name, value in best.items()}
+    total = sum(weight.values())
+    return {name: value / total for name, value in weight.items()}
+
+
+def _starts(shift: float, end: float, scales: TimeScales) -> Iterator[tuple[float, float]]:
+    """Yield when each pulse of a comb begins [s], and its sign."""
+    for i, start in enumerate(np.arange(shift, end, scales.response_s)):
+        yield float(start), 1.0 if i % 2 == 0 else -1.0
+
+
+def _comb(time: FloatArray, shift: float, scales: TimeScales) -> FloatArray:
+    """Return pulses of alternating sign, the first beginning at `shift` [s]."""
+    rise = scales.pulse_s
+    value = np.zeros_like(time)
+    for start, sign in _starts(shift, float(time[-1]) + 1.0, scales):
+        value += sign * np.maximum(0.0, 1.0 - np.abs(time - start - rise) / rise)
+    return value
+
+
+def _responses(experiment: Experiment, change: FloatArray, shift: float,
+               scales: TimeScales) -> Iterator[tuple[float, FloatArray]]:
+    """Yield start and response of each pulse of a comb, without the rest of earlier pulses."""
+    end = float(experiment.time[-1]) - 2.0 * scales.pulse_s
+    for start, sign in _starts(shift, end, scales):
+        first, last = np.searchsorted(experiment.time, [start, start + scales.response_s])
+        if first == last:
+            continue  # before the first sample
+        response = np.zeros_like(change)
+        response[first:last] = sign * (change[first:last] - change[first])
+        yield start, response.ravel()
+
+
+def _pulses_of_reading(experiment: Experiment, channel: int, scales: TimeScales) -> FloatArray:
+    """Return pulses of a reading itself, one in each column, shape (n c, pulses)."""
+    rise = scales.pulse_s
+    starts = np.arange(float(experiment.time[0]), float(experiment.time[-1]) - 2.0 * rise, rise)
+    pulses = np.maximum(0.0, 1.0 - np.abs(experiment.time[:, np.newaxis] - starts - rise) / rise)
+    if experiment.colours:
+        colour = experiment.colours[channel]
+        pulses = np.array([whitened(pulse, colour) for pulse in pulses.T]).T
+    columns = np.zeros((*experiment.measured.shape, starts.size))
+    columns[:, channel, :] = pulses
+    return columns.reshape(-1, starts.size)
+
+
+class _Evidence:
+    """The residual that is to be explained, with the nuisances projected out."""
+
+    @classmethod
+    def at(cls, problem: LeastSquares, point: Mapping[str, float]) -> _Evidence:
+        """Return that of a problem whose nuisances have been fitted."""
+        here = dict(point)
+        residual = problem.residuals(here)
+        level = max(problem.noise_level(residual), 1e-9)
+        bound = problem.settings.localisation.downweighted * level
+        weight = np.where(problem.valid, np.minimum(
+            1.0, bound / np.maximum(np.abs(residual), 1e-12)), 0.0) / level ** 2
+        nuisances = problem.machine.nuisances
+        jacobian = problem.jacobian(here, nuisances, residual, central=False).astype(float)
+        return cls(residual, weight, jacobian, prior_precision(nuisances))
+
+    def __init__(self, residual: FloatArray, weight: FloatArray, nuisances: FloatArray,
+                 prior: FloatArray) -> None:
+        self.residual, self._weight = residual, weight
+        weighted = nuisances * weight[:, np.newaxis]
+        square = nuisances.T @ weighted + np.diag(prior)
+        self._inverse = np.linalg.pinv(square, hermitian=True)
+        self._slope = weighted.T @ residual
+        self._weighted = weighted
+        self._energy = float(residual @ (weight * residual)
+                             - self._slope @ self._inverse @ self._slope)
+        self._count = float(np.count_nonzero(weight))
+
+    def judged(self, responses: Sequence[FloatArray],
+               problem: LeastSquares) -> tuple[float, float]:
+        """Return the evidence for an input with these responses, and the share it explains."""
+        return self._judged(responses, problem)[:2]
+
+    def heights(self, responses: Sequence[FloatArray], problem: LeastSquares) -> FloatArray:
+        """Return the likeliest factor of each response, shape (pulses of all experiments,)."""
+        return self._judged(responses, problem)[2]
+
+    def _judged(self, responses: Sequence[FloatArray],
+                problem: LeastSquares) -> tuple[float, float, FloatArray]:
+        squares, slopes, crosses = [], [], []
+        for k, columns in enumerate(responses):
+            rows = problem.rows(k)
+            weighted = columns * self._weight[rows, np.newaxis]
+            squares.append(columns.T @ weighted)
+            slopes.append(weighted.T @ self.residual[rows])
+            crosses.append(self._weighted[rows].T @ columns)
+        cross = np.concatenate(crosses, axis=1)
+        projected = cross.T @ self._inverse
+        square = linalg.block_diag(*squares) - projected @ cross
+        slope = np.concatenate(slopes) - projected @ self._slope
+        size = float(np.trace(square)) / len(square)
+        if size <= 0.0:
+            return 0.0, 0.0, np.zeros(len(square))
+        values, vectors = np.linalg.eigh(0.5 * (square + square.T) / size)
+        values = np.maximum(values, 0.0)
+        turned = vectors.T @ slope
+        along = turned ** 2 / size
+        best, share, heights = 0.0, 0.0, np.zeros(len(square))
+        for ratio in _RATIOS:
+            left = self._energy - float(np.sum(along / (values + 1.0 / ratio)))
+            left = max(left / self._energy, 1e-9)
+            evidence = -0.5 * (self._count * np.log(left)
+                               + float(np.sum(np.log1p(ratio * values))))
+            if evidence > best:
+                best, share = float(evidence), 1.0 - left
+                heights = vectors @ (turned / (values + 1.0 / ratio)) / size
+        return best, share, heights
