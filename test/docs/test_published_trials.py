@@ -17,7 +17,8 @@ from lab.trials.scorecard import score
 from lab.trials.scored_cases import read_scored
 import pytest
 
-DOCS = Path(__file__).resolve().parents[2] / 'docs'
+ROOT = Path(__file__).resolve().parents[2]
+DOCS, NOTEBOOK = ROOT / 'docs', ROOT / 'lab' / 'notebook'
 # columns of the tables of wild trials, in the words of both pages
 COLUMNS = {
     'top1': 'one effect, named first', 'top3': 'in the first three',
@@ -36,16 +37,19 @@ ROWS = {
 TITLE = '| trial | one effect, named first |'
 
 
-@pytest.mark.parametrize(('name', 'files'), [
-    *((f'trial {n}', [f'wild_{n}']) for n in range(9, 19)),
-    ('trials 16 to 18', ['wild_16', 'wild_17', 'wild_18']),
-    ('family B', ['family_b_1']), ('rest of family B', ['family_b_2']),
-    ('fresh family B', ['family_b_3']), ('second fresh family B', ['family_b_4'])])
-@pytest.mark.parametrize('page', ['diagnosis.md', 'trials/README.md'])
-def test_figures_of_a_wild_trial_are_those_of_its_cases(
-        page: str, name: str, files: list[str]) -> None:
-    cases = [case for file in files for case in read_scored(DOCS / 'trials' / f'{file}.jsonl')]
-    text = (DOCS / page).read_text(encoding='utf-8')
+TRIALS = {
+    **{f'trial {n}': [f'wild_{n}'] for n in range(9, 19)},
+    'trials 16 to 18': ['wild_16', 'wild_17', 'wild_18'],
+    'family B': ['family_b_1'], 'rest of family B': ['family_b_2'],
+    'fresh family B': ['family_b_3'], 'second fresh family B': ['family_b_4']}
+
+
+@pytest.mark.parametrize(('page', 'name'), [
+    *((NOTEBOOK / page, name) for page in ('diagnosis.md', 'README.md') for name in TRIALS),
+    *((DOCS / 'diagnosis.md', name) for name in ('trials 16 to 18', 'second fresh family B'))])
+def test_figures_of_a_wild_trial_are_those_of_its_cases(page: Path, name: str) -> None:
+    cases = [case for file in TRIALS[name] for case in read_scored(NOTEBOOK / f'{file}.jsonl')]
+    text = page.read_text(encoding='utf-8')
     table = text[text.index(TITLE):].split('\n\n')[0].splitlines()
     titles, _, *rows = [[cell.strip() for cell in line.strip('|').split('|')] for line in table]
     # a trial that was published in part has a row for its first cases, too
@@ -68,7 +72,7 @@ def results_of(folder: Path, name: str, wanted: Callable[[str], bool] = lambda c
 
 def cases_of(name: str, wanted: Callable[[str], bool] = lambda case: True) -> list[dict[str, Any]]:
     """Return some cases of a trial that goes on, as they are published."""
-    return [case for line in (DOCS / 'trials' / f'{name}.jsonl').read_text(
+    return [case for line in (NOTEBOOK / f'{name}.jsonl').read_text(
         encoding='utf-8').splitlines() if wanted((case := json.loads(line))['case'])]
 
 
@@ -82,7 +86,7 @@ def results_from(folder: Path, cases: list[dict[str, Any]]) -> TrialResults:
 
 def table_of(title: str, place: int = 1) -> list[list[str]]:
     """Return the rows of a table of the page of trials, by its first title and its place."""
-    text = (DOCS / 'next-test-trials.md').read_text(encoding='utf-8')
+    text = (NOTEBOOK / 'next-test-trials.md').read_text(encoding='utf-8')
     table = text.split(f'| {title} |')[place].split('\n\n')[0].splitlines()[2:]
     return [[cell.strip() for cell in line.strip('|').split('|')] for line in table]
 
@@ -111,7 +115,7 @@ def test_the_random_tests_of_five_trials_were_of_the_kind_that_the_page_says(
     kinds = [case['tests']['random']['family'] for trial in range(1, 6)
              for results in [results_of(tmp_path, f'next_test_{trial}')]
              for case in map(results.__getitem__, results) if 'random' in case.get('tests', {})]
-    text = ' '.join((DOCS / 'next-test-trials.md').read_text(encoding='utf-8').split())
+    text = ' '.join((NOTEBOOK / 'next-test-trials.md').read_text(encoding='utf-8').split())
     assert f'a triangle in {kinds.count("triangle")} of {len(kinds)} cases' in text
 
 
@@ -192,8 +196,8 @@ def test_the_summary_of_next_tests_is_that_of_all_their_cases(tmp_path: Path) ->
 @pytest.mark.parametrize('trial', ['5', '6'])
 @pytest.mark.parametrize('key', ROWS)
 def test_figures_of_a_tame_trial_are_those_of_its_cases(key: str, trial: str) -> None:
-    figures = score(read_scored(DOCS / 'trials' / f'tame_{trial}.jsonl'))
-    text = (DOCS / 'trials' / 'README.md').read_text(encoding='utf-8')
+    figures = score(read_scored(NOTEBOOK / f'tame_{trial}.jsonl'))
+    text = (NOTEBOOK / 'README.md').read_text(encoding='utf-8')
     table = text[text.index('| figure (95 % interval) |'):].split('\n\n')[0].splitlines()
     titles, _, *rows = [[cell.strip() for cell in line.strip('|').split('|')] for line in table]
     [row] = [row for row in rows if row[0].startswith(ROWS[key])]
@@ -204,10 +208,10 @@ def test_figures_of_a_tame_trial_are_those_of_its_cases(key: str, trial: str) ->
 
 
 def test_figures_of_growing_verdicts_are_those_of_their_cases() -> None:
-    file = DOCS / 'trials' / 'growing_verdict_2.jsonl'
+    file = NOTEBOOK / 'growing_verdict_2.jsonl'
     *_, stopped, whole, same = of_verdicts(
         [json.loads(line) for line in file.read_text(encoding='utf-8').splitlines()])
-    text = (DOCS / 'twin.md').read_text(encoding='utf-8')
+    text = (NOTEBOOK / 'twin.md').read_text(encoding='utf-8')
     rows = {cells[0]: cells[1:] for line in text.splitlines() if len(cells := [
         cell.strip() for cell in line.strip('|').split('|')]) == 4}
     for column, line in enumerate((stopped, whole)):
@@ -220,10 +224,10 @@ def test_figures_of_growing_verdicts_are_those_of_their_cases() -> None:
 
 
 def test_figures_of_the_twin_on_topics_are_those_of_its_cases() -> None:
-    file = DOCS / 'trials' / 'twin_topics_2.jsonl'
+    file = NOTEBOOK / 'twin_topics_2.jsonl'
     *_, told, _ = of_onsets(
         [json.loads(line) for line in file.read_text(encoding='utf-8').splitlines()])
-    text = (DOCS / 'twin.md').read_text(encoding='utf-8')
+    text = (NOTEBOOK / 'twin.md').read_text(encoding='utf-8')
     rows = {cells[0]: cells[1] for line in text.splitlines() if len(cells := [
         cell.strip() for cell in line.strip('|').split('|')]) == 4}
     soon, later, never, middle, alarms = (rows[name].partition(',')[0] for name in (

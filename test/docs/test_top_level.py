@@ -9,7 +9,9 @@ import re
 
 from antenna_drive import __version__
 from antenna_drive.cli import COMMANDS
+import lab.cli
 import pytest
+import simgap.cli
 import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -70,4 +72,4 @@ def test_every_link_leads_somewhere(page: Path) -> None:
 
 def test_commands_of_the_changelog_are_there() -> None:
     for name in re.findall(r'^- `([a-z][a-z-]*)`: ', (ROOT / 'CHANGELOG.md').read_text(), re.M):
-        assert name in COMMANDS
+        assert name in {*COMMANDS, *lab.cli.COMMANDS, *simgap.cli.COMMANDS}
