@@ -4,7 +4,8 @@
 EMPS: a carriage on a ball screw, driven by a DC motor in a position loop.
 
 The model is that of A. Janot, M. Gautier, M. Brunot, 'Data set and reference models of EMPS': one
-mass with symmetric friction. The effects are what it may lack. docs/emps.md tells what is found.
+mass with symmetric friction. The effects are what it may lack. lab/notebook/emps.md has what is
+found.
 """
 
 from __future__ import annotations
