@@ -44,7 +44,7 @@ trials: $(READY)
 	$(PY) -m pytest -m trial $(PYTEST_ARGS)
 
 campaign: $(READY)
-	$(VENV)/bin/antenna-drive campaign --out out/campaign --json out/campaign.json $(CAMPAIGN_ARGS)
+	$(VENV)/bin/lab campaign --out out/campaign --json out/campaign.json $(CAMPAIGN_ARGS)
 
 quick: $(READY)
 	$(PY) -m pytest $(WORKERS) -m 'not slow and not trial' $(PYTEST_ARGS)
@@ -54,7 +54,7 @@ lint: $(READY)
 
 bench: $(READY)
 	$(PY) -m pip install --quiet --disable-pip-version-check --editable '.[bench]'
-	$(VENV)/bin/antenna-drive bench
+	$(VENV)/bin/lab bench
 
 clean:
 	rm -rf $(VENV) build dist install log out *.egg-info .pytest_cache .mypy_cache .hypothesis

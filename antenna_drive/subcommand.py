@@ -15,7 +15,7 @@ from simgap.command.programs import PARENT
 
 
 def run_command(words: Sequence[str], limit_s: float = math.inf, memory_MB: float = math.inf,
-                folder: Path | None = None) -> str:
+                folder: Path | None = None, program: str = 'antenna_drive') -> str:
     """
     Run a command of this installation; return what it said, for the case that it failed.
 
@@ -31,6 +31,8 @@ def run_command(words: Sequence[str], limit_s: float = math.inf, memory_MB: floa
         what it may ask for; if it asks for more, it fails (Linux)
     folder
         its working folder
+    program
+        the module that has the command
 
     Returns
     -------
@@ -38,7 +40,7 @@ def run_command(words: Sequence[str], limit_s: float = math.inf, memory_MB: floa
 
     """
     with subprocess.Popen(
-            [sys.executable, '-m', 'antenna_drive', *words], stdin=subprocess.DEVNULL,
+            [sys.executable, '-m', program, *words], stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, cwd=folder,
             env={**os.environ, PARENT: str(os.getpid())}) as process:
         if math.isfinite(memory_MB) and sys.platform.startswith('linux'):

@@ -76,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="say of a signal's remainder beyond noise whether it is larger than "
                              'VALUE, in the unit of the signal, e.g. current_1=0.05')
     parser.add_argument('--threshold', action='append', default=[], metavar='NAME=VALUE',
-                        help='change a threshold; antenna-drive thresholds lists them')
+                        help='change a threshold; lab thresholds lists them')
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -173,7 +173,7 @@ def _settings(changes: Sequence[str]) -> Settings:
     known = {name: value for name, _, value in DEFAULT.entries()}
     for name, value in _numbers('--threshold', changes):
         if name not in known:
-            raise UserError(f'--threshold {name}: no such threshold; antenna-drive thresholds '
+            raise UserError(f'--threshold {name}: no such threshold; lab thresholds '
                             'lists them')
         settings = settings.changed(name, type(known[name])(value))
     return settings

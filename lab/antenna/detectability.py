@@ -6,7 +6,7 @@ How clearly an effect shows through noise and tolerances; the ranges of sizes ar
 The measure is the effect's change of the recorded signals in standard deviations of noise, less
 the part that tolerances, initial positions and sensor offsets can imitate. That part is a
 first-order fit in which a ridge keeps each of them near its prior. Run
-`python -m lab.antenna.detectability` for the table of docs/trial.md.
+`python -m lab.antenna.detectability` for the table of lab/notebook/trial.md.
 """
 
 from __future__ import annotations

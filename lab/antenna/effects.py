@@ -4,7 +4,7 @@
 The catalogue's effects in this program's own forms, with the range of each.
 
 The smallest sizes are just detectable in the standard test programme through noise and
-tolerances (docs/trial.md explains the measurement); the largest would call for a repair. A
+tolerances (lab/notebook/trial.md explains the measurement); the largest would call for a repair. A
 tachometer is inside the rate loop; errors of current, encoder and bias affect the recording
 only.
 """

@@ -3,9 +3,9 @@
 """
 Family B: other laws for the same effects, other outsiders and other programmes.
 
-It is used only to report how a diagnosis does on forms that nothing was tuned on; docs/history.md
-lists each use. Effects have the names, numbers and ranges of `effects`. Those in LAWS act by
-another law, the others are changes of a constant and have only one.
+It is used only to report how a diagnosis does on forms that nothing was tuned on;
+lab/notebook/history.md lists each use. Effects have the names, numbers and ranges of `effects`.
+Those in LAWS act by another law, the others are changes of a constant and have only one.
 """
 
 from __future__ import annotations

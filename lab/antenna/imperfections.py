@@ -5,7 +5,7 @@ The imperfections of a wild case, which no test sheet lists and no verdict shoul
 
 Every real machine and recorder has them: zeros inside the rate loop, gains and zeros of the
 recorder, delays of its channels, a clock that is off, noise of another level and colour than the
-sheet says, spikes and missing rows. docs/trial.md has the table of their sizes.
+sheet says, spikes and missing rows. lab/notebook/trial.md has the table of their sizes.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 """
 The scorecard of a trial, computed from truths and verdicts alone.
 
-docs/trial.md defines each figure. A case without a valid verdict counts as wrong.
+lab/notebook/trial.md defines each figure. A case without a valid verdict counts as wrong.
 """
 
 from __future__ import annotations
@@ -310,7 +310,7 @@ def score(cases: Sequence[Case], pending: int = 0) -> dict[str, Any]:
 
     Returns
     -------
-    figures by name, nan where there are no cases; docs/trial.md defines them
+    figures by name, nan where there are no cases; lab/notebook/trial.md defines them
 
     """
     by_kind = {kind: [case for case in cases if case.kind == kind]

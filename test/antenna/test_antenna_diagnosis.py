@@ -4,7 +4,7 @@
 Tests of a whole diagnosis, on recordings made with the emulator itself, noise added.
 
 That the maker and the judge share their physics makes these tests of the program, not of the
-method: `antenna-drive trial` judges the method, with a machine that shares nothing.
+method: `lab trial` judges the method, with a machine that shares nothing.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ import shutil
 import time
 
 from antenna_drive.article.experiments import experiments
-from antenna_drive.cli import main
+from lab.cli import main
 from antenna_drive.emulator.run import simulate
 from antenna_drive.emulator.wiring import UNITS
 from antenna_drive.lockstep.pace import LEAD_S

@@ -14,7 +14,7 @@ import json
 import math
 from pathlib import Path
 
-from antenna_drive import cli
+from lab import cli
 from antenna_drive.recording.bam import read_bam
 from lab.servo import refit as servo_refit
 from lab.servo.catalogue import BASE, catalogue, number, NUMBERS, TIED, vector

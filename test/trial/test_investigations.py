@@ -11,7 +11,7 @@ from pathlib import Path
 import shlex
 from typing import Any
 
-from antenna_drive.cli import main
+from lab.cli import main
 from antenna_drive.recording.csv_format import read_csv
 from lab.trials import batch, further_tests, investigations, sealing
 from lab.trials.further_tests import known, reached, with_test

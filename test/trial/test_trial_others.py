@@ -9,7 +9,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.cli import main
+from lab.cli import main
 from lab.antenna.sizes import stated_sizes
 from lab.joints.cases import draw_truths, make_recording, moved
 from lab.joints.machines import kind_of, MACHINES

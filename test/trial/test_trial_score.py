@@ -9,7 +9,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.cli import main
+from lab.cli import main
 from antenna_drive.diagnosis.catalogue import catalogue
 from hypothesis import given, strategies as st
 from lab.antenna.cases import draw_truths

@@ -19,7 +19,7 @@ PATIENCE_S = 200.0
 PARENT = """
 import sys
 from antenna_drive.subcommand import run_command
-run_command(['trial', '--cases', '2000', '--seed', '1', '--jobs', '1', '--out', sys.argv[1]])
+run_command(['trial', '--cases', '2000', '--seed', '1', '--jobs', '1', '--out', sys.argv[1]], program='lab')
 """
 
 
@@ -31,7 +31,7 @@ def test_what_a_command_says() -> None:
 
 def test_time_is_limited(tmp_path: Path) -> None:
     said = run_command(['trial', '--cases', '100000', '--seed', '1', '--jobs', '1', '--out',
-                        str(tmp_path)], limit_s=1.0)
+                        str(tmp_path)], limit_s=1.0, program='lab')
     assert said == 'no result after 1 s'
 
 
