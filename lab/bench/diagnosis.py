@@ -31,7 +31,7 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
     took: dict[int, list[tuple[float, float, float]]] = {1: [], 2: []}
     with tempfile.TemporaryDirectory() as folder:
         progress('recordings')
-        measuring.process('antenna_drive', 'trial', '--cases', '1', '--seed', str(_SEED),
+        measuring.process('lab', 'trial', '--cases', '1', '--seed', str(_SEED),
                           '--out', folder, '--quiet')
         case = Path(folder, 'case_0001')
         recordings = [str(path) for path in sorted(case.glob('rec_*.csv'))]

@@ -41,7 +41,7 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         progress('recordings')
-        measuring.process('antenna_drive', 'trial', '--cases', str(count), '--seed', str(_SEED),
+        measuring.process('lab', 'trial', '--cases', str(count), '--seed', str(_SEED),
                           '--out', str(folder / 'trial'), '--quiet')
         machines = machines_of(folder / 'trial')
         for turn in range(1 if quick else repetitions):

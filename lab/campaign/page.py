@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 import json
+from pathlib import Path
 from typing import Any
 
-from pathlib import Path
 from lab.campaign.summary import BAD, COUNTS
 from lab.campaign.trials import PARTS
 from simgap.report.render import render

@@ -54,7 +54,7 @@ def summary(trials: Sequence[Trial], outcomes: Mapping[str, Mapping[str, Any]],
         'skipped': {entry['id']: entry['skipped'] for entry in done if entry['skipped']},
         'findings': [
             {'trial': entry['id'], **finding,
-             'repeat': f'antenna-drive campaign --out {folder} --repeat {entry["id"]}'}
+             'repeat': f'lab campaign --out {folder} --repeat {entry["id"]}'}
             for entry in done for finding in entry['findings']],
         'settings': dict(settings), 'version': __version__,
         'wall_s': round(sum(entry['wall_s'] for entry in done)),

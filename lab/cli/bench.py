@@ -19,10 +19,10 @@ Peers that are not installed are left out, and the result names them; pip instal
 has the single values. Do not use the machine for other work meanwhile.
 
 For example:
-  antenna-drive bench --quick
-  antenna-drive bench --json bench.json
-  antenna-drive bench --only simulation --json -
-  antenna-drive bench --only transport --paced 480 --json -     (a quarter of an hour at most)
+  lab bench --quick
+  lab bench --json bench.json
+  lab bench --only simulation --json -
+  lab bench --only transport --paced 480 --json -     (a quarter of an hour at most)
 """
 
 from __future__ import annotations

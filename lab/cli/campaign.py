@@ -3,9 +3,9 @@
 """
 Look for faults of the drive: kills, garbage, damaged files, full disks, long runs, other networks.
 
-  antenna-drive campaign --out campaign --short     about ten minutes
-  antenna-drive campaign --out campaign --dose medium   about half an hour
-  antenna-drive campaign --out campaign             some hours: 200 kills, a million frames of
+  lab campaign --out campaign --short     about ten minutes
+  lab campaign --out campaign --dose medium   about half an hour
+  lab campaign --out campaign             some hours: 200 kills, a million frames of
                                                     garbage, 100 000 damaged files of each kind,
                                                     an hour at real time
 

@@ -9,15 +9,15 @@ case that was not diagnosed yet is pending and not scored.
 
 --cases writes the cases with their answers into one small file. Such a file can be published and
 scored again, alone or together with others and with folders; a trial may be continued in another
-folder (`antenna-drive trial --skip`).
+folder (`lab trial --skip`).
 
 docs/trial.md defines every figure. The exit code is 1 if there is no verdict to score.
 
 For example:
-  antenna-drive score trial7
-  antenna-drive score trial7 --json score.json --picture score.png
-  antenna-drive score trial7 --cases trial7.jsonl
-  antenna-drive score trial7.jsonl trial8
+  lab score trial7
+  lab score trial7 --json score.json --picture score.png
+  lab score trial7 --cases trial7.jsonl
+  lab score trial7.jsonl trial8
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ OTHER_TARGETS = {**dict.fromkeys(TARGETS, ''), 'failures': '0', 'pending': '0',
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of `antenna-drive score`."""
+    """Add the options of `lab score`."""
     parser.add_argument('trials', type=Path, nargs='+', metavar='TRIAL',
                         help='folder of a trial, or a file that --cases wrote (.jsonl)')
     add_json_option(parser)

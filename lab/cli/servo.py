@@ -12,9 +12,9 @@ over whole runs, in milliradians. The exit code is 1 if one of BAM's models is b
 
 For example:
 
-  antenna-drive servo logs/
-  antenna-drive servo logs/ --split gain --runs 500 --jobs 2 --json result.json
-  antenna-drive servo logs/ --without gearbox.load_dependent_friction --json -
+  lab servo logs/
+  lab servo logs/ --split gain --runs 500 --jobs 2 --json result.json
+  lab servo logs/ --without gearbox.load_dependent_friction --json -
 """
 
 from __future__ import annotations

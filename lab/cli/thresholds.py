@@ -4,7 +4,7 @@ r"""
 List the thresholds of the diagnosis, and say what halving and doubling them does to a trial.
 
 Without TRIAL the table is printed: name, value, unit, what it decides, which trial set it. With
-TRIAL, a folder of `antenna-drive trial --diagnose`, every verdict is decided anew from the fits
+TRIAL, a folder of `lab trial --diagnose`, every verdict is decided anew from the fits
 that it keeps, with each threshold of the verdict halved and doubled. That takes seconds, because
 nothing is fitted. Thresholds of the search change the fits themselves: --again runs the first
 --cases diagnoses with one of them changed, which takes minutes for each; interrupted, it goes on.
@@ -12,9 +12,9 @@ It also tells how long a diagnosis takes with each.
 
 For example:
 
-  antenna-drive thresholds
-  antenna-drive thresholds trial --json -
-  antenna-drive thresholds trial --again search.singles search.reach --cases 10
+  lab thresholds
+  lab thresholds trial --json -
+  lab thresholds trial --again search.singles search.reach --cases 10
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def _decided_anew(folder: Path) -> dict[str, Mapping[str, float]]:
                             'this version') from None
         kept.append((sealing.open_truth(folder, name, manifest), content, evidence))
     if not kept:
-        raise UserError(f'{folder}: no case is diagnosed; antenna-drive trial --diagnose does it')
+        raise UserError(f'{folder}: no case is diagnosed; lab trial --diagnose does it')
     return {name: _scored(kept, settings)
             for name, settings in (('as they are', DEFAULT), *variants(DECIDED))}
 
@@ -141,7 +141,7 @@ def _run_again(arguments: argparse.Namespace) -> dict[str, Mapping[str, float]]:
     wanted: dict[str, list[str]] = {'as they are': []}
     for name in arguments.again:
         if name not in known:
-            raise UserError(f'--again: {name}: no such threshold; antenna-drive thresholds lists '
+            raise UserError(f'--again: {name}: no such threshold; lab thresholds lists '
                             'them')
         for label, _ in _halved_and_doubled(name, *known[name]):
             wanted[label] = ['--threshold', f'{name}={label.rpartition(" ")[2]}']

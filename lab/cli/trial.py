@@ -15,9 +15,9 @@ is not in the catalogue.
 
 The hash of the manifest is printed before any recording is made. Note it down to prove later
 that no truth was changed. With --diagnose each case is diagnosed too, and the verdict is written
-to DIR/case_0001/verdict.json; `antenna-drive score DIR` scores the verdicts. The same command
+to DIR/case_0001/verdict.json; `lab score DIR` scores the verdicts. The same command
 resumes an interrupted trial. On another machine, --skip leaves out the cases that a file of
-`antenna-drive score --cases` holds; the file and DIR are scored together then.
+`lab score --cases` holds; the file and DIR are scored together then.
 
 With --wild, each case also has the imperfections of a real machine and recorder, which no sheet
 lists, and other programmes, lengths, rates and sheets. A fourth recording is kept from the
@@ -32,10 +32,10 @@ With --scheduler, the workers of a cluster make and diagnose the cases. DIR must
 that they all have under the same path.
 
 For example:
-  antenna-drive trial --cases 200 --seed 7 --out trial7 --diagnose && antenna-drive score trial7
-  antenna-drive trial --wild --cases 20 --seed 7 --out wild7 --diagnose
-  antenna-drive trial --wild --cases 20 --seed 7 --out rest7 --diagnose --skip wild7.jsonl
-  antenna-drive trial --machine joint --machine axis --cases 60 --seed 7 --out other7 --diagnose
+  lab trial --cases 200 --seed 7 --out trial7 --diagnose && lab score trial7
+  lab trial --wild --cases 20 --seed 7 --out wild7 --diagnose
+  lab trial --wild --cases 20 --seed 7 --out rest7 --diagnose --skip wild7.jsonl
+  lab trial --machine joint --machine axis --cases 60 --seed 7 --out other7 --diagnose
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ USUAL_TOLERANCE = 0.02
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of `antenna-drive trial`."""
+    """Add the options of `lab trial`."""
     parser.add_argument('--cases', type=int, required=True, metavar='N',
                         help='number of cases')
     parser.add_argument('--seed', type=int, required=True, metavar='S',
@@ -85,7 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              'on b, which needs --wild (default %(default)s)')
     add_worker_options(parser, os.cpu_count() or 1)
     parser.add_argument('--skip', type=Path, metavar='FILE',
-                        help='make and diagnose no case that this file of `antenna-drive score '
+                        help='make and diagnose no case that this file of `lab score '
                              '--cases` holds')
     parser.add_argument('--diagnose', action='store_true',
                         help='diagnose each case as well')

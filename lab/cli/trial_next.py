@@ -3,7 +3,7 @@
 """
 Try designed tests on sealed cases: a third test, or a whole investigation.
 
-Wild cases are drawn and sealed as by `antenna-drive trial --wild`. All tests run on the
+Wild cases are drawn and sealed as by `lab trial --wild`. All tests run on the
 independent antenna.
 
   --kind third        cases whose first two recordings leave the answer open (best answer below
@@ -24,9 +24,9 @@ A case takes about ten diagnoses. The same command resumes an interrupted trial.
 in DIR/results.jsonl. To continue on another machine, put that file into a new DIR.
 
 For example:
-  antenna-drive trial-next --cases 40 --pool 400 --seed 71 --out next71 --jobs 8
-  antenna-drive trial-next --cases 40 --seed 71 --longest 30 --largest 0.1 --out small71 --jobs 8
-  antenna-drive trial-next --kind investigate --cases 30 --seed 72 --out loops72 --jobs 8
+  lab trial-next --cases 40 --pool 400 --seed 71 --out next71 --jobs 8
+  lab trial-next --cases 40 --seed 71 --longest 30 --largest 0.1 --out small71 --jobs 8
+  lab trial-next --kind investigate --cases 30 --seed 72 --out loops72 --jobs 8
 """
 
 from __future__ import annotations

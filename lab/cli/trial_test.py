@@ -3,14 +3,14 @@
 """
 Make one test more on the antenna of a sealed case.
 
-DIR holds a trial that `antenna-drive trial` has made. The independent antenna of CASE plays the
+DIR holds a trial that `lab trial` has made. The independent antenna of CASE plays the
 waveform of a test sheet, with the tolerances, imperfections and sensors of the case, and the
 recording is written as CSV. What the sheet does not say is as in the other tests of the case.
 
 So you can try the whole loop by hand, or let it run by itself:
 
-  antenna-drive trial-test wild7 case_0001 --sheet next.yaml --out next.csv
-  antenna-drive investigate --out found --by 'antenna-drive trial-test wild7 case_0001
+  lab trial-test wild7 case_0001 --sheet next.yaml --out next.csv
+  antenna-drive investigate --out found --by 'lab trial-test wild7 case_0001
       --sheet {sheet} --out {out} --duration {duration} --number {number}'
 
 The same test gives the same recording; with another --number it has another noise.
@@ -28,12 +28,12 @@ from simgap.command.output import check_options
 from simgap.errors import UserError
 from simgap.inputs.schema import Entry
 
-# Places before these belong to the tests of `antenna-drive trial-next`.
+# Places before these belong to the tests of `lab trial-next`.
 _FIRST_PLACE = 10
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of `antenna-drive trial-test`."""
+    """Add the options of `lab trial-test`."""
     parser.add_argument('trial', type=Path, metavar='DIR', help='folder of the trial')
     parser.add_argument('case', metavar='CASE', help='of an antenna, e.g. case_0001')
     parser.add_argument('--sheet', type=Path, required=True, metavar='FILE',

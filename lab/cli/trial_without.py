@@ -5,15 +5,15 @@ Diagnose cases of a trial again, each without its true effect in the catalogue.
 
 A machine's fault may be on no list. So cases whose single effect was named first are diagnosed
 again without that effect, the same effect in other places, and what becomes it at an end of its
-range. The probability of 'unknown' must rise. `antenna-drive trial --diagnose` makes the cases;
+range. The probability of 'unknown' must rise. `lab trial --diagnose` makes the cases;
 those that are not diagnosed yet, or were not right, are not used. The second verdict is
 DIR/case_0001/without.json. The same command resumes an interrupted trial.
 
 The exit code is 1 if no case could be diagnosed.
 
 For example:
-  antenna-drive trial-without wild7 --cases 20
-  antenna-drive trial-without wild7 --scored wild7.jsonl
+  lab trial-without wild7 --cases 20
+  lab trial-without wild7 --scored wild7.jsonl
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--cases', type=int, default=20, metavar='N',
                         help='how many cases, in their order (default: %(default)s)')
     parser.add_argument('--scored', type=Path, metavar='FILE',
-                        help='take the first answers from this file of `antenna-drive score '
+                        help='take the first answers from this file of `lab score '
                              '--cases`, of a trial that was drawn again in DIR')
     add_batch_options(parser, 'diagnoses')
 

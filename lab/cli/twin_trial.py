@@ -11,15 +11,15 @@ The antennas have the tolerances and, but for --kind verdict, the imperfections 
 (docs/trial.md). The twin is played in simulated time, as fast as the computer goes. With --topics
 its node hears the antenna on topics at real time, six minutes a case. No more cases run at once
 than there are cores, because a twin without a processor tells late. Truths are sealed in DIR
-before anything is simulated, as by `antenna-drive trial`; DIR/results.jsonl is what the twin said.
+before anything is simulated, as by `lab trial`; DIR/results.jsonl is what the twin said.
 The same command resumes an interrupted trial. To continue on another machine, put that file into a
 new DIR.
 
 For example:
-  antenna-drive twin-trial --kind onset --cases 20 --seed 7 --out onsets
-  antenna-drive twin-trial --kind onset --cases 20 --seed 7 --out real_time --topics --jobs 2
-  antenna-drive twin-trial --kind healthy --cases 4 --seed 8 --out hours
-  antenna-drive twin-trial --kind verdict --cases 30 --seed 9 --out growing --jobs 2
+  lab twin-trial --kind onset --cases 20 --seed 7 --out onsets
+  lab twin-trial --kind onset --cases 20 --seed 7 --out real_time --topics --jobs 2
+  lab twin-trial --kind healthy --cases 4 --seed 8 --out hours
+  lab twin-trial --kind verdict --cases 30 --seed 9 --out growing --jobs 2
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ RECORDED_S = 30.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of `antenna-drive twin-trial`."""
+    """Add the options of `lab twin-trial`."""
     parser.add_argument('--kind', choices=('onset', 'healthy', 'verdict'), required=True,
                         help='what happens in the tests')
     parser.add_argument('--cases', type=int, required=True, metavar='N', help='number of cases')
@@ -144,7 +144,7 @@ def outcome(truth: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, Any
 def _watched(columns: Mapping[str, FloatArray], sheet: Mapping[str, Any], onset_s: float,
              settings: Mapping[str, Any]) -> dict[str, Any]:
     if settings.get('topics'):
-        from lab.trials.twin_on_topics import watched_on_topics
+        from lab.campaign.twin_on_topics import watched_on_topics
         return watched_on_topics(columns, sheet, onset_s, settings['alarms_per_day'])
     from antenna_drive.twin.proving import watched
     from antenna_drive.twin.watch import TwinSettings

@@ -95,7 +95,7 @@ def _designed(folder: Path, truth: Truth, limit: float) -> dict[str, Any]:
     out = case / 'investigation'
     sheet = case / 'known.yaml'
     sealing.write_whole(sheet, yaml.safe_dump(known(truth), sort_keys=False))
-    by = [sys.executable, '-m', 'antenna_drive', 'trial-test', str(folder), truth['case'],
+    by = [sys.executable, '-m', 'lab', 'trial-test', str(folder), truth['case'],
           '--sheet', '{sheet}', '--out', '{out}', '--duration', '{duration}',
           '--number', '{number}']
     said = run_command(['investigate', '--out', str(out), '--sheet', str(sheet), '--by',

@@ -48,7 +48,7 @@ def run_trial(folder: Path, wanted: int, jobs: int, limit: float, options: Seque
     done
         called with the number of cases that are complete, and their total
     scored
-        file of `antenna-drive score --cases` with the first answers; None: those in the folder
+        file of `lab score --cases` with the first answers; None: those in the folder
 
     Returns
     -------
@@ -70,7 +70,7 @@ def run_trial(folder: Path, wanted: int, jobs: int, limit: float, options: Seque
              if case.truth['kind'] == 'single' and case.right][:wanted]
     if not cases:
         raise UserError(f'{folder}: no case with a single effect that was named first; '
-                        'antenna-drive trial --diagnose makes a trial')
+                        'lab trial --diagnose makes a trial')
     done(0, len(cases))
     with workers(jobs, threads=True) as pool:
         for complete, (_, result) in enumerate(pool.each(_diagnosed, (

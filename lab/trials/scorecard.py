@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from lab.antenna.cases import Truth
-from lab.antenna.sizes import stated_sizes, StatedSize
 from lab.antenna.wild_programme import KEPT_BACK
 from lab.trials import sealing
 from lab.trials.batch import FAILURE, KEPT, VERDICT
 from lab.trials.held_back import closed_fraction, PredictionError
+from lab.trials.sizes import stated_sizes, StatedSize
 from lab.trials.verdict import NONE, read_verdict, UNKNOWN, Verdict, VerdictError
 import numpy as np
 

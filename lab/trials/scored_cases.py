@@ -57,7 +57,7 @@ def read_scored(path: Path) -> list[Case]:
                     cases.append(_case(json.loads(line)))
                 except (ValueError, RecursionError) as error:
                     raise UserError(f'{path}: line {number}: no case of a trial, '
-                                    f'{one_line(error, 200)}; antenna-drive score DIR --cases '
+                                    f'{one_line(error, 200)}; lab score DIR --cases '
                                     'FILE writes such a file') from None
     except (OSError, UnicodeDecodeError) as error:
         raise UserError(f'{path}: cannot be read, {one_line(error, 200)}') from error

@@ -98,7 +98,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
     """
     path = folder / MANIFEST
-    manifest = _read(path, 'make a trial first: antenna-drive trial --out DIR')
+    manifest = _read(path, 'make a trial first: lab trial --out DIR')
     if manifest.get('format') != FORMAT or not isinstance(manifest.get('seals'), dict) or (
             not isinstance(manifest.get('settings'), dict)):
         raise SealError(f'{path}: not a manifest of format {FORMAT}; make the trial again')

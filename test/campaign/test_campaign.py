@@ -13,7 +13,6 @@ import subprocess
 import sys
 from typing import Any
 
-from antenna_drive.cli import main
 from antenna_drive.emulator.wiring import OUTPUTS
 from antenna_drive.lockstep.frame import FrameLayout, read_foreign
 from antenna_drive.lockstep.inbox import Inbox
@@ -26,6 +25,7 @@ from lab.campaign.soak import BLOCKS, slope
 from lab.campaign.summary import bad, COUNTS, summary
 from lab.campaign.supervisor import Campaign, OUTCOMES
 from lab.campaign.trials import DOSES, FULL, Outcome, PARTS, plan, READERS, Trial
+from lab.cli import main
 from lab.trials.verdict import VerdictError
 import numpy as np
 import pytest
@@ -199,7 +199,7 @@ def test_a_finding_says_how_to_repeat_it_and_becomes_no_part_of_the_page() -> No
         id=first.label, findings=[finding], counts={'tracebacks': 1})}, SETTINGS, 'out')
     assert bad(result) == {'tracebacks': 1}
     [found] = result['findings']
-    assert found['repeat'] == f'antenna-drive campaign --out out --repeat {first.label}'
+    assert found['repeat'] == f'lab campaign --out out --repeat {first.label}'
     text = page(result)
     assert '<script>' not in text
     assert found['repeat'] in text

@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from antenna_drive.cli import main
+from lab.cli import main
 from lab.cli.thresholds import DECIDED, variants
 import numpy as np
 import pytest

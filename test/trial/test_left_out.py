@@ -9,7 +9,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.cli import main
+from lab.cli import main
 from lab.trials import batch, sealing
 from lab.trials.left_out import run_trial
 from lab.trials.scorecard import read_cases

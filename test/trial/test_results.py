@@ -9,8 +9,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.cli import main
 from antenna_drive.workers import workers
+from lab.cli import main
 from lab.cli import twin_trial
 from lab.trials import batch
 from lab.trials.results import FILE, TrialResults

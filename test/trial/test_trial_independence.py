@@ -9,23 +9,25 @@ from pathlib import Path
 import subprocess
 import sys
 
-import lab.antenna as trial
+import lab
 import pytest
 
-PACKAGE = Path(trial.__file__).parent
+LAB = Path(lab.__file__).parent
+HOUSES = ('antenna_drive', 'lab', 'simgap')
+ANTENNA = ('lab.antenna', 'simgap.errors')
 # what starts processes and reports errors knows nothing of any drive
-ALLOWED = ('lab.antenna', 'simgap.errors', 'antenna_drive.workers',
+ALLOWED = (*ANTENNA, 'lab.joints', 'lab.trials', 'antenna_drive.workers',
            'antenna_drive.subcommand', 'simgap.command.programs', 'simgap.command.remedies')
-
-
 # models that diagnose, which only a diagnosis loads
-MODELS = PACKAGE / 'others' / 'models'
-SOURCES = sorted(path for path in PACKAGE.rglob('*.py') if path.parent != MODELS)
+MODELS = LAB / 'joints' / 'models'
+SOURCES = [(source, ANTENNA if room == 'antenna' else ALLOWED)
+           for room in ('antenna', 'joints', 'trials') for source in sorted((LAB / room).rglob('*.py'))
+           if source.parent != MODELS]
 
 
-@pytest.mark.parametrize('source', SOURCES,
-                         ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_source_imports_nothing_of_the_emulator(source: Path) -> None:
+@pytest.mark.parametrize('source, allowed', SOURCES,
+                         ids=[str(source.relative_to(LAB)) for source, _ in SOURCES])
+def test_source_imports_nothing_of_the_emulator(source: Path, allowed: tuple[str, ...]) -> None:
     for node in ast.walk(ast.parse(source.read_text())):
         names: list[str] = []
         if isinstance(node, ast.Import):
@@ -34,18 +36,21 @@ def test_source_imports_nothing_of_the_emulator(source: Path) -> None:
             assert node.level == 0, f'{source.name}: a relative import'
             names = [node.module or '']
         for name in names:
-            if name.split('.')[0] == 'antenna_drive':
-                assert name.startswith(ALLOWED), f'{source.name} imports {name}'
+            if name.split('.')[0] in HOUSES:
+                assert name.startswith(allowed), f'{source.name} imports {name}'
                 assert 'models' not in name.split('.'), f'{source.name} imports {name}'
 
 
 def test_nothing_of_the_emulator_is_loaded_with_it() -> None:
     program = (
         'import sys, lab.trials.batch, lab.trials.scorecard\n'
-        'print(*[name for name in sys.modules if name.startswith("antenna_drive.")])')
+        'print(*[name for name in sys.modules if name.count(".") and\n'
+        '       name.split(".")[0] in ("antenna_drive", "lab", "simgap")])')
     loaded = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True,
                             check=True).stdout.split()
     assert 'lab.antenna.equations' in loaded
     assert 'lab.joints.mechanism' in loaded
     assert [name for name in loaded if '.models' in name] == []
-    assert [name for name in loaded if not name.startswith(ALLOWED)] == []
+    of_packages = ('simgap.command',)   # an empty __init__
+    assert [name for name in loaded
+            if not name.startswith(ALLOWED) and name not in of_packages] == []
