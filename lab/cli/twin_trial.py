@@ -26,6 +26,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
+from functools import partial
 import os
 from pathlib import Path
 from statistics import median
@@ -33,9 +34,9 @@ from typing import Any
 
 from antenna_drive.cli.sharing import add_worker_options
 from antenna_drive.emulator.unit import FloatArray
-from antenna_drive.workers import workers
 from lab.antenna import cases
 from lab.trials import onset, sealing
+from lab.trials.driver import Arm, complete
 from lab.trials.results import TrialResults
 from lab.trials.scorecard import Case, score
 from lab.trials.verdict import content_of, parse_verdict
@@ -91,17 +92,11 @@ def run(arguments: argparse.Namespace) -> int:
     print(f'{folder}: {len(names)} truths sealed, manifest {sealing.manifest_seal(manifest)}',
           flush=True)
     results = TrialResults(folder, manifest)
-    wanted = [name for name in names if not results[name]]
-    tasks = [(sealing.open_truth(folder, name, manifest), manifest['settings'])
-             for name in wanted]
-    with Progress('cases', len(names), quiet=arguments.quiet) as progress, workers(
-            arguments.jobs, arguments.scheduler) as hands:
-        done = len(names) - len(wanted)
-        progress.update(done)
-        for number, result in hands.each(outcome, tasks):
-            results.put(wanted[number], **result())
-            done += 1
-            progress.update(done)
+    with Progress('cases', len(names), quiet=arguments.quiet) as progress:
+        complete(names, partial(sealing.open_truth, folder, manifest=manifest),
+                 [Arm(lambda name, row: not row, partial(outcome, settings=manifest['settings']))],
+                 results, arguments.jobs, arguments.scheduler,
+                 done=lambda done, total: progress.update(done))
     print('\n'.join({'onset': of_onsets, 'healthy': of_healthy, 'verdict': of_verdicts}[
         arguments.kind]([results[name] for name in results])))
     return 0

@@ -21,8 +21,8 @@ ALLOWED = (*ANTENNA, 'lab.joints', 'lab.trials', 'antenna_drive.workers',
 # models that diagnose, which only a diagnosis loads
 MODELS = LAB / 'joints' / 'models'
 SOURCES = [(source, ANTENNA if room == 'antenna' else ALLOWED)
-           for room in ('antenna', 'joints', 'trials') for source in sorted((LAB / room).rglob('*.py'))
-           if source.parent != MODELS]
+           for room in ('antenna', 'joints', 'trials')
+           for source in sorted((LAB / room).rglob('*.py')) if source.parent != MODELS]
 
 
 @pytest.mark.parametrize('source, allowed', SOURCES,
