@@ -159,9 +159,7 @@ def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
 
     Parameters
     ----------
-    folder
-        of the trial
-    manifest
+    folder, manifest
         of the trial
     jobs
         number of processes
@@ -348,23 +346,12 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
 
     Parameters
     ----------
-    folder
-        of the trial
-    manifest
-        of the trial
-    jobs
-        diagnoses at a time
+    folder, manifest, jobs, done, scheduler, skipped
+        as for `make_cases`
     options
         further options for the diagnosis
     limit
         time limit of one diagnosis, after which it counts as failed [s]
-    done
-        called with the number of finished cases and their total
-    scheduler
-        address of a dask.distributed scheduler whose workers diagnose them; they see the folder
-        under the same path
-    skipped
-        names of cases that are not wanted
 
     Returns
     -------
