@@ -35,6 +35,11 @@ _OTHERS_READY_S = 8.0
 Run = Callable[..., 'ExchangeRun']
 
 _PERCENTILES = (50.0, 99.0, 99.9)
+_RATIOS = (
+    ('ratio_to_bare_compiled', 'own', 'bare_compiled'),
+    ('ratio_to_bare_compiled_placed', 'own_placed', 'bare_compiled_placed'),
+    ('ratio_to_bare_compiled_with_readings', 'readings', 'bare_compiled'),
+    ('ratio_to_bare', 'own_placed', 'bare_placed'))
 
 
 @dataclass(frozen=True)
@@ -196,11 +201,7 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None],
     rates = {name: [run.rate for run in of_kind] for name, of_kind in runs.items()}
     result['steps_per_s'] = {name: measuring.figure(values, '1/s')
                              for name, values in rates.items()}
-    for ratio, above, below in (
-            ('ratio_to_bare_compiled', 'own', 'bare_compiled'),
-            ('ratio_to_bare_compiled_placed', 'own_placed', 'bare_compiled_placed'),
-            ('ratio_to_bare_compiled_with_readings', 'readings', 'bare_compiled'),
-            ('ratio_to_bare', 'own_placed', 'bare_placed')):
+    for ratio, above, below in _RATIOS:
         result[ratio] = measuring.ratio(rates[above], rates[below])
     for factor, name, step_s in (
             ('rtf_1ms', 'readings', STEP_S), ('rtf_1ms_placed', 'readings_placed', STEP_S),

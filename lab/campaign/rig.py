@@ -188,10 +188,8 @@ class Rig:
             where a recorder records
         recorder, observers
             members to start beside the nodes, in processes of their own
-        namespace
-            of the drive
-        order
-            the processes in the order of their start
+        namespace, order
+            of the drive, and its processes in the order of their start
         conductor
             the command of another node in the place of test_signal
         exchange
