@@ -54,10 +54,8 @@ def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float =
         of all random draws
     tolerance
         largest relative deviation of any parameter from the reference, unit 1
-    sample_rate
-        of the recordings [Hz]
-    duration
-        of each recording [s]
+    sample_rate, duration
+        of the recordings [Hz], [s]
     wild
         draw imperfections and programmes too, instead of `sample_rate` and `duration`
     family

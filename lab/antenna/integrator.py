@@ -15,9 +15,10 @@ from typing import Any
 
 from lab.antenna.compiled import compiled, inner
 from lab.antenna.equations import (
-    AXIS_FRICTION, derivative, FloatArray, FRICTION, LOAD_SIGN, ModeArray, MOTOR_AT, MOTOR_SIZE,
-    STATES, SWITCHES, W, W_A,
+    AXIS_FRICTION, derivative, FRICTION, LOAD_SIGN, ModeArray, MOTOR_AT, MOTOR_SIZE, STATES,
+    SWITCHES, W, W_A,
 )
+from lab.antenna.laws import FloatArray
 from lab.antenna.machine import Records
 import numpy as np
 
@@ -179,22 +180,14 @@ def integrate(machine: Records, test: Any, start: FloatArray, mode: ModeArray,
 
     Parameters
     ----------
-    machine
-        the antenna
-    test
-        TEST record
-    start
-        state at t = 0, shape (STATES,); overwritten with the last state
-    mode
-        switches at t = 0, shape (SWITCHES,); overwritten
-    corners
-        times at which an input is not smooth, ascending [s]
-    samples
-        times of the requested states, ascending, from 0 [s]
-    tolerance
-        largest error of one step, in units of `scale`
-    scale
-        typical size of each state
+    machine, test
+        the antenna, and a TEST record
+    start, mode
+        state and switches at t = 0, shapes (STATES,), (SWITCHES,); overwritten with the last ones
+    corners, samples
+        times at which an input is not smooth, and of the requested states, from 0; ascending [s]
+    tolerance, scale
+        largest error of one step, in units of the typical size of each state, shape (STATES,)
     out
         result, shape (len(samples), STATES)
     statistics

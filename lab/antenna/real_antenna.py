@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-from lab.antenna import equations, integrator, waveform
+from lab.antenna import equations, integrator, laws, waveform
 from lab.antenna.equations import MOTOR_AT, MOTOR_SIZE
 from lab.antenna.machine import Records
 from lab.antenna.sheet import CaseSheet
@@ -88,7 +88,7 @@ def start_state(machine: Records, sheet: CaseSheet, place: tuple[float, float]) 
         y[at + equations.THETA] = place[which] * motor['half_gap']
         # Tooth errors shift the gap: iterate until the motor stands at its place.
         for _ in range(50):
-            x, _, gap = equations.gear_deflection(
+            x, _, gap = laws.gear_deflection(
                 motor, machine.structure[0], y[at + equations.THETA], 0.0, 0.0, 0.0)
             y[at + equations.THETA] -= 0.5 * (x - place[which] * gap)
     return y

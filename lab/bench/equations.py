@@ -166,8 +166,8 @@ def _torques(compiler: _Compiler) -> tuple[_Equation, _Equation]:
     return mode_torque, applied
 
 
-def _rates(compiler: _Compiler, mode_torque: _Equation, applied: _Equation) -> _Equation:
-    """Return the function that writes the time derivative of the state."""
+def _acceleration(compiler: _Compiler, applied: _Equation) -> _Equation:
+    """Return the acceleration of a body with friction."""
     @compiler
     def acceleration(x, body, slip, threshold, p):  # type: ignore[no-untyped-def]
         """Return a body's acceleration [rad/s^2], Eq. (2)-(8)."""
@@ -192,6 +192,13 @@ def _rates(compiler: _Compiler, mode_torque: _Equation, applied: _Equation) -> _
         if torque < -stiction:
             return (torque + stiction) / inertia
         return 0.0
+
+    return acceleration
+
+
+def _rates(compiler: _Compiler, mode_torque: _Equation, applied: _Equation) -> _Equation:
+    """Return the function that writes the time derivative of the state."""
+    acceleration = _acceleration(compiler, applied)
 
     @compiler
     def amplifier(x, m, p):  # type: ignore[no-untyped-def]

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 from antenna_drive.article.experiments import DriveExperiment
@@ -26,6 +26,8 @@ import numpy as np
 GRID_S = 5e-3
 # The rate decides between stick and slip; see `equations`.
 BY_RATE = 2
+# Start and end [s], value and slope of a part of the command.
+Piece = tuple[float, float, float, float]
 # A guard that falls below zero within this time has jumped; smaller steps do not help [s].
 _JUMP_S = 1e-7
 # Sizes of the states, for absolute tolerances: V; A, A, A, rad, rad/s; V; rad, rad/s.
@@ -234,7 +236,7 @@ def pathsim(problem: Problem, setting: Setting) -> FloatArray:
     """Run with PathSim: an ODE block, a source for the command, events for the stops."""
     from pathsim import Connection, Simulation, solvers
     from pathsim.blocks import ODE, Scope, Source
-    from pathsim.events import Schedule, ZeroCrossingDown
+    from pathsim.events import Schedule
 
     rates, slip, p = problem.rates, problem.slip, problem.p
     x = problem.begin(setting)
@@ -252,8 +254,7 @@ def pathsim(problem: Problem, setting: Setting) -> FloatArray:
 
     source = Source(command)
     drive = ODE(f, x)
-    events: list[Any] = []
-    before = [0.0] * BODIES
+    events: list[Any] = [] if setting.threshold else _pathsim_stops(problem, drive)
 
     def turn(t: float) -> None:
         piece[0] = min(piece[0] + 1, len(problem.pieces) - 1)
@@ -261,23 +262,7 @@ def pathsim(problem: Problem, setting: Setting) -> FloatArray:
     # the schedule ends a step at each jump of the command
     if len(problem.pieces) > 1:
         first, period = problem.pieces[0][1], problem.pieces[1][1] - problem.pieces[1][0]
-        events.append(Schedule(t_start=first, t_period=period, func_act=turn, tolerance=1e-9))
-    if not setting.threshold:
-        for body in range(BODIES):
-            def stop(t: float, body: int = body) -> None:
-                x = np.array(drive.engine.state)
-                problem.switch(x, {body})
-                drive.engine.set(x)
-
-            def guard(t: float, body: int = body) -> float:
-                g = problem.guard(body, drive.engine.state)
-                if g > 0.0:
-                    before[body] = t
-                elif abs(t - before[body]) < _JUMP_S:
-                    return 0.0
-                return g
-
-            events.append(ZeroCrossingDown(func_evt=guard, func_act=stop, tolerance=1e-6))
+        events.insert(0, Schedule(t_start=first, t_period=period, func_act=turn, tolerance=1e-9))
     scope = Scope(sampling_period=GRID_S)
     simulation = Simulation(
         [source, drive, scope],
@@ -294,6 +279,29 @@ def pathsim(problem: Problem, setting: Setting) -> FloatArray:
     return problem.readings(states)
 
 
+def _pathsim_stops(problem: Problem, drive: Any) -> list[Any]:
+    """Return an event for each body that stops or breaks away."""
+    from pathsim.events import ZeroCrossingDown
+
+    before = [0.0] * BODIES
+
+    def stop(body: int, t: float) -> None:
+        x = np.array(drive.engine.state)
+        problem.switch(x, {body})
+        drive.engine.set(x)
+
+    def guard(body: int, t: float) -> float:
+        g = problem.guard(body, drive.engine.state)
+        if g > 0.0:
+            before[body] = t
+        elif abs(t - before[body]) < _JUMP_S:
+            return 0.0
+        return g
+
+    return [ZeroCrossingDown(func_evt=partial(guard, body), func_act=partial(stop, body),
+                             tolerance=1e-6) for body in range(BODIES)]
+
+
 def _on_grid(grid: FloatArray, times: FloatArray, states: FloatArray) -> FloatArray:
     # a scope may sample slightly late if a step ends elsewhere
     if len(times) == len(grid) and np.allclose(times, grid, atol=1e-9):
@@ -304,14 +312,38 @@ def _on_grid(grid: FloatArray, times: FloatArray, states: FloatArray) -> FloatAr
 def drake(problem: Problem, setting: Setting) -> FloatArray:
     """Run with Drake's Simulator: a LeafSystem, with witness functions for the stops."""
     from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+
+    x = problem.begin(setting)
+    present = [problem.pieces[0]]
+    simulator = Simulator(_drake_system(problem, setting, present))
+    ApplySimulatorConfig(SimulatorConfig(
+        integration_scheme=setting.method, max_step_size=0.1, accuracy=setting.tolerance,
+        use_error_control=True), simulator)
+    context: Any = simulator.get_mutable_context()
+    context.SetContinuousState(x)
+    context.SetAccuracy(setting.tolerance)
+    simulator.Initialize()
+    out = np.empty((STATES, problem.grid.size))
+    out[:, 0] = x
+    row = 1
+    for piece in problem.pieces:
+        present[0] = piece
+        start, end, _, _ = piece
+        for t in problem.within(start, end):
+            simulator.AdvanceTo(t)
+            out[:, row] = context.get_continuous_state_vector().CopyToVector()
+            row += 1
+        simulator.AdvanceTo(end)
+    return problem.readings(out)
+
+
+def _drake_system(problem: Problem, setting: Setting, present: list[Piece]) -> Any:
+    """Return the drive in the one piece of the command that is present."""
     from pydrake.systems.framework import (
         LeafSystem, UnrestrictedUpdateEvent, WitnessFunctionDirection,
     )
 
-    rates, slip, p = problem.rates, problem.slip, problem.p
-    x = problem.begin(setting)
-    threshold = problem.threshold
-    piece = problem.pieces[0]
+    rates, slip, p, threshold = problem.rates, problem.slip, problem.p, problem.threshold
     dx = np.empty(STATES)
 
     class DriveSystem(LeafSystem):  # type: ignore[misc]
@@ -339,28 +371,9 @@ def drake(problem: Problem, setting: Setting) -> FloatArray:
             return self.witnesses
 
         def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
-            start, _, value, slope = piece
+            start, _, value, slope = present[0]
             rates(context.get_continuous_state_vector().CopyToVector(),
                   value + slope * (context.get_time() - start), slip, threshold, p, dx)
             derivatives.get_mutable_vector().SetFromVector(dx)
 
-    system = DriveSystem()
-    simulator = Simulator(system)
-    ApplySimulatorConfig(SimulatorConfig(
-        integration_scheme=setting.method, max_step_size=0.1, accuracy=setting.tolerance,
-        use_error_control=True), simulator)
-    context: Any = simulator.get_mutable_context()
-    context.SetContinuousState(x)
-    context.SetAccuracy(setting.tolerance)
-    simulator.Initialize()
-    out = np.empty((STATES, problem.grid.size))
-    out[:, 0] = x
-    row = 1
-    for piece in problem.pieces:
-        start, end, _, _ = piece
-        for t in problem.within(start, end):
-            simulator.AdvanceTo(t)
-            out[:, row] = context.get_continuous_state_vector().CopyToVector()
-            row += 1
-        simulator.AdvanceTo(end)
-    return problem.readings(out)
+    return DriveSystem()

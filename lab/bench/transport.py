@@ -35,6 +35,11 @@ _OTHERS_READY_S = 8.0
 Run = Callable[..., 'ExchangeRun']
 
 _PERCENTILES = (50.0, 99.0, 99.9)
+_RATIOS = (
+    ('ratio_to_bare_compiled', 'own', 'bare_compiled'),
+    ('ratio_to_bare_compiled_placed', 'own_placed', 'bare_compiled_placed'),
+    ('ratio_to_bare_compiled_with_readings', 'readings', 'bare_compiled'),
+    ('ratio_to_bare', 'own_placed', 'bare_placed'))
 
 
 @dataclass(frozen=True)
@@ -186,17 +191,7 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None],
 
     steps = 1500 if quick else 5000
     result: dict[str, Any] = {'steps': steps, 'step_s': STEP_S}
-    kinds: dict[str, Callable[[], ExchangeRun]] = {
-        'own': partial(own, steps, placed=False),
-        'bare_compiled': partial(bare, steps, 'compiled', placed=False),
-        'readings': partial(own, steps, publish_rate=100.0, placed=False),
-        'own_placed': partial(own, steps, placed=True),
-        'bare_compiled_placed': partial(bare, steps, 'compiled', placed=True),
-        'readings_placed': partial(own, steps, publish_rate=100.0, placed=True),
-        'bare_placed': partial(bare, steps, placed=True),
-        'half_step': partial(own, steps, STEP_S / 2.0, publish_rate=100.0, placed=False),
-        'busy': partial(_beside_a_busy_process, steps),
-        'first': _first_step}
+    kinds = _kinds(steps)
     runs: dict[str, list[ExchangeRun]] = {name: [] for name in kinds}
     for turn in range(repetitions):
         for name, run in kinds.items():
@@ -206,11 +201,7 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None],
     rates = {name: [run.rate for run in of_kind] for name, of_kind in runs.items()}
     result['steps_per_s'] = {name: measuring.figure(values, '1/s')
                              for name, values in rates.items()}
-    for ratio, above, below in (
-            ('ratio_to_bare_compiled', 'own', 'bare_compiled'),
-            ('ratio_to_bare_compiled_placed', 'own_placed', 'bare_compiled_placed'),
-            ('ratio_to_bare_compiled_with_readings', 'readings', 'bare_compiled'),
-            ('ratio_to_bare', 'own_placed', 'bare_placed')):
+    for ratio, above, below in _RATIOS:
         result[ratio] = measuring.ratio(rates[above], rates[below])
     for factor, name, step_s in (
             ('rtf_1ms', 'readings', STEP_S), ('rtf_1ms_placed', 'readings_placed', STEP_S),
@@ -230,6 +221,21 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None],
         progress(f'{duration_s:g} s at real-time pace with steps of {1e3 * step_s:g} ms')
         result |= _paced(name, step_s, duration_s)
     return result
+
+
+def _kinds(steps: int) -> dict[str, Callable[[], ExchangeRun]]:
+    """Return what runs in turn, by name."""
+    return {
+        'own': partial(own, steps, placed=False),
+        'bare_compiled': partial(bare, steps, 'compiled', placed=False),
+        'readings': partial(own, steps, publish_rate=100.0, placed=False),
+        'own_placed': partial(own, steps, placed=True),
+        'bare_compiled_placed': partial(bare, steps, 'compiled', placed=True),
+        'readings_placed': partial(own, steps, publish_rate=100.0, placed=True),
+        'bare_placed': partial(bare, steps, placed=True),
+        'half_step': partial(own, steps, STEP_S / 2.0, publish_rate=100.0, placed=False),
+        'busy': partial(_beside_a_busy_process, steps),
+        'first': _first_step}
 
 
 def _first_step() -> ExchangeRun:

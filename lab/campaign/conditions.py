@@ -26,7 +26,7 @@ from lab.campaign.domains import DomainClaim
 from lab.campaign.rig import (
     Diagnostics, InVainError, MEMBERS, OBSERVER, random_settings, RECORDER, Rig,
 )
-from lab.campaign.starts import check_bag
+from lab.campaign.starts import check_bags
 from lab.campaign.trials import Outcome
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
@@ -208,8 +208,7 @@ def _clock_set(outcome: Outcome, options: Mapping[str, Any], rng: random.Random,
                       and rig.watcher.step > 300, f'a new run of {victim} with the clock at '
                                                   f'{offset_s:+d} s')
             rig.compare()
-    for bag in sorted((folder / 'bags').iterdir()):
-        check_bag(outcome, bag)
+    check_bags(outcome, folder / 'bags')
 
 
 def _suspended(outcome: Outcome, options: Mapping[str, Any], rng: random.Random,
@@ -231,8 +230,7 @@ def _suspended(outcome: Outcome, options: Mapping[str, Any], rng: random.Random,
         rig.compare()
         said = rig.said.last('test_signal')
         outcome.figures['late_steps'] = said.values.get('late steps') if said else None
-    for bag in sorted((folder / 'bags').iterdir()):
-        check_bag(outcome, bag)
+    check_bags(outcome, folder / 'bags')
 
 
 def _many_drives(outcome: Outcome, options: Mapping[str, Any], rng: random.Random,
@@ -270,8 +268,7 @@ def _slow_observer(outcome: Outcome, options: Mapping[str, Any], rng: random.Ran
         rig.start()
         rig.until_step(1500)
         rig.compare()
-    for bag in sorted((folder / 'bags').iterdir()):
-        check_bag(outcome, bag)
+    check_bags(outcome, folder / 'bags')
 
 
 def _many_changes(outcome: Outcome, options: Mapping[str, Any], rng: random.Random,
@@ -300,8 +297,7 @@ def _many_changes(outcome: Outcome, options: Mapping[str, Any], rng: random.Rand
         noted = sum(len(units) for units in rig.schedule().values())
         outcome.figures['steps_with_changes'] = noted
         rig.compare()
-    for bag in sorted((folder / 'bags').iterdir()):
-        check_bag(outcome, bag)
+    check_bags(outcome, folder / 'bags')
 
 
 def _second_publishers(outcome: Outcome, options: Mapping[str, Any], rng: random.Random,
@@ -320,8 +316,7 @@ def _second_publishers(outcome: Outcome, options: Mapping[str, Any], rng: random
         if len(rig.watcher.runs) != 1:
             outcome.find('a second publisher began a new run', 'new_runs')
         rig.end('echo')
-    for bag in sorted((folder / 'bags').iterdir()):
-        check_bag(outcome, bag)
+    check_bags(outcome, folder / 'bags')
 
 
 def _stopped_beside_garbage(outcome: Outcome, options: Mapping[str, Any], rng: random.Random,

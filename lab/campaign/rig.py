@@ -188,31 +188,24 @@ class Rig:
             where a recorder records
         recorder, observers
             members to start beside the nodes, in processes of their own
-        namespace
-            of the drive
-        order
-            the processes in the order of their start
+        namespace, order
+            of the drive, and its processes in the order of their start
         conductor
             the command of another node in the place of test_signal
         exchange
             of all nodes: auto or python
         environment
             of all processes; None for this one's
-        commands
-            commands of further processes, by name
-        waited_for
-            those of them that the drive waits for
-        settings
-            of the test signal
+        commands, waited_for
+            of further processes, by name, and those of them that the drive waits for
+        settings, run
+            of the test signal, and its parameters run.*
         nap_s, keep
             how long the watcher takes for each step [s], and how many it keeps of each run
         said
             hears /diagnostics; None for a listener of the rig's own
         nodes_are_killed
-            True if the trial does that: a node may take its last frames along, and the recorder
-            then lacks steps
-        run
-            the parameters run.* of test_signal
+            by the trial: a node may take its last frames along, and the recorder lacks steps
 
         """
         self.outcome = outcome
@@ -221,19 +214,15 @@ class Rig:
         self.said = Diagnostics() if said is None else said
         self._owns_said = said is None
         self.watcher = Watcher(namespace, nap_s, keep)
-        further = dict(commands or {})
-        if recorder:
-            assert folder is not None
-            further[RECORDER] = (sys.executable, '-m', MEMBERS, 'recorder', str(folder))
-        for name in observers:
-            further[name] = (sys.executable, '-m', MEMBERS, 'observer')
+        further = {**(commands or {}),
+                   **({RECORDER: _member('recorder', str(folder))} if recorder else {}),
+                   **{name: _member('observer') for name in observers}}
         members = [WATCHER, *([RECORDER] if recorder else ()), *observers, *waited_for]
         self.names = tuple(order or (*UNITS, *further))
-        parameters: dict[str, dict[str, Any]] = {
-            unit: {'exchange': exchange} for unit in UNITS}
-        parameters[TEST_SIGNAL].update({
+        parameters: dict[str, dict[str, Any]] = {unit: {'exchange': exchange} for unit in UNITS}
+        parameters[TEST_SIGNAL] |= {
             **({} if conductor else self.settings), 'run.observers': members,
-            **{f'run.{key}': value for key, value in run.items()}})
+            **{f'run.{key}': value for key, value in run.items()}}
         self.processes = DriveProcesses(
             parameters, namespace=namespace, order=self.names, environment=environment,
             commands={**further, **({TEST_SIGNAL: conductor} if conductor else {})})
@@ -378,6 +367,10 @@ class Rig:
         except KeyError:
             return False
         return True
+
+
+def _member(*arguments: str) -> tuple[str, ...]:
+    return (sys.executable, '-m', MEMBERS, *arguments)
 
 
 def memory_bytes(pid: int) -> int:

@@ -13,7 +13,7 @@ import time
 from typing import Any
 
 from lab.campaign.rig import handles, memory_bytes, OBSERVER, random_settings, Rig
-from lab.campaign.starts import check_bag
+from lab.campaign.starts import check_bags
 from lab.campaign.trials import Outcome
 import numpy as np
 
@@ -59,8 +59,7 @@ def run(name: str, options: Mapping[str, Any], rng: random.Random) -> Outcome:
                 outcome.find(f'{len(rig.watcher.runs)} runs in one soak', 'new_runs')
             rig.compare()
         outcome.count('lost_steps', 0)
-        for bag in sorted(Path(folder).iterdir()):
-            check_bag(outcome, bag)
+        check_bags(outcome, Path(folder))
     _judge(outcome, samples)
     return outcome
 

@@ -37,9 +37,14 @@ def run(name: str, options: Mapping[str, Any], rng: random.Random) -> Outcome:
                 lambda: rig.watcher.step >= STEP, f'step {STEP}')
             outcome.count('starts_reached')
             rig.compare()
-        for bag in sorted(Path(folder).iterdir()):
-            check_bag(outcome, bag)
+        check_bags(outcome, Path(folder))
     return outcome
+
+
+def check_bags(outcome: Outcome, folder: Path) -> None:
+    """Read every bag of a folder, all of which were completed."""
+    for bag in sorted(folder.iterdir()):
+        check_bag(outcome, bag)
 
 
 def check_bag(outcome: Outcome, bag: Path) -> None:

@@ -8,9 +8,9 @@ Make a trial of the twin: sealed antennas of an independent program, played to i
   --kind verdict   the three recordings of an ordinary sealed case, diagnosed as they grow
 
 The antennas have the tolerances and, but for --kind verdict, the imperfections of wild cases
-(lab/notebook/trial.md). The twin is played in simulated time, as fast as the computer goes. With
---topics its node hears the antenna on topics at real time, six minutes a case. No more cases run
-at once than there are cores, because a twin without a processor tells late. Truths are sealed in DIR
+(docs/trial.md). The twin is played in simulated time, as fast as the computer goes. With --topics
+its node hears the antenna on topics at real time, six minutes a case. No more cases run at once
+than there are cores, because a twin without a processor tells late. Truths are sealed in DIR
 before anything is simulated, as by `lab trial`; DIR/results.jsonl is what the twin said.
 The same command resumes an interrupted trial. To continue on another machine, put that file into a
 new DIR.
@@ -26,6 +26,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
+from functools import partial
 import os
 from pathlib import Path
 from statistics import median
@@ -33,9 +34,9 @@ from typing import Any
 
 from antenna_drive.cli.sharing import add_worker_options
 from antenna_drive.emulator.unit import FloatArray
-from antenna_drive.workers import workers
 from lab.antenna import cases
 from lab.trials import onset, sealing
+from lab.trials.driver import Arm, complete
 from lab.trials.results import TrialResults
 from lab.trials.scorecard import Case, score
 from lab.trials.verdict import content_of, parse_verdict
@@ -91,17 +92,11 @@ def run(arguments: argparse.Namespace) -> int:
     print(f'{folder}: {len(names)} truths sealed, manifest {sealing.manifest_seal(manifest)}',
           flush=True)
     results = TrialResults(folder, manifest)
-    wanted = [name for name in names if not results[name]]
-    tasks = [(sealing.open_truth(folder, name, manifest), manifest['settings'])
-             for name in wanted]
-    with Progress('cases', len(names), quiet=arguments.quiet) as progress, workers(
-            arguments.jobs, arguments.scheduler) as hands:
-        done = len(names) - len(wanted)
-        progress.update(done)
-        for number, result in hands.each(outcome, tasks):
-            results.put(wanted[number], **result())
-            done += 1
-            progress.update(done)
+    with Progress('cases', len(names), quiet=arguments.quiet) as progress:
+        complete(names, partial(sealing.open_truth, folder, manifest=manifest),
+                 [Arm(lambda name, row: not row, partial(outcome, settings=manifest['settings']))],
+                 results, arguments.jobs, arguments.scheduler,
+                 done=lambda done, total: progress.update(done))
     print('\n'.join({'onset': of_onsets, 'healthy': of_healthy, 'verdict': of_verdicts}[
         arguments.kind]([results[name] for name in results])))
     return 0
@@ -144,7 +139,7 @@ def outcome(truth: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, Any
 def _watched(columns: Mapping[str, FloatArray], sheet: Mapping[str, Any], onset_s: float,
              settings: Mapping[str, Any]) -> dict[str, Any]:
     if settings.get('topics'):
-        from lab.trials.twin_on_topics import watched_on_topics
+        from lab.campaign.twin_on_topics import watched_on_topics
         return watched_on_topics(columns, sheet, onset_s, settings['alarms_per_day'])
     from antenna_drive.twin.proving import watched
     from antenna_drive.twin.watch import TwinSettings

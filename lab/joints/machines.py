@@ -143,7 +143,7 @@ class Kind:
 @cache
 def kind_of(name: str) -> Kind:
     """Return a kind of machine by its name, one of MACHINES."""
-    table = read_table(f'others/{name}.yaml')
+    table = read_table(f'{name}.yaml', Path(__file__).parent)
     return Kind(name, table, _causes(table['effects']), _causes(table['outside']))
 
 

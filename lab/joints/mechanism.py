@@ -197,6 +197,61 @@ def bristles(m: Mechanism, t: float, bent: float, q: float, w: float, span: floa
     return end + (bent - end) * math.exp(-abs(w) * span / slipping)
 
 
+@inner
+def moved(m: Mechanism, now: float, h: float, middle: float, bent: float, q: float, w: float,
+          ql: float, wl: float, qh: float,
+          wh: float) -> tuple[float, float, float, float, float, float]:
+    """Return angles and rates after a step h of Runge and Kutta's fourth order."""
+    a0, b0, c0 = accelerations(m, now, middle, bent, q, w, ql, wl, qh, wh)
+    g = 0.5 * h
+    a1, b1, c1 = accelerations(
+        m, now + g, middle, bent, q + g * w, w + g * a0, ql + g * wl, wl + g * b0,
+        qh + g * wh, wh + g * c0)
+    a2, b2, c2 = accelerations(
+        m, now + g, middle, bent, q + g * (w + g * a0), w + g * a1,
+        ql + g * (wl + g * b0), wl + g * b1, qh + g * (wh + g * c0), wh + g * c1)
+    a3, b3, c3 = accelerations(
+        m, now + h, middle, bent, q + h * (w + g * a1), w + h * a2,
+        ql + h * (wl + g * b1), wl + h * b2, qh + h * (wh + g * c1), wh + h * c2)
+    q += h * (w + h * (a0 + a1 + a2) / 6.0)
+    ql += h * (wl + h * (b0 + b1 + b2) / 6.0)
+    qh += h * (wh + h * (c0 + c1 + c2) / 6.0)
+    w += h * (a0 + 2.0 * a1 + 2.0 * a2 + a3) / 6.0
+    wl += h * (b0 + 2.0 * b1 + 2.0 * b2 + b3) / 6.0
+    wh += h * (c0 + 2.0 * c1 + 2.0 * c2 + c3) / 6.0
+    return q, w, ql, wl, qh, wh
+
+
+@inner
+def encoder_reading(m: Mechanism, t: float, q: float) -> float:
+    """Return what the encoder reads before it is rounded to its digit [rad]."""
+    read = q
+    if m.encoder_error != 0.0:
+        a = m.encoder_cycles * q + m.encoder_phase
+        read += m.encoder_error * (math.sin(a) + 0.25 * math.sin(2.0 * a))
+    if m.slip != 0.0 and t >= m.slip_at:
+        read += m.slip
+    return read
+
+
+@inner
+def demanded(m: Mechanism, asked: float, read: float, before: float,
+             integral: float) -> tuple[float, float]:
+    """Return the current that the controller demands at a tick, and its integral [A]."""
+    wanted_rate = min(max(m.position_gain * (asked - read), -m.rate_limit), m.rate_limit)
+    error = wanted_rate - (read - before) / TICK_S
+    grown = integral
+    if m.velocity_time > 0.0:
+        grown += m.velocity_gain * error * TICK_S / m.velocity_time
+    demand = m.velocity_gain * error + grown
+    if abs(demand) <= m.current_limit or demand * error < 0.0:
+        integral = grown
+    demand = min(max(demand, -m.current_limit), m.current_limit)
+    if m.dead_zone > 0.0:
+        demand -= m.dead_zone * math.tanh(demand / m.dead_zone)
+    return demand, integral
+
+
 @compiled
 def simulate(m: Mechanism, reference: FloatArray, ticks: int, begin: int, start: float,
              angle: FloatArray, current: FloatArray) -> None:
@@ -232,29 +287,14 @@ def simulate(m: Mechanism, reference: FloatArray, ticks: int, begin: int, start:
             k = (tick - 1) // ticks
             asked = reference[max(k - 1, 0)]
             asked += (reference[k] - asked) * (tick - k * ticks) / ticks
-        read = q
-        if m.encoder_error != 0.0:
-            a = m.encoder_cycles * q + m.encoder_phase
-            read += m.encoder_error * (math.sin(a) + 0.25 * math.sin(2.0 * a))
-        if m.slip != 0.0 and t >= m.slip_at:
-            read += m.slip
+        read = encoder_reading(m, t, q)
         if tick >= 0:
             angle[tick], current[tick] = read, flowing
         read = m.digit * math.floor(read / m.digit + 0.5)
         if tick == -begin:
             before = read
-        wanted_rate = min(max(m.position_gain * (asked - read), -m.rate_limit), m.rate_limit)
-        error = wanted_rate - (read - before) / TICK_S
+        demand, integral = demanded(m, asked, read, before, integral)
         before = read
-        grown = integral
-        if m.velocity_time > 0.0:
-            grown += m.velocity_gain * error * TICK_S / m.velocity_time
-        demand = m.velocity_gain * error + grown
-        if abs(demand) <= m.current_limit or demand * error < 0.0:
-            integral = grown
-        demand = min(max(demand, -m.current_limit), m.current_limit)
-        if m.dead_zone > 0.0:
-            demand -= m.dead_zone * math.tanh(demand / m.dead_zone)
         for part in range(PARTS):
             now = t + part * h
             # each lag follows the mean of the one before it
@@ -270,21 +310,5 @@ def simulate(m: Mechanism, reference: FloatArray, ticks: int, begin: int, start:
             middle = 0.5 * (flowing + after)
             flowing = after
             bent = bristles(m, now, bent, q, w, 0.5 * h)
-            a0, b0, c0 = accelerations(m, now, middle, bent, q, w, ql, wl, qh, wh)
-            g = 0.5 * h
-            a1, b1, c1 = accelerations(
-                m, now + g, middle, bent, q + g * w, w + g * a0, ql + g * wl, wl + g * b0,
-                qh + g * wh, wh + g * c0)
-            a2, b2, c2 = accelerations(
-                m, now + g, middle, bent, q + g * (w + g * a0), w + g * a1,
-                ql + g * (wl + g * b0), wl + g * b1, qh + g * (wh + g * c0), wh + g * c1)
-            a3, b3, c3 = accelerations(
-                m, now + h, middle, bent, q + h * (w + g * a1), w + h * a2,
-                ql + h * (wl + g * b1), wl + h * b2, qh + h * (wh + g * c1), wh + h * c2)
-            q += h * (w + h * (a0 + a1 + a2) / 6.0)
-            ql += h * (wl + h * (b0 + b1 + b2) / 6.0)
-            qh += h * (wh + h * (c0 + c1 + c2) / 6.0)
-            w += h * (a0 + 2.0 * a1 + 2.0 * a2 + a3) / 6.0
-            wl += h * (b0 + 2.0 * b1 + 2.0 * b2 + b3) / 6.0
-            wh += h * (c0 + 2.0 * c1 + 2.0 * c2 + c3) / 6.0
+            q, w, ql, wl, qh, wh = moved(m, now, h, middle, bent, q, w, ql, wl, qh, wh)
             bent = bristles(m, now + h, bent, q, w, 0.5 * h)

@@ -147,14 +147,7 @@ def lacking(tests: Sequence[ServoLog], effort: FitEffort, without: Sequence[str]
         before, structure = structure, best.structure
         rounds[-1]['added'] = [effect for effect, _ in structure[len(before):]]
         fit = servo_refit.nearby(tests, numbers(structure), best.values, effort.near_runs)
-        worth = _judged(parts, structure, fit.values, scale)
-        for piece in structure:
-            shorter = tuple(p for p in structure if p != piece)
-            price = 1.0 + PRICE_PER_NUMBER * (len(numbers(structure)) - len(numbers(shorter)))
-            bare = _judged(parts, shorter, fit.values, scale)
-            if bare <= price * worth:
-                rounds[-1]['dropped'].append(piece[0])
-                structure, worth = shorter, bare
+        structure, rounds[-1]['dropped'] = _shortened(parts, structure, fit.values, scale)
         if rounds[-1]['dropped']:
             fit = servo_refit.nearby(tests, numbers(structure), fit.values, effort.near_runs)
         if set(structure) <= set(before):
@@ -208,6 +201,20 @@ def _judged(parts: Sequence[Fold], structure: Structure, start: Mapping[str, flo
     names = numbers(structure)
     return float(np.mean([servo_refit.error(
         part.withheld, settled(part.fitted, names, start, scale).values) for part in parts]))
+
+
+def _shortened(parts: Sequence[Fold], structure: Structure, values: Mapping[str, float],
+               scale: Sequence[float]) -> tuple[Structure, list[str]]:
+    """Return the effects that are worth their numbers, and the names of those dropped."""
+    worth, dropped = _judged(parts, structure, values, scale), []
+    for piece in structure:
+        shorter = tuple(p for p in structure if p != piece)
+        price = 1.0 + PRICE_PER_NUMBER * (len(numbers(structure)) - len(numbers(shorter)))
+        bare = _judged(parts, shorter, values, scale)
+        if bare <= price * worth:
+            dropped.append(piece[0])
+            structure, worth = shorter, bare
+    return structure, dropped
 
 
 def _scale(tests: Sequence[ServoLog], fit: Fit) -> list[float]:

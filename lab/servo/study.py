@@ -21,7 +21,6 @@ from pathlib import Path
 import time
 from typing import Any
 
-from antenna_drive import diagnosis
 from antenna_drive.workers import workers
 from lab.servo import refit as servo_refit
 from lab.servo.catalogue import catalogue, vector
@@ -29,6 +28,7 @@ from lab.servo.log import ServoLog
 from lab.servo.refit import Fit, LADDER, PARENTS
 from lab.servo.rounds import FitEffort, lacking, plain
 import numpy as np
+import simgap
 from simgap.errors import UserError
 
 Progress = Callable[[float, str], None]
@@ -198,8 +198,8 @@ class _KeptResults:
             for part in (test.time, test.goal, test.measured):
                 digest.update(part.tobytes())
         # the results depend on this room and on the engine
-        for room in (Path(__file__).parent, Path(diagnosis.__file__).parent):
-            for source in sorted(room.glob('*.py')):
+        for room in (Path(__file__).parent, Path(simgap.__file__).parent):
+            for source in sorted(room.rglob('*.py')):
                 digest.update(source.read_bytes())
         self._key = digest.hexdigest()
 

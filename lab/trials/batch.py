@@ -10,7 +10,8 @@ it, and a verdict only once the diagnosis has succeeded.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
+from functools import partial
 import json
 import math
 import os
@@ -19,7 +20,6 @@ import shutil
 from typing import Any
 
 from antenna_drive.subcommand import run_command
-from antenna_drive.workers import workers
 from lab.antenna.cases import draw_truths, make_recording, Truth
 from lab.antenna.programme import RECORDINGS
 from lab.antenna.real_antenna import FloatArray
@@ -28,6 +28,7 @@ from lab.antenna.wild_programme import KEPT_BACK, LONGEST_S
 from lab.joints import cases as others
 from lab.joints.machines import kind_of
 from lab.trials import sealing
+from lab.trials.driver import Arm, complete, Done, Row
 from simgap.errors import UserError
 import yaml
 
@@ -42,7 +43,6 @@ DURATION_S = 30.0
 # Formats that keep every digit of the sensors.
 FORMATS = {'time_s': '%.6f', 'rate_command_rad_s': '%.12g', 'encoder_rad': '%.12g'}
 USUAL_FORMAT = '%.9g'
-Done = Callable[[int, int], None]
 
 
 def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: float,
@@ -159,9 +159,7 @@ def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
 
     Parameters
     ----------
-    folder
-        of the trial
-    manifest
+    folder, manifest
         of the trial
     jobs
         number of processes
@@ -176,39 +174,23 @@ def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
     """
     _remove_drafts(folder)
     names = [name for name in manifest['seals'] if name not in skipped]
-    wanted = [name for name in names if not (folder / name).is_dir()]
-    truths = [sealing.open_truth(folder, name, manifest) for name in wanted]
-    complete = len(names) - len(wanted)
-    done(complete, len(names))
-    for _ in _made(folder, truths, jobs, scheduler):
-        complete += 1
-        done(complete, len(names))
+    truth_of = partial(sealing.open_truth, folder, manifest=manifest)
+    missing = [name for name in names if not (folder / name).is_dir()]
+    if jobs > 1 and scheduler is None and missing:
+        # the first case compiles the equations for the processes that follow
+        make_case(folder, truth_of(missing[0]))
+    complete(names, truth_of, [Arm(lambda name, row: not (folder / name).is_dir(),
+                                   partial(_make_seen_case, folder.absolute()))],
+             jobs=jobs, scheduler=scheduler, done=done)
     _remove_drafts(folder)
 
 
-def _made(folder: Path, truths: Sequence[Truth], jobs: int,
-          scheduler: str | None) -> Iterator[None]:
-    """Make the cases of these truths; yield after each."""
-    if scheduler is None:
-        # The first case compiles the equations for the processes that follow.
-        alone = 1 if jobs > 1 else len(truths)
-        for truth in truths[:alone]:
-            make_case(folder, truth)
-            yield
-        truths = truths[alone:]
-    if truths:
-        with workers(jobs, scheduler) as pool:
-            for _, result in pool.each(_make_seen_case,
-                                       ((folder.absolute(), truth) for truth in truths)):
-                result()
-                yield
-
-
-def _make_seen_case(folder: Path, truth: Truth) -> None:
+def _make_seen_case(folder: Path, truth: Truth) -> Row:
     """Make a case, unless a worker that was killed had just completed it."""
     _check_seen(folder)
     if not (folder / truth['case']).exists():
         make_case(folder, truth)
+    return {}
 
 
 def _check_seen(folder: Path) -> None:
@@ -364,23 +346,12 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
 
     Parameters
     ----------
-    folder
-        of the trial
-    manifest
-        of the trial
-    jobs
-        diagnoses at a time
+    folder, manifest, jobs, done, scheduler, skipped
+        as for `make_cases`
     options
         further options for the diagnosis
     limit
         time limit of one diagnosis, after which it counts as failed [s]
-    done
-        called with the number of finished cases and their total
-    scheduler
-        address of a dask.distributed scheduler whose workers diagnose them; they see the folder
-        under the same path
-    skipped
-        names of cases that are not wanted
 
     Returns
     -------
@@ -388,35 +359,36 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
 
     """
     names = [name for name in manifest['seals'] if name not in skipped]
-    wanted = [name for name in names if not (folder / name / VERDICT).exists()]
     here = folder if scheduler is None else folder.absolute()
-    kept = {name: path if path.exists() else None for name in names
-            for path in [here / KEPT / name / f'{KEPT_BACK}.csv']}
-    complete, failures = len(names) - len(wanted), 0
-    done(complete, len(names))
     if scheduler is None:
         # each diagnosis gets its share of the cores; a worker of a cluster has one
         options = ['--jobs', str(max(1, (os.cpu_count() or 1) // jobs)), *options]
-    late = [(here, here / name, options, limit, path) for name, path in kept.items()
-            if path is not None and _unpredicted(folder / name)]
-    tasks = [*late, *((here, here / name, options, limit, kept[name],
-                       machine_of(folder, name, manifest)) for name in wanted)]
-    with workers(jobs, scheduler, threads=True) as pool:
-        for number, result in pool.each(_complete, tasks):
-            success = result()
-            if number >= len(late):
-                complete += 1
-                failures += not success
-                done(complete, len(names))
-    return failures
+
+    def kept(name: str) -> Path | None:
+        path = here / KEPT / name / f'{KEPT_BACK}.csv'
+        return path if path.exists() else None
+
+    def lacks(name: str, _: Row) -> bool:
+        return not (folder / name / VERDICT).exists() or (
+            kept(name) is not None and _unpredicted(folder / name))
+
+    def known(name: str) -> tuple[Path, Path | None, str | None]:
+        diagnosed = (folder / name / VERDICT).exists()
+        return here / name, kept(name), (
+            None if diagnosed else machine_of(folder, name, manifest))
+
+    complete(names, known, [Arm(lacks, partial(_diagnose_seen_case, here, options, limit))],
+             jobs=jobs, scheduler=scheduler, threads=True, done=done)
+    return sum(not (folder / name / VERDICT).exists() for name in names)
 
 
-def _complete(folder: Path, case: Path, options: Sequence[str], limit: float,
-              kept: Path | None, machine: str | None = None) -> bool:
+def _diagnose_seen_case(folder: Path, options: Sequence[str], limit: float,
+                        known: tuple[Path, Path | None, str | None]) -> Row:
     """Do what a case still lacks: its diagnosis, the predictions of what was kept back."""
     _check_seen(folder)
+    case, kept, machine = known
     if not (case / VERDICT).exists():
-        return diagnose_case(case, [*model_options(machine), *options], limit, kept)
-    if kept is not None and _unpredicted(case):
+        diagnose_case(case, [*model_options(machine), *options], limit, kept)
+    elif kept is not None and _unpredicted(case):
         predict_kept(case, options, kept)
-    return True
+    return {}

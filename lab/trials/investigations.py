@@ -12,6 +12,7 @@ take 30 s. An interrupted trial goes on, see `results`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 import json
 import math
 from pathlib import Path
@@ -21,11 +22,11 @@ import sys
 from typing import Any
 
 from antenna_drive.subcommand import run_command
-from antenna_drive.workers import workers
 from lab.antenna import programme
 from lab.antenna.cases import Truth
 from lab.trials import sealing
-from lab.trials.batch import diagnose_recordings, Done
+from lab.trials.batch import diagnose_recordings
+from lab.trials.driver import Arm, complete, Done, Row
 from lab.trials.further_tests import DURATION_S, known, record_test, SURE, with_test
 from lab.trials.results import TrialResults
 from lab.trials.scorecard import Case, rate
@@ -67,29 +68,26 @@ def run_trial(folder: Path, manifest: dict[str, Any], jobs: int, limit: float,
 
     """
     results = TrialResults(folder, manifest)
-    tasks = [(folder, sealing.open_truth(folder, name, manifest), results, limit, options)
-             for name in manifest['seals']]
-    done(0, len(tasks))
-    with workers(jobs, threads=True) as pool:
-        for complete, (_, result) in enumerate(pool.each(_both_ways, tasks), 1):
-            result()
-            done(complete, len(tasks))
+    complete(list(manifest['seals']), partial(sealing.open_truth, folder, manifest=manifest),
+             [Arm(lambda name, row: 'designed' not in row, partial(_designed, folder, limit)),
+              Arm(lambda name, row: 'standard' not in row,
+                  partial(_standard, folder, limit, options))],
+             results, jobs, threads=True, done=done)
     return summary(results)
 
 
-def _both_ways(folder: Path, truth: Truth, results: TrialResults, limit: float,
-               options: Sequence[str]) -> None:
-    """Take a case both ways, where that is still to be done."""
-    name = truth['case']
-    (folder / name).mkdir(exist_ok=True)
-    if 'designed' not in results[name]:
-        results.put(name, kind=truth['kind'], truth=sorted(Case(truth, None).effects),
-                    designed=_designed(folder, truth, limit))
-    if 'standard' not in results[name]:
-        results.put(name, standard=_standard(folder / name, truth, limit, options))
+def _designed(folder: Path, limit: float, truth: Truth) -> Row:
+    (folder / truth['case']).mkdir(exist_ok=True)
+    return {'kind': truth['kind'], 'truth': sorted(Case(truth, None).effects),
+            'designed': _investigated(folder, truth, limit)}
 
 
-def _designed(folder: Path, truth: Truth, limit: float) -> dict[str, Any]:
+def _standard(folder: Path, limit: float, options: Sequence[str], truth: Truth) -> Row:
+    (folder / truth['case']).mkdir(exist_ok=True)
+    return {'standard': _after_each(folder / truth['case'], truth, limit, options)}
+
+
+def _investigated(folder: Path, truth: Truth, limit: float) -> dict[str, Any]:
     """Return the answers after each test of an investigation."""
     case = folder / truth['case']
     out = case / 'investigation'
@@ -114,7 +112,7 @@ def _designed(folder: Path, truth: Truth, limit: float) -> dict[str, Any]:
             'families': [test['family'] for test in story['tests']]}
 
 
-def _standard(case: Path, truth: Truth, limit: float, options: Sequence[str]) -> dict[str, Any]:
+def _after_each(case: Path, truth: Truth, limit: float, options: Sequence[str]) -> dict[str, Any]:
     """Return the answers after each test of the standard programme."""
     random = np.random.default_rng([*truth['seed'], 200])
     answers: list[dict[str, Any]] = []

@@ -11,12 +11,13 @@ range. The catalogue is then wrong on purpose, as it is for a machine whose faul
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.workers import workers
 from lab.antenna.programme import RECORDINGS
-from lab.trials.batch import diagnose_recordings, Done, model_options
+from lab.trials.batch import diagnose_recordings, model_options
+from lab.trials.driver import Arm, complete, Done, Row
 from lab.trials.scorecard import Case, OVERCONFIDENT, rate, read_cases
 from lab.trials.scored_cases import read_scored_of
 from lab.trials.verdict import read_verdict, UNKNOWN, VerdictError
@@ -71,12 +72,11 @@ def run_trial(folder: Path, wanted: int, jobs: int, limit: float, options: Seque
     if not cases:
         raise UserError(f'{folder}: no case with a single effect that was named first; '
                         'lab trial --diagnose makes a trial')
-    done(0, len(cases))
-    with workers(jobs, threads=True) as pool:
-        for complete, (_, result) in enumerate(pool.each(_diagnosed, (
-                (folder, case, limit, options) for case in cases)), 1):
-            result()
-            done(complete, len(cases))
+    named = {case.truth['case']: case for case in cases}
+    complete(list(named), named.__getitem__,
+             [Arm(lambda name, row: not (folder / name / WITHOUT).exists(),
+                  partial(_diagnosed, folder, limit, options))],
+             jobs=jobs, threads=True, done=done)
     rows = [row for case in cases for row in _rows(folder, case)]
     rises = [row['unknown_after'] - row['unknown_before'] for row in rows]
     recognised = rate(rise >= RISE for rise in rises)
@@ -89,11 +89,12 @@ def run_trial(folder: Path, wanted: int, jobs: int, limit: float, options: Seque
             'named_wrongly': wrongly.value, 'named_wrongly_ci95': [wrongly.low, wrongly.high]}
 
 
-def _diagnosed(folder: Path, case: Case, limit: float, options: Sequence[str]) -> None:
+def _diagnosed(folder: Path, limit: float, options: Sequence[str], case: Case) -> Row:
     effect, = case.effects
     diagnose_recordings(
         folder / case.truth['case'], RECORDINGS, WITHOUT, limit,
         [*model_options(case.truth.get('machine')), '--without', effect, *options])
+    return {}
 
 
 def _rows(folder: Path, case: Case) -> list[dict[str, Any]]:

@@ -73,9 +73,15 @@ class TrialResults:
         return (name for name in self._names if name in self._found)
 
     def put(self, name: str, **known: Any) -> None:
-        """Add to what is known of a case, and write the file whole; threads may do so at once."""
+        """
+        Add to what is known of a case, and write the file whole; threads may do so at once.
+
+        An entry that is a dict is added to what is there under its key.
+        """
         with self._lock:
-            self._found[name] = {**self._found.get(name, {}), **known}
+            row = self._found.setdefault(name, {})
+            row |= {key: {**row.get(key, {}), **value} if isinstance(value, dict) else value
+                    for key, value in known.items()}
             sealing.write_whole(self._path, ''.join(
                 json.dumps({'case': case, 'seed': self._seed, **self._found[case]}) + '\n'
                 for case in self))

@@ -8,22 +8,24 @@ lab/notebook/trial.md defines each figure. A case without a valid verdict counts
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from lab.antenna.cases import Truth
-from lab.antenna.sizes import stated_sizes, StatedSize
 from lab.antenna.wild_programme import KEPT_BACK
 from lab.trials import sealing
 from lab.trials.batch import FAILURE, KEPT, VERDICT
 from lab.trials.held_back import closed_fraction, PredictionError
+from lab.trials.sizes import stated_sizes, StatedSize
 from lab.trials.verdict import NONE, read_verdict, UNKNOWN, Verdict, VerdictError
 import numpy as np
 
 FIRST_FEW = 3
+# Rates at the head of the scorecard.
+HEADLINES = ('top1', 'top3', 'within_set', 'pairs_both', 'no_gap_on_none')
 OVERCONFIDENT = 0.9
 BINS = 10
 SIZES = ('small', 'middle', 'large')
@@ -319,46 +321,28 @@ def score(cases: Sequence[Case], pending: int = 0) -> dict[str, Any]:
     outside = by_kind['outside']
     known = [case for case in cases if case.kind != 'outside']
     sizes = [size for case in (*singles, *pairs) for size in case.sizes]
-    rates = {
-        'top1': rate(case.right for case in singles),
-        'top3': rate(case.named_among(FIRST_FEW) for case in singles),
-        'within_set': rate(case.within_set for case in singles),
-        'pairs_both': rate(case.right for case in pairs),
-        'no_gap_on_none': rate(
-            case.verdict is not None and case.verdict.verdict == 'no_gap'
-            for case in by_kind['none'])}
-    overconfident = rate(_overconfident(case) for case in outside)
-    more_rates = {
-        'top1_exact': rate(case.named_among(1, exactly=True) for case in singles),
-        'top3_exact': rate(case.named_among(FIRST_FEW, exactly=True) for case in singles),
-        'pairs_one': rate(_one_named(case) for case in pairs),
-        'overconfident_outside': overconfident,
-        'detection_rate': rate(case.alarmed for case in cases if case.kind != 'none'),
-        'false_alarm_rate': rate(
-            case.verdict is None or case.alarmed for case in by_kind['none']),
-        'size_coverage': rate(size.covered for size in sizes)}
-    figures: dict[str, Any] = {
+    rates = _rates(cases, by_kind, sizes)
+    return {
         'cases': len(cases),
         'all_wild': bool(cases) and all(case.wild for case in cases),
         'failures': sum(case.verdict is None for case in cases),
-        **{name: value.value for name, value in rates.items()},
+        **{name: rates[name].value for name in HEADLINES},
         'auroc_unknown': auroc(_unknown(outside), _unknown(known)),
-        'overconfident_outside': overconfident.value,
+        'overconfident_outside': rates['overconfident_outside'].value,
         'ece': calibration_error(case_reliability(cases)),
         'explained_fraction_median': _median(
             case.verdict.explained_fraction for case in (*singles, *pairs)
             if case.verdict and case.right),
         'seconds_median': _median(case.verdict.seconds for case in cases if case.verdict),
         'pending': pending,
-        **{name: value.value for name, value in more_rates.items() if name not in rates},
+        **{name: value.value for name, value in rates.items() if name not in HEADLINES},
         'true_probability_mean': _mean(
             case.probability_of_truth for case in (*singles, *pairs)),
         'sizes_compared': len(sizes),
         'size_error_median': _median(size.relative_error for size in sizes),
         'closed_held_back_median': _median(case.closed for case in (*singles, *pairs)),
         'site': site(cases),
-        'ci95': {name: [value.low, value.high]
-                 for name, value in {**rates, **more_rates}.items()},
+        'ci95': {name: [value.low, value.high] for name, value in rates.items()},
         'by_kind': {kind: _summary(group) for kind, group in by_kind.items()},
         'by_size': {size: _summary([case for case in singles if case.size == size])
                     for size in SIZES},
@@ -369,7 +353,27 @@ def score(cases: Sequence[Case], pending: int = 0) -> dict[str, Any]:
                       for label in sorted({case.label for case in (*singles, *outside)})},
         'confusion': confusion(cases),
         'reliability': [b._asdict() for b in case_reliability(cases)]}
-    return figures
+
+
+def _rates(cases: Sequence[Case], by_kind: Mapping[str, Sequence[Case]],
+           sizes: Sequence[StatedSize]) -> dict[str, Rate]:
+    singles, pairs = by_kind[SCORED_SINGLE], by_kind[SCORED_PAIR]
+    return {
+        'top1': rate(case.right for case in singles),
+        'top3': rate(case.named_among(FIRST_FEW) for case in singles),
+        'within_set': rate(case.within_set for case in singles),
+        'pairs_both': rate(case.right for case in pairs),
+        'no_gap_on_none': rate(
+            case.verdict is not None and case.verdict.verdict == 'no_gap'
+            for case in by_kind['none']),
+        'top1_exact': rate(case.named_among(1, exactly=True) for case in singles),
+        'top3_exact': rate(case.named_among(FIRST_FEW, exactly=True) for case in singles),
+        'pairs_one': rate(_one_named(case) for case in pairs),
+        'overconfident_outside': rate(_overconfident(case) for case in by_kind['outside']),
+        'detection_rate': rate(case.alarmed for case in cases if case.kind != 'none'),
+        'false_alarm_rate': rate(
+            case.verdict is None or case.alarmed for case in by_kind['none']),
+        'size_coverage': rate(size.covered for size in sizes)}
 
 
 def _one_named(case: Case) -> bool:

@@ -12,17 +12,18 @@ recordings are diagnosed. An interrupted trial goes on, see `results`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 import json
 import math
 from pathlib import Path
 from typing import Any
 
 from antenna_drive.subcommand import run_command
-from antenna_drive.workers import workers
 from lab.antenna import programme
 from lab.antenna.cases import Truth
 from lab.trials import sealing
-from lab.trials.batch import diagnose_recordings, Done, make_case
+from lab.trials.batch import diagnose_recordings, make_case
+from lab.trials.driver import Arm, complete, Done, Row
 from lab.trials.further_tests import DURATION_S, known, reached, record_test, SURE, with_test
 from lab.trials.results import TrialResults
 from lab.trials.scorecard import Case, rate
@@ -77,23 +78,24 @@ def run_trial(folder: Path, manifest: dict[str, Any], wanted: int, jobs: int, li
     """
     names, results = list(manifest['seals']), TrialResults(folder, manifest)
     found: list[str] = []
+    work = partial(complete, known=partial(sealing.open_truth, folder, manifest=manifest),
+                   results=results, jobs=jobs, threads=True)
+    opening = Arm(lambda name, row: 'open' not in row, partial(_opening, folder, limit, options))
+    third = [Arm(partial(_lacks, rule), partial(_third_test, folder, rule, limit, options))
+             for rule in rules]
     done(0, wanted)
     for first in range(0, len(names), _AT_ONCE * jobs):
         part = names[first:first + _AT_ONCE * jobs]
-        tasks = [(folder, sealing.open_truth(folder, name, manifest), results, limit, options)
-                 for name in part]
-        with workers(jobs, threads=True) as pool:
-            opened = {part[number]: result() for number, result in pool.each(_is_open, tasks)}
-        found += [name for name in part if opened[name]]
+        work(part, arms=[opening])
+        found += [name for name in part if results[name]['open']]
         if len(found) >= wanted:
             break
-    tasks_of_cases = [(folder, sealing.open_truth(folder, name, manifest), results, rules, limit,
-                       options) for name in found[:wanted]]
-    with workers(jobs, threads=True) as pool:
-        for complete, (_, result) in enumerate(pool.each(third_tests, tasks_of_cases), 1):
-            result()
-            done(complete, wanted)
+    work(found[:wanted], arms=third, done=done)
     return summary(results)
+
+
+def _lacks(rule: str, name: str, row: Row) -> bool:
+    return rule not in row.get('tests', {})
 
 
 def is_open(verdict: Verdict) -> bool:
@@ -134,32 +136,23 @@ def _of_two(folder: Path, truth: Truth, limit: float, options: Sequence[str]) ->
         return None
 
 
-def _is_open(folder: Path, truth: Truth, results: TrialResults, limit: float,
-             options: Sequence[str]) -> bool:
-    """Return whether the first two recordings of a case leave its answer open."""
-    name = truth['case']
-    if 'open' not in results[name]:
-        verdict = _of_two(folder, truth, limit, options)
-        told = answer_of(folder / name / TWO, truth)
-        results.put(name, open=verdict is not None and is_open(verdict),
-                    **{f'{key}_before': told.get(key) for key in ('set', 'rivals', 'right')})
-    return bool(results[name]['open'])
+def _opening(folder: Path, limit: float, options: Sequence[str], truth: Truth) -> Row:
+    """Return whether the first two recordings of a case leave its answer open, and how."""
+    verdict = _of_two(folder, truth, limit, options)
+    told = answer_of(folder / truth['case'] / TWO, truth)
+    return {'open': verdict is not None and is_open(verdict),
+            **{f'{key}_before': told.get(key) for key in ('set', 'rivals', 'right')}}
 
 
-def third_tests(folder: Path, truth: Truth, results: TrialResults, rules: Sequence[str],
-                limit: float, options: Sequence[str] = ()) -> None:
-    """Give an open case its third tests, those that it has not had."""
-    name = truth['case']
-    for rule in rules:
-        tests = results[name].get('tests', {})
-        if rule not in tests:
-            _of_two(folder, truth, limit, options)
-            told = _third_test(folder / name, truth, rule, limit, options)
-            results.put(name, tests={**tests, rule: told})
+def _third_test(folder: Path, rule: str, limit: float, options: Sequence[str],
+                truth: Truth) -> Row:
+    """Give an open case its third test by a rule."""
+    _of_two(folder, truth, limit, options)
+    return {'tests': {rule: _told(folder / truth['case'], rule, limit, options, truth)}}
 
 
-def _third_test(case: Path, truth: Truth, rule: str, limit: float,
-                options: Sequence[str]) -> dict[str, Any]:
+def _told(case: Path, rule: str, limit: float, options: Sequence[str],
+          truth: Truth) -> dict[str, Any]:
     """Return what a third test by a rule told, or why it told nothing."""
     name = f'rec_{rule}'
     if rule in BUILT_IN:

@@ -13,7 +13,6 @@ import shutil
 import time
 
 from antenna_drive.article.experiments import experiments
-from lab.cli import main
 from antenna_drive.emulator.run import simulate
 from antenna_drive.emulator.wiring import UNITS
 from antenna_drive.lockstep.pace import LEAD_S
@@ -21,6 +20,7 @@ from lab.bench import batches, c_loop, measuring, peers, simulation, stolen, sui
 from lab.bench.batches import Task
 from lab.bench.peers import Setting
 from lab.bench.stamps import WARM_STEPS
+from lab.cli import main
 import numpy as np
 import pytest
 from simgap.command.programs import BAD_INPUT

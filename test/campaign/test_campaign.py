@@ -13,7 +13,6 @@ import subprocess
 import sys
 from typing import Any
 
-from lab.cli import main
 from antenna_drive.emulator.wiring import OUTPUTS
 from antenna_drive.lockstep.frame import FrameLayout, read_foreign
 from antenna_drive.lockstep.inbox import Inbox
@@ -26,6 +25,7 @@ from lab.campaign.soak import BLOCKS, slope
 from lab.campaign.summary import bad, COUNTS, summary
 from lab.campaign.supervisor import Campaign, OUTCOMES
 from lab.campaign.trials import DOSES, FULL, Outcome, PARTS, plan, READERS, Trial
+from lab.cli import main
 from lab.trials.verdict import VerdictError
 import numpy as np
 import pytest

@@ -8,9 +8,9 @@ import pytest
 
 pytest.importorskip('rclpy', reason='rclpy is not installed: nobody says anything')
 
-from antenna_drive.twin.watch import GAP, LEARNING, OK  # noqa: E402
-from lab.campaign.rig import Said  # noqa: E402, I100
-from lab.trials.twin_on_topics import told  # noqa: E402
+from antenna_drive.twin.watch import GAP, LEARNING, OK  # noqa: E402, I100
+from lab.campaign.rig import Said  # noqa: E402
+from lab.campaign.twin_on_topics import told  # noqa: E402
 
 # The test began at 1000 s of the one clock and 5000 s of the other; its onset is 330 s later.
 ZERO_S, ZERO_NS, ONSET_S = 1000.0, 5000 * 10**9, 330.0

@@ -14,8 +14,8 @@ import json
 import math
 from pathlib import Path
 
-from lab import cli
 from antenna_drive.recording.bam import read_bam
+from lab import cli
 from lab.servo import refit as servo_refit
 from lab.servo.catalogue import BASE, catalogue, number, NUMBERS, TIED, vector
 from lab.servo.firmware import firmware_of

@@ -11,8 +11,8 @@ from pathlib import Path
 import shlex
 from typing import Any
 
-from lab.cli import main
 from antenna_drive.recording.csv_format import read_csv
+from lab.cli import main
 from lab.trials import batch, further_tests, investigations, sealing
 from lab.trials.further_tests import known, reached, with_test
 from lab.trials.investigations import run_trial, summary, until_sure

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from lab.cli import main
-from antenna_drive.workers import workers
 from lab.cli import twin_trial
 from lab.trials import batch
 from lab.trials.results import FILE, TrialResults
@@ -69,8 +68,6 @@ def test_a_trial_of_the_twin_goes_on_in_another_folder(
                 'alarms': [{'time_s': 9.0, 'gaps': ['current_1']}] if len(asked) == 1 else []}
 
     monkeypatch.setattr(twin_trial, 'outcome', outcome)
-    monkeypatch.setattr(twin_trial, 'workers',
-                        lambda jobs, scheduler: workers(jobs, threads=True))
     words = ['twin-trial', '--kind', 'healthy', '--cases', '4', '--seed', '8', '--jobs', '1',
              '--quiet', '--out']
     assert main([*words, str(tmp_path / 'one')]) == 2

@@ -12,9 +12,9 @@ import shutil
 import sys
 from typing import Any
 
-from lab.cli import main
 from antenna_drive.recording.csv_format import read_csv
 from lab.antenna.cases import make_recording
+from lab.cli import main
 from lab.trials import batch, sealing
 import numpy as np
 import pytest

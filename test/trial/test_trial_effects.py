@@ -7,7 +7,7 @@ from __future__ import annotations
 import functools
 import math
 
-from lab.antenna import equations, family_b
+from lab.antenna import equations, family_b, laws
 from lab.antenna.cases import draw_truths
 from lab.antenna.effect import Defect
 from lab.antenna.effects import CATALOGUE
@@ -112,7 +112,7 @@ def test_mesh_error_is_the_rounded_saw_tooth() -> None:
     machine.motors['mesh_error'] = 0.01
     machine.motors['mesh_cycles'] = 3.0
     for theta in (0.1, 1.0, 2.2, -1.4):
-        x, rate, _ = equations.gear_deflection(
+        x, rate, _ = laws.gear_deflection(
             machine.motors[0], machine.structure[0], theta, 2.0, 0.0, 0.0)
         terms = np.arange(1, 60)
         series = np.sum(np.sin(terms * 3.0 * theta) / (terms * 2.0**(terms - 1)))
@@ -128,7 +128,7 @@ def test_damaged_tooth_moves_as_fast_as_it_says() -> None:
     step = 1e-6
     for theta in (0.2, -0.4, 1.0):
         (before, _, _), (_, rate, _), (after, _, _) = (
-            equations.gear_deflection(
+            laws.gear_deflection(
                 machine.motors[0], machine.structure[0], theta + shift, 3.0, 0.0, 0.0)
             for shift in (-step, 0.0, step))
         assert rate == pytest.approx(3.0 * (after - before) / (2.0 * step), rel=1e-7)
@@ -143,10 +143,10 @@ def test_delay_is_a_delay(frequency: float) -> None:
     for k in range(rows):
         y[:] = 0.0
         y[k] = 1.0
-        out[k] = equations.delayed(y, slope, 0, 0.0, delay)
+        out[k] = laws.delayed(y, slope, 0, 0.0, delay)
         matrix[:, k] = slope
     y[:] = 0.0
-    equations.delayed(y, slope, 0, 1.0, delay)
+    laws.delayed(y, slope, 0, 1.0, delay)
     gain[:] = slope
     omega = 2.0 * math.pi * frequency
     response = out @ np.linalg.solve(1j * omega * np.eye(rows) - matrix, gain)
@@ -155,27 +155,27 @@ def test_delay_is_a_delay(frequency: float) -> None:
 
 
 def test_stribeck_falls_as_a_hyperbola() -> None:
-    assert equations.stribeck_torque(4.0, 0.0, 2.0, LAW_A) == 4.0
-    assert equations.stribeck_torque(4.0, -2.0, 2.0, LAW_A) == 2.0
-    assert equations.stribeck_torque(4.0, 6.0, 2.0, LAW_A) == 1.0
+    assert laws.stribeck_torque(4.0, 0.0, 2.0, LAW_A) == 4.0
+    assert laws.stribeck_torque(4.0, -2.0, 2.0, LAW_A) == 2.0
+    assert laws.stribeck_torque(4.0, 6.0, 2.0, LAW_A) == 1.0
 
 
 def test_laws_of_family_b_have_the_limits_of_their_kind() -> None:
     """Each law agrees with the other at low and at high rate or load, and not between."""
-    assert equations.stribeck_torque(4.0, 0.0, 2.0, LAW_B) == 4.0
-    assert equations.stribeck_torque(4.0, -2.0, 2.0, LAW_B) == 2.0
-    assert equations.stribeck_torque(4.0, 6.0, 2.0, LAW_B) == pytest.approx(0.4)
+    assert laws.stribeck_torque(4.0, 0.0, 2.0, LAW_B) == 4.0
+    assert laws.stribeck_torque(4.0, -2.0, 2.0, LAW_B) == 2.0
+    assert laws.stribeck_torque(4.0, 6.0, 2.0, LAW_B) == pytest.approx(0.4)
     # Eyring's fluid is Newton's at low rate, and a logarithm at high rate
-    assert equations.viscous_torque(0.1, 0.01, 20.0, LAW_B) == pytest.approx(1e-3)
-    rise = (equations.viscous_torque(0.1, 2e5, 20.0, LAW_B)
-            - equations.viscous_torque(0.1, 1e5, 20.0, LAW_B))
+    assert laws.viscous_torque(0.1, 0.01, 20.0, LAW_B) == pytest.approx(1e-3)
+    rise = (laws.viscous_torque(0.1, 2e5, 20.0, LAW_B)
+            - laws.viscous_torque(0.1, 1e5, 20.0, LAW_B))
     assert rise == pytest.approx(0.1 * 100.0 * math.log(2.0))
     for law in (LAW_A, LAW_B):
         # a dead zone lets nothing through in its middle and takes its half width away far off
-        assert equations.crossover(1e-4, 0.5, law) == pytest.approx(0.0, abs=1e-9)
-        assert equations.crossover(100.0, 0.5, law) == pytest.approx(99.5, abs=1e-4)
+        assert laws.crossover(1e-4, 0.5, law) == pytest.approx(0.0, abs=1e-9)
+        assert laws.crossover(100.0, 0.5, law) == pytest.approx(99.5, abs=1e-4)
         angles = np.arange(0.0, 2.0 * math.pi, 1e-3)
-        shape = [equations.ripple_shape(a, law) for a in angles]
+        shape = [laws.ripple_shape(a, law) for a in angles]
         assert np.mean(shape) == pytest.approx(0.0, abs=1e-3)
         assert 0.9 < np.max(np.abs(shape)) < 1.25
 
@@ -202,7 +202,7 @@ def test_lags_of_family_b_are_as_late_as_they_say() -> None:
     delay, step = 0.02, 1e-5
     y, dy, area = np.zeros(4), np.zeros(4), 0.0
     for _ in range(20000):
-        area += step * (1.0 - equations.lagged(y, dy, 0, 1.0, delay))
+        area += step * (1.0 - laws.lagged(y, dy, 0, 1.0, delay))
         y += step * dy
     assert area == pytest.approx(delay, rel=1e-2)
 
@@ -213,7 +213,7 @@ def test_gust_has_the_strength_it_says() -> None:
     structure = machine.structure[0]
     assert math.sqrt(0.5 * float(np.sum(structure['gust']**2))) == pytest.approx(2e4)
     assert structure['gust_frequency'].max() < 2.0 * math.pi * 5.0
-    torque = [equations.load_torque(structure, 0.0, t, t, 0.0) for t in np.arange(0, 1000, 0.05)]
+    torque = [laws.load_torque(structure, 0.0, t, t, 0.0) for t in np.arange(0, 1000, 0.05)]
     assert np.std(torque) == pytest.approx(2e4, rel=0.1)
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 
-from lab.antenna import equations
+from lab.antenna import equations, laws
 from lab.antenna.equations import MODES_AT, MOTOR_AT, MOTOR_SIZE
 from lab.antenna.machine import Records, reference_machine
 from lab.antenna.real_antenna import simulate, TrueSignals
@@ -178,6 +178,6 @@ def test_start_is_where_it_is_said_to_be() -> None:
     assert history.switchings == 0
     for which, place in enumerate((0.999, -0.999)):
         theta = history.state[0, MOTOR_AT + which * MOTOR_SIZE + equations.THETA]
-        x, _, gap = equations.gear_deflection(
+        x, _, gap = laws.gear_deflection(
             machine.motors[which], machine.structure[0], theta, 0.0, 0.0, 0.0)
         assert x == pytest.approx(place * gap, abs=1e-9)

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from lab.cli import main
-from lab.antenna.sizes import stated_sizes
 from lab.joints.cases import draw_truths, make_recording, moved
 from lab.joints.machines import kind_of, MACHINES
 from lab.joints.programme import draw_tests, reference
 from lab.trials import batch, sealing
 from lab.trials.scorecard import Case, read_cases, score
+from lab.trials.sizes import stated_sizes
 from lab.trials.verdict import parse_verdict
 import numpy as np
 import pytest

@@ -9,7 +9,6 @@ import math
 from pathlib import Path
 from typing import Any
 
-from lab.cli import main
 from antenna_drive.diagnosis.catalogue import catalogue
 from hypothesis import given, strategies as st
 from lab.antenna.cases import draw_truths
@@ -17,13 +16,14 @@ from lab.antenna.effects import CATALOGUE
 from lab.antenna.imperfections import apply_imperfections, imperfect_recording
 from lab.antenna.machine import reference_machine
 from lab.antenna.sheet import CaseSheet
-from lab.antenna.sizes import size_of, StatedSize
+from lab.cli import main
 from lab.trials import sealing
 from lab.trials.held_back import noise_power
 from lab.trials.scorecard import (
     auroc, calibration_error, Case, rate, read_cases, reliability, score,
 )
 from lab.trials.scored_cases import read_scored
+from lab.trials.sizes import size_of, StatedSize
 from lab.trials.verdict import Interval, parse_verdict, read_verdict, Verdict, VerdictError
 import numpy as np
 import pytest

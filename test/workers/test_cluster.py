@@ -103,7 +103,7 @@ def test_trial_with_two_workers_killed(four: Cluster, tmp_path: Path) -> None:
     shutil.copytree(here, there)
     batch.make_cases(here, manifest, jobs=1)
     process = subprocess.Popen(
-        [sys.executable, '-m', 'antenna_drive', 'trial', '--cases', '10', '--seed', '3',
+        [sys.executable, '-m', 'lab', 'trial', '--cases', '10', '--seed', '3',
          '--sample-rate', '50', '--out', str(there), '--scheduler', four.address],
         cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     try:

@@ -13,6 +13,7 @@ left out too.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from lab.antenna.effect import Parameters
@@ -51,7 +52,7 @@ class StatedSize(NamedTuple):
         return self.stated.low - rounding <= self.true <= self.stated.high + rounding
 
 
-_TABLE = read_table('sizes.yaml')
+_TABLE = read_table('sizes.yaml', Path(__file__).parent)
 
 
 def size_of(effect: str, values: Parameters, machine: str | None = None) -> Size | None:
