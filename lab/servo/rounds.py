@@ -223,7 +223,7 @@ def _singles(problem: LeastSquares) -> list[Hypothesis]:
     """Return every single effect in its best form, after a few iterations, the best first."""
     state = problem.fit(problem.start(problem.machine.nuisances, {}), ITERATIONS)
     found = []
-    for effect in problem.machine.effects.values():
+    for effect in problem.machine.catalogue.values():
         forms = []
         for form in effect.forms:
             values = [p.start for p in form.parameters]

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 from simgap.fit.cholesky import factored, solved
-from simgap.machine.contract import FloatArray
+from simgap.machine.arrays import FloatArray
 
 # For this many iterations all wrongly active bounds are released at once; after that one by one,
 # because releasing all of them may cycle.

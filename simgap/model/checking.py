@@ -125,7 +125,7 @@ def _rough(machine: OwnMachine) -> Iterator[str]:
 
 def _rough_effects(machine: OwnMachine) -> Iterator[str]:
     """Yield numbers of effects by which a fit will be hard."""
-    for effect in machine.effects.values():
+    for effect in machine.catalogue.values():
         form = effect.forms[0]
         for parameter in form.sizes:
             if not any(StepResponse.at(machine, parameter, k, form.start).acts

@@ -11,7 +11,7 @@ for the other.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import cache
 import math
@@ -21,9 +21,12 @@ import numpy as np
 from scipy.optimize import brentq
 from simgap.fit.box_qp import BoxQuadratic
 from simgap.fit.cholesky import factored, ROUNDING, solved
-from simgap.fit.least_squares import FitState, LeastSquares, prior_precision, proper_precision
+from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error
-from simgap.machine.contract import FloatArray, Machine, Parameter
+from simgap.fit.state import FitState, prior_precision, proper_precision
+from simgap.machine.arrays import FloatArray
+from simgap.machine.effect import Parameter
+from simgap.machine.machine import Machine
 from simgap.settings import DEFAULT, Settings
 
 # a size is told to this share of itself
@@ -80,7 +83,8 @@ class Confusability:
 
 
 def confusability(machine: Machine, progress: Callable[[float], None] = lambda share: None,
-                  settings: Settings = DEFAULT, inflated: float = 1.0) -> Confusability:
+                  settings: Settings = DEFAULT, inflated: float = 1.0,
+                  among: Collection[str] = ()) -> Confusability:
     """
     Say which effects the tests of a machine can tell apart.
 
@@ -94,16 +98,18 @@ def confusability(machine: Machine, progress: Callable[[float], None] = lambda s
         thresholds
     inflated
         by what differences of the cost are divided
+    among
+        ids of the effects that are asked for; empty for all
 
     """
     problem = LeastSquares(machine.with_experiments(
         with_model_error(machine.experiments, settings.noise)), settings=settings)
-    return visibility(problem, problem.start(machine.nuisances, {}), progress, inflated)
+    return visibility(problem, problem.start(machine.nuisances, {}), progress, inflated, among)
 
 
 def visibility(problem: LeastSquares, state: FitState,
                progress: Callable[[float], None] = lambda share: None,
-               inflated: float = 1.0) -> Confusability:
+               inflated: float = 1.0, among: Collection[str] = ()) -> Confusability:
     """
     Say how large each effect must be to show beside a fit of the nuisances, and what it is like.
 
@@ -113,8 +119,8 @@ def visibility(problem: LeastSquares, state: FitState,
         the tests, and a fit of the nuisances with its Jacobian
     progress
         called with the share that is done
-    inflated
-        by what differences of the cost are divided
+    inflated, among
+        as in `confusability`
 
     """
     machine, settings = problem.machine, problem.settings
@@ -125,9 +131,10 @@ def visibility(problem: LeastSquares, state: FitState,
     ids, units, sizes, remainders = [], [], [], []
     price = inflated * (settings.penalty.effect + settings.penalty.parameter)
     imitation = _Imitation(state, settings.interval.derivative_error)
-    for i, effect in enumerate(machine.effects.values()):
-        progress(i / len(machine.effects))
-        form = machine.typical_form(effect)
+    asked = [effect for effect in machine.catalogue.values() if not among or effect.id in among]
+    for i, effect in enumerate(asked):
+        progress(i / len(asked))
+        form = machine.catalogue.typical_form(effect)
         first = form.parameters[0]
         column = problem.jacobian({**state.point(), **form.start}, [first], state.residual,
                                   central=False)[:, 0]

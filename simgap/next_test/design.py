@@ -25,7 +25,8 @@ from typing import Any
 import numpy as np
 from simgap.fit.blas import one_blas_thread
 from simgap.fit.noise import with_found_noise
-from simgap.machine.contract import FloatArray, Machine, Point
+from simgap.machine.arrays import FloatArray, Point
+from simgap.machine.machine import Machine
 from simgap.next_test.confusability import confusability
 from simgap.next_test.discrimination import deviations, known_to, refitted, Separation, separation
 from simgap.next_test.rivals import Findings, Rival
@@ -423,9 +424,8 @@ class TestDesign:
         machine = machine.with_experiments([
             replace(e, measured=machine.predict({}, k))
             for k, e in enumerate(machine.experiments)])
-        machine.effects = {name: effect for name, effect in machine.effects.items()
-                           if not self._suspected or name in self._suspected}
-        found = confusability(machine, settings=self._settings, inflated=self._inflated)
+        found = confusability(machine, settings=self._settings, inflated=self._inflated,
+                              among=self._suspected)
         return {name: (float(size), unit) for name, size, unit in zip(
             found.effects, found.detectable, found.units, strict=True)}
 
@@ -444,7 +444,7 @@ class TestDesign:
         weight = np.ones(len(names)) / max(len(names), 1)
         if not self._findings.unnamed or not names:
             return weight
-        effects = self._space.machine(tests[0].test).effects
+        effects = self._space.machine(tests[0].test).catalogue
         own = {part: np.array([effects[name].component == part for name in names])
                for part in self._findings.unnamed}
         known = {part: share for part, share in self._findings.unnamed.items() if own[part].any()}

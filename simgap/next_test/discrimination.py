@@ -38,9 +38,12 @@ import math
 import numpy as np
 from scipy import linalg
 from simgap.fit.cholesky import factored, ROUNDING, solved
-from simgap.fit.least_squares import LeastSquares, proper_precision
+from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error
-from simgap.machine.contract import FloatArray, Machine, Parameter, Point
+from simgap.fit.state import proper_precision
+from simgap.machine.arrays import FloatArray, Point
+from simgap.machine.effect import Parameter
+from simgap.machine.machine import Machine
 from simgap.next_test.rivals import Rival
 from simgap.settings import DEFAULT, Settings
 from simgap.verdict.doubts import Doubt

@@ -22,7 +22,9 @@ from typing import Any
 import numpy as np
 from scipy.stats import truncnorm
 from simgap.fit.least_squares import LeastSquares
-from simgap.machine.contract import FloatArray, Form, Machine, Parameter, Point
+from simgap.machine.arrays import FloatArray, Point
+from simgap.machine.effect import Form, Parameter
+from simgap.machine.machine import Machine
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import PlanningSettings, Settings
 from simgap.verdict.doubts import Doubt
@@ -76,7 +78,7 @@ class Rival:
         KeyError : the machine's catalogue lacks an effect or a form
 
         """
-        return [machine.form_named(machine.effects[effect], form)
+        return [machine.catalogue.form_named(machine.catalogue[effect], form)
                 for effect, form in zip(self.effects, self.forms, strict=True)]
 
     def is_known_to(self, machine: Machine) -> bool:

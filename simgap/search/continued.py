@@ -14,7 +14,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from simgap.fit.least_squares import LeastSquares, settled, with_initial_conditions
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.starts import settled, with_initial_conditions
 from simgap.next_test.rivals import Rival
 from simgap.search.hypothesis import Hypothesis
 

@@ -9,8 +9,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from simgap.fit.least_squares import FitState
-from simgap.machine.contract import Form, Parameter
+from simgap.fit.state import FitState
+from simgap.machine.effect import Form, Parameter
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import Settings
 from simgap.verdict import verdict

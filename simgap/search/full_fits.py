@@ -15,8 +15,9 @@ from functools import partial
 from statistics import fmean
 
 import numpy as np
-from simgap.fit.least_squares import LeastSquares, settled
+from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import same_noise, with_estimated_noise
+from simgap.fit.starts import settled
 from simgap.search.hypothesis import Hypothesis
 from simgap.search.refitting import dropped, refitted, shared_jacobian, SharedJacobian, taken_over
 from simgap.search.screening import screened, sensitivities, Sensitivity
@@ -178,7 +179,7 @@ class FullFits:
         """
         if not self._noise_taken(best):
             return list(hypotheses)
-        return [replace(h, state=self.problem.judged(h.state)) for h in hypotheses]
+        return [replace(h, state=self.problem.evaluated(h.state)) for h in hypotheses]
 
     def without(self, hypothesis: Hypothesis, effect: str) -> Hypothesis:
         """Return a hypothesis without one of its effects, fitted until it has converged."""
@@ -190,14 +191,14 @@ class FullFits:
 
     def simpler(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
         """Return which effects could be simpler ones that they become, each with such a one."""
-        effects = self.problem.machine.effects
+        effects = self.problem.machine.catalogue
         return [(effect, other) for effect in hypothesis.effects
                 for other in effects[effect].simpler if other not in hypothesis.effects]
 
     def elsewhere(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
         """Return which effects could act in another place, each with the effect there."""
         return [(effect, other.id) for effect in hypothesis.effects
-                for other, _ in self.problem.machine.relatives(effect)
+                for other, _ in self.problem.machine.catalogue.relatives(effect)
                 if other.id not in hypothesis.effects]
 
     def exchanged(self, hypothesis: Hypothesis, effect: str, other: str) -> Hypothesis:
@@ -207,7 +208,7 @@ class FullFits:
         The fit begins at the size that does most of what the former has done, and has converged.
         """
         machine = self.problem.machine
-        rest, form = self._dropped(hypothesis, effect), machine.effects[other].forms[0]
+        rest, form = self._dropped(hypothesis, effect), machine.catalogue[other].forms[0]
         point = {**rest.state.point(), **form.start}
         bare = self.problem.residuals(point)
         done = bare - self.problem.residuals(hypothesis.state.point())
@@ -228,13 +229,13 @@ class FullFits:
 
         None if its effects are not all the parts of one, in one form. The fit has converged.
         """
-        machine, effects = self.problem.machine, self.problem.machine.effects
+        machine, effects = self.problem.machine, self.problem.machine.catalogue
         whole = next((item for item in effects.values()
                       if item.parts and set(item.parts) == set(hypothesis.effects)), None)
         if whole is None:
             return None
         form, *others = {
-            machine.counterpart(form, effects[effect], whole)
+            machine.catalogue.counterpart(form, effects[effect], whole)
             for effect, form in zip(hypothesis.effects, hypothesis.forms, strict=True)}
         if others:
             return None

@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 from simgap.fit.box_qp import box_constrained_step
-from simgap.fit.least_squares import (
-    FitState, Jacobian, least_cost, LeastSquares, prior_precision, transposed_product,
-    weighted_product,
-)
-from simgap.machine.contract import Effect, FloatArray, Form, Point
+from simgap.fit.broyden import Jacobian, transposed_product, weighted_product
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.starts import least_cost
+from simgap.fit.state import FitState, prior_precision
+from simgap.machine.arrays import FloatArray, Point
+from simgap.machine.effect import Effect, Form
 
 # How often a scan looks between the values of a single size that it has tried.
 _REFINEMENTS = 10
@@ -51,8 +52,8 @@ def sensitivities(problem: LeastSquares, state: FitState,
     residuals = [
         state.residual[problem.rows(k)].reshape(e.measured.shape) * e.noise * problem.scale
         for k, e in enumerate(problem.experiments)]
-    forms = [(effect.id, form) for effect in machine.effects.values()
-             for form in machine.forms(effect, residuals)]
+    forms = [(effect.id, form) for effect in machine.catalogue.values()
+             for form in machine.catalogue.forms(effect, problem.experiments, residuals)]
     return list(concurrently(
         lambda item: Sensitivity(item[0], item[1], jacobian_of_form(problem, state, item[1])),
         forms))
@@ -107,7 +108,7 @@ def screened(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity
     found: dict[str, list[tuple[float, Sensitivity]]] = {}
     for item in known:
         form = item.form
-        if same_effect(problem.machine.effects, item.effect, besides):
+        if same_effect(problem.machine.catalogue, item.effect, besides):
             continue
         if besides and form.is_course:
             continue  # a free course explains what any other effect leaves
@@ -171,7 +172,7 @@ def scan(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
     coarse: list[tuple[float, int, Sensitivity]] = []
     for item in known:
         trials = item.form.trials
-        if trials and not same_effect(problem.machine.effects, item.effect, besides) and not any(
+        if trials and not same_effect(problem.machine.catalogue, item.effect, besides) and not any(
                 p.name in here for p in item.form.parameters):
             coarse.append((*tried(item, trials), item))
     coarse.sort(key=lambda entry: entry[0])

@@ -28,10 +28,12 @@ from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
-from simgap.fit.least_squares import (
-    FitState, Jacobian, LeastSquares, led, settled, with_initial_conditions,
-)
-from simgap.machine.contract import Effect, Form, Point
+from simgap.fit.broyden import Jacobian
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.starts import led, settled, with_initial_conditions
+from simgap.fit.state import FitState
+from simgap.machine.arrays import Point
+from simgap.machine.effect import Effect, Form
 from simgap.next_test.rivals import Rival
 from simgap.search.continued import continued
 from simgap.search.hypothesis import Hypothesis
@@ -328,7 +330,7 @@ class Search:
         return self._with_better(hypotheses, self._pool.map(
             lambda item: self._moved(best, *item),
             [(place, *item) for place in range(len(best.effects))
-             for item in self.machine.relatives(best.effects[place])
+             for item in self.machine.catalogue.relatives(best.effects[place])
              if item[0].id not in best.effects]))
 
     def _exchanged(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -364,7 +366,8 @@ class Search:
     def _moved(self, base: Hypothesis, place: int, effect: Effect, factor: float) -> Hypothesis:
         """Fit an effect in the place of one of a hypothesis', from its size times a factor."""
         was = base.forms[place]
-        form = self.machine.counterpart(was, self.machine.effects[base.effects[place]], effect)
+        catalogue = self.machine.catalogue
+        form = catalogue.counterpart(was, catalogue[base.effects[place]], effect)
         point = base.state.point()
         for old, new in zip(was.parameters, form.parameters, strict=True):
             point[new.name] = point.pop(old.name) * (1.0 if new.is_shape else factor)
@@ -436,10 +439,11 @@ class Search:
 
     def _split(self, base: Hypothesis) -> list[Hypothesis]:
         """Return an effect that acts in several places as one effect in each, or nothing."""
-        effect = self.machine.effects[base.effects[0]]
+        catalogue = self.machine.catalogue
+        effect = catalogue[base.effects[0]]
         if not effect.parts:
             return []
-        forms = tuple(self.machine.counterpart(base.forms[0], effect, self.machine.effects[part])
+        forms = tuple(catalogue.counterpart(base.forms[0], effect, catalogue[part])
                       for part in effect.parts)
         point = base.state.point()
         whole = base.forms[0].parameters

@@ -10,12 +10,16 @@ import math
 from types import MappingProxyType
 
 import numpy as np
-from simgap.fit.least_squares import (
-    FitState, Jacobian, LeastSquares, settled, with_initial_conditions,
-)
-from simgap.machine.contract import (
-    Experiment, FloatArray, Form, Machine, Parameter, Point, TimeScales,
-)
+from simgap.fit.broyden import Jacobian
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.starts import settled, with_initial_conditions
+from simgap.fit.state import FitState
+from simgap.machine.arrays import FloatArray, Point
+from simgap.machine.effect import Form, Parameter
+from simgap.machine.experiment import Experiment
+from simgap.machine.machine import Machine
+from simgap.machine.motion import TimeScales
+from simgap.machine.nuisances import Nuisances
 from simgap.settings import Settings
 
 
@@ -40,7 +44,9 @@ class Part(Machine):
                  experiments: Sequence[Experiment] | None = None,
                  held: Point = MappingProxyType({})) -> None:
         """Take a part of the experiments."""
-        super().__init__(experiments or [machine.experiments[k] for k in chosen])
+        tried = machine.nuisances.initial_conditions
+        super().__init__(experiments or [machine.experiments[k] for k in chosen], Nuisances(
+            (), {i: tried[k] for i, k in enumerate(chosen) if k in tried}))
         self.chosen = tuple(chosen)
         self._machine = machine
         self._held = held
@@ -75,10 +81,6 @@ class Part(Machine):
         faster = self._machine.low_fidelity()
         return self if faster is self._machine else Part(
             faster, self.chosen, self.experiments, self._held)
-
-    def initial_conditions(self, experiment: int) -> Sequence[Sequence[Point]]:
-        """Return initial conditions of one experiment that are tried out before a fit."""
-        return self._machine.initial_conditions(self.chosen[experiment])
 
     def parameters(self, of: Sequence[Parameter]) -> tuple[Parameter, ...]:
         """Return the parameters that act on these experiments, with the indices of this part."""

@@ -16,9 +16,11 @@ import math
 from typing import Any
 
 import numpy as np
-from simgap.fit.least_squares import FitState, LeastSquares
-from simgap.machine.by_label import ByLabel
-from simgap.machine.contract import FloatArray, Form, Parameter
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.state import FitState
+from simgap.machine.arrays import FloatArray
+from simgap.machine.by_label import ByLabel, can_be_split
+from simgap.machine.effect import Form, Parameter
 from simgap.search.hypothesis import Hypothesis
 from simgap.verdict.held_out import held_out
 from simgap.verdict.intervals import contrast_deviation, same_number, TWO_SIDED_95
@@ -44,7 +46,7 @@ def interventions(problem: LeastSquares, none: Hypothesis, best: Hypothesis,
     machine = problem.machine
     if not isinstance(machine, ByLabel):
         return []
-    return [_of_label(problem, machine, none, best, key, threads) for key in machine.groups]
+    return [_of_label(problem, machine, none, best, key, threads) for key in machine.labels.groups]
 
 
 def simplified(problem: LeastSquares, hypotheses: Sequence[Hypothesis],
@@ -69,7 +71,7 @@ def simplified(problem: LeastSquares, hypotheses: Sequence[Hypothesis],
     whole = best.with_jacobian(problem)
     forms = []
     for form in best.forms:
-        base, own = machine.base_of(form), [p.label for p in form.sizes if p.label]
+        base, own = machine.catalogue.base_of(form), [p.label for p in form.sizes if p.label]
         values = [value for _, value in dict.fromkeys(own)]
         differs = any(_compared(
             problem, whole.state, size, [_of_value(form, own[0][0], value)[j] for value in values],
@@ -77,14 +79,14 @@ def simplified(problem: LeastSquares, hypotheses: Sequence[Hypothesis],
         forms.append(form if differs else base)
     if tuple(forms) == best.forms:
         return list(hypotheses), best
-    point = {**machine.mean(best.state.point()), **best.state.point()}
+    point = {**machine.labels.mean(best.state.point()), **best.state.point()}
     simpler = Hypothesis(best.effects, tuple(forms), _fitted(problem, best, forms, point))
     return [simpler if set(h.effects) == set(best.effects) else h for h in hypotheses], simpler
 
 
 def _of_label(problem: LeastSquares, machine: ByLabel, none: Hypothesis, best: Hypothesis,
               key: str, threads: int) -> dict[str, Any]:
-    groups = machine.groups[key]
+    groups = machine.labels.groups[key]
     numbers = _numbers(problem, machine, best, key) if best.named else []
     common = _in_common(problem, machine, best)
     reach = held_out(problem, none, common, threads, groups,
@@ -109,13 +111,13 @@ def _effects(numbers: Sequence[Mapping[str, Any]], differ: bool) -> list[str]:
 def _numbers(problem: LeastSquares, machine: ByLabel, best: Hypothesis,
              key: str) -> list[dict[str, Any]]:
     """Return the sizes of the named effects under each value, and their differences."""
-    values = list(dict.fromkeys(machine.groups[key]))
-    bases = {effect: machine.base_of(form) for effect, form in zip(
+    bases = {effect: machine.catalogue.base_of(form) for effect, form in zip(
         best.effects, best.forms, strict=True)}
-    chosen = {effect: machine.split(form, key) for effect, form in bases.items()
-              if effect in best.named and not form.is_course
-              and all(p.experiment is None for p in form.parameters)}
-    point = {value: machine.in_test(best.state.point(), machine.groups[key].index(value))
+    chosen = {effect: machine.catalogue.split(form, key) for effect, form in bases.items()
+              if effect in best.named and can_be_split(form)}
+    groups = machine.labels.groups[key]
+    values = list(dict.fromkeys(groups))
+    point = {value: machine.labels.in_test(best.state.point(), groups.index(value))
              for value in values}
     start = {p.name: point[value][base.name] for effect, form in chosen.items()
              for value in values for base, p in zip(
@@ -138,11 +140,11 @@ def _of_value(form: Form, key: str, value: str) -> list[Parameter]:
 
 def _in_common(problem: LeastSquares, machine: ByLabel, best: Hypothesis) -> Hypothesis:
     """Return the best hypothesis with one size for all tests."""
-    forms = tuple(machine.base_of(form) for form in best.forms)
+    forms = tuple(machine.catalogue.base_of(form) for form in best.forms)
     if forms == best.forms:
         return best
     return Hypothesis(best.effects, forms, _fitted(
-        problem, best, forms, machine.mean(best.state.point())))
+        problem, best, forms, machine.labels.mean(best.state.point())))
 
 
 def _fitted(problem: LeastSquares, best: Hypothesis, forms: Sequence[Form],

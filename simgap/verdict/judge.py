@@ -16,11 +16,13 @@ import math
 from statistics import fmean
 
 import numpy as np
-from simgap.fit.least_squares import (
-    FitState, LeastSquares, led, prior_precision, settled, weighted_product,
-    with_initial_conditions,
-)
-from simgap.machine.contract import FloatArray, Form, Machine, Parameter
+from simgap.fit.broyden import weighted_product
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.starts import led, settled, with_initial_conditions
+from simgap.fit.state import FitState, prior_precision
+from simgap.machine.arrays import FloatArray
+from simgap.machine.effect import Form, Parameter
+from simgap.machine.machine import Machine
 from simgap.search.hypothesis import Hypothesis
 from simgap.search.training import begun, Part, Slopes, trained
 from simgap.settings import Settings
@@ -116,7 +118,7 @@ class Judge:
 
         Only they are taken to the withheld test. What a tolerance has of them would be lost.
         """
-        at, _ = self._problem.machine.take_over(found.point(), self._best.forms)
+        at, _ = self._problem.machine.nuisances.take_over(found.point(), self._best.forms)
         if at == found.point():
             return found
         return problem.start(found.parameters, at, found.jacobian)

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 from simgap.fit import residual_statistics as statistics
-from simgap.fit.least_squares import FitState, LeastSquares
-from simgap.machine.contract import FloatArray
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.state import FitState
+from simgap.machine.arrays import FloatArray
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import Settings
 from simgap.verdict.intervals import covariance
@@ -213,6 +214,6 @@ def residual_tests(problem: LeastSquares, state: FitState, lack: LackOfFit) -> d
                 'greatest_correlation': max(
                     statistics.autocorrelation(part[:, c], settings) for part in zs),
             }
-    covariates = [problem.machine.covariates(k) for k in range(count)]
+    covariates = [problem.machine.motion(k).covariates() for k in range(count)]
     return {'excess_over_noise': lack.slow_excess, 'share_left': lack.left, 'signals': signals,
             'depends_on': statistics.dependences(channels, covariates, zs, settings)}

@@ -13,8 +13,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from simgap.fit.least_squares import FitState, LeastSquares
-from simgap.machine.contract import FloatArray
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.state import FitState
+from simgap.machine.arrays import FloatArray
 from simgap.verdict import unknown_input
 from simgap.verdict.verdict import Answer, LackOfFit
 
@@ -39,7 +40,7 @@ def of_effects(problem: LeastSquares, answers: Sequence[Answer], none: FitState,
     parts: dict[str, float] = {}
     for answer in answers:
         for effect in answer.effects:
-            part = problem.machine.effects[effect].component
+            part = problem.machine.catalogue[effect].component
             share = answer.probability / len(answer.effects)
             parts[part] = parts.get(part, 0.0) + share
     return _located(problem, parts, lambda k: problem.residuals_of(none, k) ** 2
@@ -95,7 +96,7 @@ def _located(problem: LeastSquares, parts: Mapping[str, float],
     settings = problem.settings.localisation
     shares: dict[tuple[str, str], float] = {}
     for k, experiment in enumerate(problem.experiments):
-        regimes = problem.machine.regimes(k)
+        regimes = problem.machine.motion(k).regimes()
         sample = np.nan_to_num(energy(k))
         for c, channel in enumerate(experiment.channels):
             for r, name in enumerate(regimes.names):

@@ -22,9 +22,13 @@ from functools import partial
 
 import numpy as np
 from scipy import linalg
-from simgap.fit.least_squares import LeastSquares, prior_precision
+from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import whitened
-from simgap.machine.contract import DisturbanceInput, Experiment, FloatArray, TimeScales
+from simgap.fit.state import prior_precision
+from simgap.machine.arrays import FloatArray
+from simgap.machine.experiment import Experiment
+from simgap.machine.machine import DisturbanceInput
+from simgap.machine.motion import TimeScales
 
 # Variances of the input over that of the noise that are tried.
 _RATIOS = np.logspace(-4.0, 4.0, 25)

@@ -240,7 +240,7 @@ class Heated(Loads):
     def machine(self, test: Any) -> Lever:
         load, hot = test
         lever = HotLever(load) if hot else Lever(load)
-        lever.effects = {**lever.effects, EXPANSION.id: EXPANSION}
+        lever.catalogue[EXPANSION.id] = EXPANSION
         return lever
 
 
@@ -302,7 +302,7 @@ def test_the_next_test_shows_the_part_where_something_without_a_name_may_lie(
         def machine(self, test: Any) -> Lever:
             load, hot = test
             lever = super().machine((load / 50.0 if hot else load, hot))
-            lever.effects = {**lever.effects, EXPANSION.id: replace(EXPANSION, component='oven')}
+            lever.catalogue[EXPANSION.id] = replace(EXPANSION, component='oven')
             return lever
 
     found = TestDesign(Faint(1.6), Findings(unnamed=unnamed), 'detect', effort=SMALL).run()

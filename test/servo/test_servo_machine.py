@@ -211,9 +211,9 @@ def test_threads_change_no_figure(plain_tests: list[ServoLog]) -> None:
 def test_an_effect_that_is_there_is_no_candidate(plain_tests: list[ServoLog]) -> None:
     values = {**TRUTH, 'load_friction': 0.1, 'ripple_cosine@8': 0.01, 'ripple_sine@8': 0.0}
     model = ServoMachine(plain_tests, values, tuple(values))
-    assert 'gearbox.load_dependent_friction' not in model.effects
-    assert 'motor.torque_ripple' not in model.effects  # the physics has one wave of each kind
-    assert 'gearbox.position_dependent_friction' in model.effects
+    assert 'gearbox.load_dependent_friction' not in model.catalogue
+    assert 'motor.torque_ripple' not in model.catalogue  # the physics has one wave of each kind
+    assert 'gearbox.position_dependent_friction' in model.catalogue
     # an offset of nought is the value itself, for logarithmic numbers too
     assert model.numbers(dict.fromkeys(values, 0.0)) == pytest.approx(values)
 
