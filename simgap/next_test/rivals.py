@@ -198,6 +198,17 @@ class Findings:
                    {part: float(share) for part, share in planning.get('unnamed', {}).items()})
 
 
+def known_to(machine: Machine, rival: Rival) -> dict[str, float]:
+    """Return a rival's values as far as the planned tests have these numbers."""
+    own = {p.name for p in numbers_of(machine, rival)}
+    return {name: value for name, value in rival.point.items() if name in own}
+
+
+def numbers_of(machine: Machine, rival: Rival) -> list[Parameter]:
+    """Return the numbers of a machine that has the effects of a rival."""
+    return [*machine.nuisances, *(p for form in rival.forms_of(machine) for p in form.parameters)]
+
+
 def rivals_of(problem: LeastSquares, answers: Sequence[Answer], inflated: float,
               settings: PlanningSettings,
               doubted: Callable[[Hypothesis], Mapping[str, Doubt]] = lambda hypothesis: {},

@@ -9,8 +9,8 @@ from dataclasses import replace
 from antenna_drive.diagnosis.field_test import ENCODER, TACH_1, TACH_2
 from antenna_drive.diagnosis.late_readings import dense, parts_of, read_at
 from antenna_drive.diagnosis.machine import AntennaMachine, LOW_FIDELITY_STEP
-from antenna_drive.diagnosis.prediction import predict, RecorderErrors
 from antenna_drive.diagnosis.plans import Plans
+from antenna_drive.diagnosis.prediction import predict, RecorderErrors
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
 from antenna_drive.parameters import load
 from antenna_drive.parameters.sets import changed

@@ -14,10 +14,13 @@ import numpy as np
 import pytest
 from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
 from simgap.next_test import design
-from simgap.next_test.design import CRITERIA, DesignEffort, Judged, TestDesign, TestSpace
-from simgap.next_test.discrimination import refitted, Separation
+from simgap.next_test.candidate import Candidate
+from simgap.next_test.design import CRITERIA, DesignEffort, TestDesign
 from simgap.next_test.proposal import as_data, contents, lines
+from simgap.next_test.rival_fits import confirmed_separation
 from simgap.next_test.rivals import Findings, Rival
+from simgap.next_test.separation import Separation
+from simgap.next_test.space import TestSpace
 from simgap.settings import DEFAULT
 
 SMALL = DesignEffort(drawn=8, judged=6, varied=2, variants=2, confirmed=2)
@@ -125,7 +128,7 @@ class Promising(Loads):
 def test_where_a_family_breaks_its_promises_another_one_is_confirmed(
         monkeypatch: pytest.MonkeyPatch) -> None:
     def fitted(machine: Lever, *rest: Any) -> Separation:
-        told = refitted(machine, *rest)
+        told = confirmed_separation(machine, *rest)
         return replace(told, lack=1e-3 * told.lack) if machine.load > 1.0 else told
 
     monkeypatch.setattr(design, 'refitted', fitted)
@@ -146,7 +149,7 @@ def test_what_is_confirmed_counts_in_full_though_its_family_broke_promises() -> 
     assert found.score == pytest.approx(_compound(found, DEFAULT.planning.unlisted))
 
 
-def _compound(test: Judged, unlisted: float) -> float:
+def _compound(test: Candidate, unlisted: float) -> float:
     assert test.confirmed is not None
     told = test.confirmed.information(DEFAULT.verdict.temperature, DEFAULT.planning.caution)
     return (1.0 - unlisted) * np.log(told) - unlisted * np.log(test.coarseness)
@@ -279,7 +282,7 @@ def test_what_the_tests_so_far_have_shown_counts_for_no_further_test() -> None:
             load, hot = test
             return super().machine((load / 2.0 if hot else load, hot))
 
-    def found(shown: Mapping[str, float]) -> Judged:
+    def found(shown: Mapping[str, float]) -> Candidate:
         return TestDesign(Softened(1.6), Findings(shown=shown), 'detect',
                           effort=SMALL).run().tests[0]
 
@@ -329,7 +332,7 @@ def test_the_same_seed_proposes_the_same_test() -> None:
     one, other, third = (
         TestDesign(Loads(1.6), Findings(HARD), effort=SMALL, seed=seed).run().tests[0]
         for seed in (3, 3, 4))
-    assert isinstance(one, Judged) and one.test == other.test != third.test
+    assert isinstance(one, Candidate) and one.test == other.test != third.test
 
 
 def test_linear_algebra_has_one_thread_because_tests_are_judged_side_by_side() -> None:

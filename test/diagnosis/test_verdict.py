@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
-from simgap.fit.state import FitState
 from simgap.fit.residual_statistics import fast_power, power, slow_excess
+from simgap.fit.state import FitState
 from simgap.machine.contract import FloatArray, Form, Parameter
 from simgap.search.elimination import backward_elimination, forward_selection, settled_rivals
 from simgap.search.hypothesis import Hypothesis, penalty
