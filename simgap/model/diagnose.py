@@ -23,7 +23,7 @@ from simgap.inputs.schema import nearest
 from simgap.logs.log import Log
 from simgap.machine.by_label import ByLabel, without_labels
 from simgap.machine.contract import Machine, Point
-from simgap.model.declaration import Model
+from simgap.model.declared import Model
 from simgap.model.machine import OwnMachine
 from simgap.model.pushes import pushes
 from simgap.model.response import derivative_error

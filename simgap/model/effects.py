@@ -11,7 +11,7 @@ from simgap.machine.arrays import FloatArray
 from simgap.machine.catalogue import Catalogue
 from simgap.machine.effect import Effect, Form, Parameter
 from simgap.machine.experiment import Experiment
-from simgap.model.declaration import Angle, Number, OwnEffect
+from simgap.model.declared import Angle, Number, OwnEffect
 from simgap.model.orders import likely_orders, USUAL_ORDERS
 
 # Stands between the stem of a ripple's numbers and its order.

@@ -19,7 +19,7 @@ from simgap.machine.effect import Parameter
 from simgap.machine.experiment import Experiment
 from simgap.machine.machine import DisturbanceInput, Machine
 from simgap.machine.motion import Motion, TimeScales
-from simgap.model.declaration import Angle, Model, ModelError, Number, Reading
+from simgap.model.declared import Angle, Model, ModelError, Number, Reading
 from simgap.model.effects import absent, ORDER_MARK, OwnCatalogue
 from simgap.model.named_numbers import Numbers
 

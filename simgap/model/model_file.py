@@ -20,10 +20,8 @@ from simgap.inputs.plain_yaml import read_yaml
 from simgap.inputs.schema import Entry, mapping_of, ParameterError, quoted
 from simgap.logs.log import OneTest
 from simgap.machine.contract import FloatArray
-from simgap.model.declaration import (
-    effect, free, known, machine, Model, ModelError, Number, OwnEffect, Push, Reading, shape, size,
-    within,
-)
+from simgap.model.declaration import effect, free, known, machine, shape, size, within
+from simgap.model.declared import Model, ModelError, Number, OwnEffect, Push, Reading
 from simgap.model.named_numbers import Numbers
 from simgap.model.simulator import Ports, Simulator
 

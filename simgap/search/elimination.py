@@ -47,8 +47,8 @@ class Fits(Protocol):
     def leaves_much(self, hypothesis: Hypothesis) -> bool:
         """Return whether a hypothesis leaves more than noise."""
 
-    def judged_by(self, best: Hypothesis,
-                  hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+    def at_noise_of(self, best: Hypothesis,
+                    hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Return hypotheses with their costs at the noise that one of them leaves."""
 
 
@@ -107,8 +107,8 @@ def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings:
             best, converged = leading, fits.converged(leading)
 
 
-def settled_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
-                   settings: Settings) -> tuple[list[Hypothesis], Hypothesis]:
+def converged_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
+                     settings: Settings) -> tuple[list[Hypothesis], Hypothesis]:
     """
     Take fits close behind the best to their ends, too: only there can they be told apart.
 
@@ -188,10 +188,10 @@ def forward_selection(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypoth
         more = fits.with_another(best)
         if not more:
             break
-        found = fits.judged_by(min(more, key=lambda h: h.cost), [*found, *more])
+        found = fits.at_noise_of(min(more, key=lambda h: h.cost), [*found, *more])
         leading = verdict.best(found, settings)
         if len(leading.effects) <= len(best.effects):
-            found = fits.judged_by(leading, found)
+            found = fits.at_noise_of(leading, found)
             best = next(h for h in found if set(h.effects) == set(best.effects))
             break
         best = fits.converged(leading)

@@ -170,8 +170,8 @@ class FullFits:
         """Return whether a hypothesis leaves more than noise in the whole tests."""
         return self.problem.leaves_much(hypothesis.state)
 
-    def judged_by(self, best: Hypothesis,
-                  hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+    def at_noise_of(self, best: Hypothesis,
+                    hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """
         Return hypotheses with their costs at the noise that one of them leaves.
 

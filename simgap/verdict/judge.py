@@ -219,11 +219,11 @@ class Judge:
         reasons, posterior = self._undetermined(training, unaided, found)
         reasons = {**reasons, **self._unseen_labels(testing, part)}
         fold = replace(fold, reasons=reasons)
-        judged = self._judged(reasons)
-        if not judged:
+        numbers = self._numbers(reasons)
+        if not numbers:
             return fold
         held = {**dict.fromkeys(self._effects, 0.0), **self._start,
-                **{p.name: found.value(p.name) for p in judged}}
+                **{p.name: found.value(p.name) for p in numbers}}
         # the nuisances begin where training has left them
         own = {p.name for p in testing.parameters(self._nuisances) if p.experiment is not None}
         begin = {name: value for name, value in found.point().items() if name not in own}
@@ -267,8 +267,8 @@ class Judge:
             return fold
         reasons, posterior = self._undetermined(problem, unaided, found)
         fold = replace(fold, reasons=reasons)
-        judged = self._judged(reasons)
-        if not judged:
+        numbers = self._numbers(reasons)
+        if not numbers:
             return fold
         left_out = {p.name for effect, form in zip(self._best.effects, self._best.forms,
                                                    strict=True)
@@ -295,7 +295,7 @@ class Judge:
                     unseen[effect] = 'the withheld data do not show it'
         return unseen
 
-    def _judged(self, reasons: Mapping[str, str]) -> list[Parameter]:
+    def _numbers(self, reasons: Mapping[str, str]) -> list[Parameter]:
         """Return the numbers of the effects that can be judged."""
         return [p for effect, form in zip(self._best.effects, self._best.forms, strict=True)
                 if effect not in reasons for p in form.parameters]
@@ -323,24 +323,24 @@ class Judge:
             have followed
 
         """
-        judged = self._judged(fold.reasons)
-        if not judged:
+        numbers = self._numbers(fold.reasons)
+        if not numbers:
             return fold
         names = [p.name for p in found.parameters]
-        places = [names.index(p.name) for p in judged]
+        places = [names.index(p.name) for p in numbers]
         # rounding may leave the least variance just below zero
         draws = np.random.default_rng(0).multivariate_normal(
             found.x[places], posterior[np.ix_(places, places)], self._settings.held_out.draws,
             method='eigh', check_valid='ignore')
         drawn = followed(problem.residuals_at([
             {**point, **{p.name: min(max(value, p.low), p.high)
-                         for p, value in zip(judged, draw, strict=True)}}
+                         for p, value in zip(numbers, draw, strict=True)}}
             for draw in draws.tolist()]))
         return replace(
             fold, judged=tuple(e for e in self._best.effects if e not in fold.reasons),
             gap_after=_gap(problem.machine, point),
             after=_shaped(problem, residual),
-            names=tuple(p.name for p in judged), values=found.x[places],
+            names=tuple(p.name for p in numbers), values=found.x[places],
             drawn=np.array([_shaped(problem, z) for z in drawn]))
 
     def _fitted(self, testing: Part, nuisances: Sequence[Parameter], held: Mapping[str, float],

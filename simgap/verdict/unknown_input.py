@@ -70,12 +70,13 @@ def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
     found = []
     for place in problem.machine.disturbance_inputs:
         responses, _ = _columns(problem, point, place, evidence.residual)
-        found.append(Place(place.name, place.component, *evidence.judged(responses, problem)))
+        found.append(Place(place.name, place.component,
+                           *evidence.weighed(responses, problem)[:2]))
     scales = problem.machine.time_scales
     for c, channel in enumerate(problem.experiments[0].channels):
-        found.append(Place(f'reading of {channel}', channel, *evidence.judged(
+        found.append(Place(f'reading of {channel}', channel, *evidence.weighed(
             [_pulses_of_reading(experiment, c, scales) for experiment in problem.experiments],
-            problem)))
+            problem)[:2]))
     return sorted(found, key=lambda place: -place.evidence)
 
 
@@ -101,7 +102,7 @@ def courses(problem: LeastSquares, point: Mapping[str, float],
     """
     evidence = _Evidence.at(problem, point)
     responses, times = _columns(problem, point, place, evidence.residual)
-    heights = evidence.heights(responses, problem)
+    _, _, heights = evidence.weighed(responses, problem)
     found, first = [], 0
     for moments in times:
         order = np.argsort(moments)
@@ -223,17 +224,14 @@ class _Evidence:
                              - self._slope @ self._inverse @ self._slope)
         self._count = float(np.count_nonzero(weight))
 
-    def judged(self, responses: Sequence[FloatArray],
-               problem: LeastSquares) -> tuple[float, float]:
-        """Return the evidence for an input with these responses, and the share it explains."""
-        return self._judged(responses, problem)[:2]
-
-    def heights(self, responses: Sequence[FloatArray], problem: LeastSquares) -> FloatArray:
-        """Return the likeliest factor of each response, shape (pulses of all experiments,)."""
-        return self._judged(responses, problem)[2]
-
-    def _judged(self, responses: Sequence[FloatArray],
+    def weighed(self, responses: Sequence[FloatArray],
                 problem: LeastSquares) -> tuple[float, float, FloatArray]:
+        """
+        Return the evidence for an input with these responses, and what it explains.
+
+        That is the share of the energy that it explains, and the likeliest factor of each
+        response, shape (pulses of all experiments,).
+        """
         squares, slopes, crosses = [], [], []
         for k, columns in enumerate(responses):
             rows = problem.rows(k)

@@ -131,7 +131,7 @@ def test_where_a_family_breaks_its_promises_another_one_is_confirmed(
         told = confirmed_separation(machine, *rest)
         return replace(told, lack=1e-3 * told.lack) if machine.load > 1.0 else told
 
-    monkeypatch.setattr(design, 'refitted', fitted)
+    monkeypatch.setattr(design, 'confirmed_separation', fitted)
     found = TestDesign(Promising(2.0), Findings(HARD), effort=SMALL).run()
     great = [test for test in found.tests if test.family == 'great']
     assert len(great) > SMALL.rounds * SMALL.confirmed
