@@ -33,7 +33,6 @@ class AntennaCatalogue(Catalogue):
 
     def __init__(self, effects: Iterable[Effect], modifiers: KnownModifiers,
                  digits_seen: bool) -> None:
-        """Register what the parameters do."""
         super().__init__(effects)
         self._modifiers, self._digits_seen = modifiers, digits_seen
         modifiers.register(p for effect in self.values() for form in effect.forms
@@ -68,7 +67,6 @@ class AntennaCatalogue(Catalogue):
         return super().form_named(effect, name)
 
     def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
-        """Return the form of an effect's part that corresponds to a form of the effect."""
         if not isinstance(form, Wave):
             return part.forms[effect.forms.index(form)]
         wave = part.forms[0]

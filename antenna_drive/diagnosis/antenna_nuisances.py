@@ -40,7 +40,6 @@ class AntennaNuisances(Nuisances):
 
     def __init__(self, tolerances: Sequence[AntennaParameter], tests: Sequence[FieldTest],
                  modifiers: KnownModifiers) -> None:
-        """Register what the tolerances do."""
         super().__init__(tolerances, {k: _in_gaps(k, test) for k, test in enumerate(tests)})
         self._modifiers = modifiers
         modifiers.register(tolerances)

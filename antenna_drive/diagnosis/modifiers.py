@@ -294,7 +294,6 @@ class KnownModifiers:
     """
 
     def __init__(self) -> None:
-        """Begin without any."""
         self.of_runs: dict[str, tuple[RunModifier, int | None]] = {}
         self.of_readings: dict[str, tuple[ReadingModifier, int | None]] = {}
 

@@ -32,7 +32,6 @@ class Plans:
     """The tables of steps of the last runs."""
 
     def __init__(self) -> None:
-        """Begin without any."""
         self._plans: OrderedDict[_PlanKey, batch.Schedule] = OrderedDict()
         self._lock = Lock()
 

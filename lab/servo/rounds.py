@@ -20,11 +20,11 @@ from lab.servo import refit as servo_refit
 from lab.servo.catalogue import BASE, catalogue, vector
 from lab.servo.log import ServoLog
 from lab.servo.machine import ServoMachine
+from lab.servo.ranking import rank_hypotheses
 from lab.servo.refit import Fit
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.search.hypothesis import Hypothesis
-from simgap.search.ranking import rank_hypotheses
 
 Progress = Callable[[float, str], None]
 # The effects of a model with the names of their forms, in the order in which they were added.

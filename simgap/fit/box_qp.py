@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 from simgap.fit.cholesky import factored, solved
-from simgap.machine.arrays import FloatArray
+from simgap.machine.contract import FloatArray
 
 # For this many iterations all wrongly active bounds are released at once; after that one by one,
 # because releasing all of them may cycle.
@@ -29,7 +29,6 @@ class BoxQuadratic:
     """
 
     def __init__(self, hessian: FloatArray, low: FloatArray, high: FloatArray) -> None:
-        """Scale the Hessian to a diagonal of ones."""
         m = len(hessian)
         diagonal = np.diag(hessian)
         dead = diagonal <= 1e-30  # a variable that changes nothing stays where it is

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from simgap.machine.arrays import FloatArray
+from simgap.machine.contract import FloatArray
 from simgap.settings import FitSettings
 
 # In single precision, because it is large and gives a direction only.
@@ -30,7 +30,6 @@ class BroydenModel:
 
     def __init__(self, jacobian: Jacobian, hessian: FloatArray, weight: FloatArray,
                  residual: FloatArray, settings: FitSettings) -> None:
-        """Begin with a Jacobian, its Hessian, and the weights and residuals that belong to it."""
         self.jacobian, self.hessian = jacobian, hessian.copy()
         # the Jacobian is the given one plus a few outer products of these
         self.errors: list[FloatArray] = []

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy import linalg
-from simgap.machine.arrays import FloatArray
+from simgap.machine.contract import FloatArray
 
 # Rounding errors of such a Hessian, as shares of its diagonal.
 ROUNDING = 1e-6

@@ -23,9 +23,7 @@ from simgap.fit.levenberg_marquardt import LevenbergMarquardt
 from simgap.fit.noise import whitened
 from simgap.fit.robust_loss import robust_loss, robust_weight
 from simgap.fit.state import FitState, point_of, prior_precision
-from simgap.machine.arrays import FloatArray, Point
-from simgap.machine.effect import Parameter
-from simgap.machine.machine import Machine
+from simgap.machine.contract import FloatArray, Machine, Parameter, Point
 from simgap.settings import DEFAULT, Settings
 
 
@@ -49,7 +47,6 @@ class LeastSquares:
 
     def __init__(self, machine: Machine, used: Sequence[NDArray[np.bool_]] | None = None,
                  scale: float = 1.0, settings: Settings = DEFAULT) -> None:
-        """Lay the measured samples out in one row."""
         self.machine = machine
         self.scale = scale
         self.settings = settings

@@ -21,7 +21,7 @@ import numpy as np
 from simgap.fit.box_qp import box_constrained_step
 from simgap.fit.broyden import BroydenModel
 from simgap.fit.state import FitState, point_of, prior_precision
-from simgap.machine.arrays import FloatArray
+from simgap.machine.contract import FloatArray
 from simgap.settings import FitSettings
 
 

@@ -19,8 +19,7 @@ import math
 
 import numpy as np
 from scipy.signal import lfilter
-from simgap.machine.arrays import FloatArray
-from simgap.machine.experiment import Colour, Experiment
+from simgap.machine.contract import Colour, Experiment, FloatArray
 from simgap.settings import NoiseSettings
 
 _CORNERS_HZ = (0.15, 0.3, 0.6, 1.2, 2.5, 5.0, 10.0, 20.0)

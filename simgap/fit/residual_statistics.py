@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from simgap.machine.arrays import FloatArray
+from simgap.machine.contract import FloatArray
 from simgap.settings import DEFAULT, LackOfFitSettings
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from simgap.machine.arrays import FloatArray
+from simgap.machine.contract import FloatArray
 
 
 def robust_weight(residual: FloatArray, valid: NDArray[np.bool_], outlier: float) -> FloatArray:

@@ -14,7 +14,7 @@ import math
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.state import FitState
-from simgap.machine.arrays import Point
+from simgap.machine.contract import Point
 from simgap.settings import SearchSettings
 
 

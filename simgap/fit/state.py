@@ -10,8 +10,7 @@ from functools import cached_property
 
 import numpy as np
 from simgap.fit.broyden import Jacobian, updated, weighted_product
-from simgap.machine.arrays import FloatArray
-from simgap.machine.effect import Parameter
+from simgap.machine.contract import FloatArray, Parameter
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,6 @@ class Labels:
     """
 
     def __init__(self, groups: Groups, nuisances: Sequence[Parameter]) -> None:
-        """Take the values of the labels."""
         self.groups = groups
         self._own = {p.name for p in nuisances}
         self._endings = {_split_name('', key, value): (key, value)
@@ -141,7 +140,6 @@ class LabelledCatalogue(Catalogue):
 
     def __init__(self, inner: Catalogue, groups: Groups,
                  whole: dict[Form, tuple[Form, str]]) -> None:
-        """Take over the effects."""
         super().__init__(inner.values())
         self._inner, self._groups, self._whole = inner, groups, whole
 
@@ -163,11 +161,9 @@ class LabelledCatalogue(Catalogue):
                           for key in self._groups)]
 
     def typical_form(self, effect: Effect) -> Form:
-        """Return the form of an effect by which planned tests are judged."""
         return self._inner.typical_form(effect)
 
     def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
-        """Return the form of an effect's part that corresponds to a form of the effect."""
         base, key = self._whole.get(form, (form, ''))
         found = self._inner.counterpart(base, effect, part)
         return self.split(found, key) if key else found
@@ -218,7 +214,6 @@ class ByLabel(Machine):
 
     def __init__(self, inner: Machine, labels: Labels,
                  whole: dict[Form, tuple[Form, str]]) -> None:
-        """Take over what the machine says of itself."""
         catalogue = LabelledCatalogue(inner.catalogue, labels.groups, whole)
         super().__init__(inner.experiments,
                          _LabelledNuisances(inner.nuisances, labels, catalogue), catalogue)
@@ -229,12 +224,10 @@ class ByLabel(Machine):
     # -- readings ------------------------------------------------------------------------------
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
-        """Return the readings of one test; see `Machine.predict`."""
         return self.inner.predict(self.labels.in_test(point, experiment), experiment)
 
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
                  until: float = math.inf) -> list[list[FloatArray | None]]:
-        """Return the readings of several variants; see `Machine.simulate`."""
         count = len(self.experiments)
         jobs: list[tuple[int, Point, int | None]] = []
         for i, (point, one) in enumerate(zip(points, only or [None] * len(points), strict=True)):
@@ -252,7 +245,6 @@ class ByLabel(Machine):
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
                            course: Course) -> list[FloatArray]:
-        """Return the readings with an unknown input; see `Machine.simulate_disturbed`."""
         if not self.labels.are_in(point):
             return self.inner.simulate_disturbed(point, place, course)
         return [self.inner.simulate_disturbed(self.labels.in_test(point, k), place, course)[k]
@@ -262,30 +254,24 @@ class ByLabel(Machine):
 
     @property
     def time_scales(self) -> TimeScales:
-        """Return how fast the machine is."""
         return self.inner.time_scales
 
     def motion(self, experiment: int) -> Motion:
-        """Return how it moves in an experiment."""
         return self.inner.motion(experiment)
 
     def _around(self, inner: Machine) -> Machine:
         return self if inner is self.inner else ByLabel(inner, self.labels, self._whole)
 
     def truncated(self) -> Machine:
-        """Return the machine with as much of each test as a search needs."""
         return self._around(self.inner.truncated())
 
     def low_fidelity(self) -> Machine:
-        """Return a faster machine."""
         return self._around(self.inner.low_fidelity())
 
     def with_experiments(self, experiments: Sequence[Experiment]) -> Machine:
-        """Return the machine with the same tests, of which more is known."""
         return self._around(self.inner.with_experiments(experiments))
 
     def without(self, effects: Collection[str]) -> Machine:
-        """Return the machine with a catalogue that lacks some effects."""
         return self._around(self.inner.without(effects))
 
     def with_noise_at(self, point: Point) -> Machine:

@@ -24,7 +24,6 @@ class Catalogue(dict[str, Effect]):
     """
 
     def __init__(self, effects: Iterable[Effect] = ()) -> None:
-        """Take the effects by their ids."""
         super().__init__({effect.id: effect for effect in effects})
 
     def without(self, effects: Collection[str]) -> Catalogue:

@@ -80,7 +80,6 @@ class Machine(ABC):
 
     def __init__(self, experiments: Iterable[Experiment], nuisances: Iterable[Parameter] = (),
                  effects: Iterable[Effect] | Catalogue = ()) -> None:
-        """Keep what was measured and what may differ."""
         self.experiments = tuple(experiments)
         self.nuisances = nuisances if isinstance(nuisances, Nuisances) else Nuisances(nuisances)
         self.catalogue = effects if isinstance(effects, Catalogue) else Catalogue(effects)

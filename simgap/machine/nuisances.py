@@ -29,7 +29,6 @@ class Nuisances(list[Parameter]):
     def __init__(self, numbers: Iterable[Parameter] = (),
                  initial_conditions: Mapping[int, Sequence[Sequence[Point]]] | None = None,
                  ) -> None:
-        """Keep the numbers in their order."""
         super().__init__(numbers)
         self.initial_conditions = initial_conditions or {}
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a user has declared of a machine, as records; `declaration` has the words that make them."""
+"""What a user has declared of a machine, as records; `declaration` has the words for it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from simgap.errors import UserError
 from simgap.logs.log import Log
-from simgap.machine.arrays import FloatArray
+from simgap.machine.contract import FloatArray
 
 # From numbers and a test to readings by name, shape (n,) each.
 Simulation = Callable[[Any, Any], Mapping[str, Any]]

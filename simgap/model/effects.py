@@ -7,10 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
-from simgap.machine.arrays import FloatArray
-from simgap.machine.catalogue import Catalogue
-from simgap.machine.effect import Effect, Form, Parameter
-from simgap.machine.experiment import Experiment
+from simgap.machine.contract import Catalogue, Effect, Experiment, FloatArray, Form, Parameter
 from simgap.model.declared import Angle, Number, OwnEffect
 from simgap.model.orders import likely_orders, USUAL_ORDERS
 
@@ -36,7 +33,6 @@ class OwnCatalogue(Catalogue):
 
     def __init__(self, effects: Sequence[OwnEffect],
                  angles: Callable[[Angle], Sequence[FloatArray]]) -> None:
-        """Make effects of what is declared."""
         super().__init__(map(_effect, effects))
         self._declared = {item.name: item for item in effects}
         self._angles = angles

@@ -13,12 +13,11 @@ import numpy as np
 from simgap.errors import UserError
 from simgap.inputs.schema import nearest
 from simgap.logs.log import beginning, Log, LogError, OneTest
-from simgap.machine.arrays import Course, FloatArray, Point
+from simgap.machine.contract import (
+    Course, DisturbanceInput, Experiment, FloatArray, Machine, Motion, Parameter, Point,
+    TimeScales,
+)
 from simgap.machine.diagram import Diagram
-from simgap.machine.effect import Parameter
-from simgap.machine.experiment import Experiment
-from simgap.machine.machine import DisturbanceInput, Machine
-from simgap.machine.motion import Motion, TimeScales
 from simgap.model.declared import Angle, Model, ModelError, Number, Reading
 from simgap.model.effects import absent, ORDER_MARK, OwnCatalogue
 from simgap.model.named_numbers import Numbers
@@ -45,7 +44,6 @@ class OwnMachine(Machine):
     """
 
     def __init__(self, model: Model, logs: Sequence[Log]) -> None:
-        """Prepare the experiments, the numbers and the catalogue."""
         self.model = model
         self.logs = [model.log(log) if model.log else log for log in logs]
         self._strides = [_stride(log, model.judged_hz) for log in self.logs]
@@ -107,7 +105,6 @@ class OwnMachine(Machine):
     # -- readings ------------------------------------------------------------------------------
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
-        """Return the readings of one log at its judged samples; see `Machine.predict`."""
         return self.pushed(point, experiment, {})
 
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
@@ -123,7 +120,6 @@ class OwnMachine(Machine):
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
                            course: Course) -> list[FloatArray]:
-        """Return the readings with an unknown input; see `Machine.simulate_disturbed`."""
         name = self.push_at(place.name)
         size = self.model.push[name].size
         return [self.pushed(point, k, {name: size * course(log.time)})

@@ -10,7 +10,7 @@ import math
 from typing import Any
 
 import numpy as np
-from simgap.machine.arrays import FloatArray
+from simgap.machine.contract import FloatArray
 from simgap.next_test.rivals import Rival
 from simgap.next_test.separation import Separation
 

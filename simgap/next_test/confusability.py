@@ -24,9 +24,7 @@ from simgap.fit.cholesky import factored, ROUNDING, solved
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error
 from simgap.fit.state import FitState, prior_precision, proper_precision
-from simgap.machine.arrays import FloatArray
-from simgap.machine.effect import Parameter
-from simgap.machine.machine import Machine
+from simgap.machine.contract import FloatArray, Machine, Parameter
 from simgap.settings import DEFAULT, Settings
 
 # a size is told to this share of itself

@@ -21,8 +21,7 @@ from statistics import fmean
 import numpy as np
 from simgap.fit.blas import one_blas_thread
 from simgap.fit.noise import with_found_noise
-from simgap.machine.arrays import FloatArray
-from simgap.machine.machine import Machine
+from simgap.machine.contract import FloatArray, Machine
 from simgap.next_test.candidate import Candidate, coarseness_of, of_each_family, Proposal
 from simgap.next_test.confusability import confusability
 from simgap.next_test.discrimination import deviations, separation
@@ -115,7 +114,6 @@ class TestDesign:
                  objective: str = SEPARATE, suspected: Sequence[str] = (), threads: int = 2,
                  settings: Settings = DEFAULT, effort: DesignEffort = DesignEffort(),
                  seed: int = 0) -> None:
-        """Prepare to search."""
         self._space, self._findings = space, findings
         self._rivals, self._inflated = findings.rivals, findings.inflated
         self._objective, self._suspected = objective, list(suspected)

@@ -32,9 +32,7 @@ from simgap.fit.cholesky import factored, ROUNDING, solved
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error
 from simgap.fit.state import proper_precision
-from simgap.machine.arrays import FloatArray, Point
-from simgap.machine.effect import Parameter
-from simgap.machine.machine import Machine
+from simgap.machine.contract import FloatArray, Machine, Parameter, Point
 from simgap.next_test.rivals import known_to, numbers_of, Rival
 from simgap.next_test.separation import LEAST, odds_of, prior_of, Separation, shrunk_at_most
 from simgap.settings import DEFAULT, Settings

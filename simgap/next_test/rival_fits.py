@@ -10,9 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
-from simgap.machine.arrays import FloatArray, Point
-from simgap.machine.effect import Parameter
-from simgap.machine.machine import Machine
+from simgap.machine.contract import FloatArray, Machine, Parameter, Point
 from simgap.next_test.discrimination import planned
 from simgap.next_test.rivals import known_to, numbers_of, Rival
 from simgap.next_test.separation import odds_of, prior_of, Separation
@@ -82,7 +80,6 @@ class _Continued(Machine):
     """
 
     def __init__(self, machine: Machine, rival: Rival, inflated: float) -> None:
-        """Take a rival's numbers and their covariance."""
         numbers = numbers_of(machine, rival)
         self._machine = machine
         self._known = [p for p in numbers if p.name in rival.names]
@@ -96,16 +93,13 @@ class _Continued(Machine):
         self._free = [p.name for p in free]
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
-        """Return the readings of one experiment."""
         return self._machine.predict(self.own(point), experiment)
 
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
                  until: float = np.inf) -> list[list[FloatArray | None]]:
-        """Return the readings of several variants; see `Machine.simulate`."""
         return self._machine.simulate([self.own(point) for point in points], only, until)
 
     def low_fidelity(self) -> Machine:
-        """Return the same with the faster machine."""
         other = copy(self)
         other._machine = self._machine.low_fidelity()
         return other

@@ -22,9 +22,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import truncnorm
 from simgap.fit.least_squares import LeastSquares
-from simgap.machine.arrays import FloatArray, Point
-from simgap.machine.effect import Form, Parameter
-from simgap.machine.machine import Machine
+from simgap.machine.contract import FloatArray, Form, Machine, Parameter, Point
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import PlanningSettings, Settings
 from simgap.verdict.doubts import Doubt

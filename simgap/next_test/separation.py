@@ -19,7 +19,7 @@ from itertools import permutations
 import math
 
 import numpy as np
-from simgap.machine.arrays import FloatArray, Point
+from simgap.machine.contract import FloatArray, Point
 from simgap.next_test.rivals import Rival
 from simgap.verdict.doubts import Doubt
 

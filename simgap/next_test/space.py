@@ -11,8 +11,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from simgap.machine.arrays import FloatArray, Point
-from simgap.machine.machine import Machine
+from simgap.machine.contract import FloatArray, Machine, Point
 
 
 class TestSpace(ABC):

@@ -13,46 +13,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 import math
-from typing import Protocol
 
+from simgap.search.full_fits import FullFits
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import Settings
 from simgap.verdict import verdict
 
 
-class Fits(Protocol):
-    """What runs fits until they have converged, see `full_fits.FullFits`."""
-
-    def converged(self, hypothesis: Hypothesis) -> Hypothesis:
-        """Go on with a fit."""
-
-    def without(self, hypothesis: Hypothesis, effect: str) -> Hypothesis:
-        """Return a hypothesis without one of its effects, fitted until it has converged."""
-
-    def simpler(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
-        """Return which effects could be simpler ones that they become, each with such a one."""
-
-    def elsewhere(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
-        """Return which effects could act in another place, each with the effect there."""
-
-    def exchanged(self, hypothesis: Hypothesis, effect: str, other: str) -> Hypothesis:
-        """Return a hypothesis with another effect in the place of one, fitted to its end."""
-
-    def joined(self, hypothesis: Hypothesis) -> Hypothesis | None:
-        """Return one effect in place of the same one in each of its places; None if not so."""
-
-    def with_another(self, hypothesis: Hypothesis) -> list[Hypothesis]:
-        """Return a hypothesis whose fit has converged with each of a few more effects."""
-
-    def leaves_much(self, hypothesis: Hypothesis) -> bool:
-        """Return whether a hypothesis leaves more than noise."""
-
-    def at_noise_of(self, best: Hypothesis,
-                    hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Return hypotheses with their costs at the noise that one of them leaves."""
-
-
-def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings: Settings,
+def backward_elimination(fits: FullFits, hypotheses: Sequence[Hypothesis], settings: Settings,
                          ) -> tuple[list[Hypothesis], Hypothesis]:
     """
     Test each doubtful effect of the best hypothesis, until the best has none.
@@ -107,7 +75,7 @@ def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings:
             best, converged = leading, fits.converged(leading)
 
 
-def converged_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
+def converged_rivals(fits: FullFits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
                      settings: Settings) -> tuple[list[Hypothesis], Hypothesis]:
     """
     Take fits close behind the best to their ends, too: only there can they be told apart.
@@ -157,7 +125,7 @@ def converged_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothe
     return list(found.values()), best
 
 
-def forward_selection(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
+def forward_selection(fits: FullFits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
                       settings: Settings) -> tuple[list[Hypothesis], Hypothesis]:
     """
     Add effects one after the other, until none is worth its price.

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from simgap.fit.state import FitState
-from simgap.machine.effect import Form, Parameter
+from simgap.machine.contract import Form, Parameter
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import Settings
 from simgap.verdict import verdict

@@ -44,7 +44,6 @@ class FullFits:
 
     def __init__(self, problem: LeastSquares, progress: Callable[[float, str], None],
                  threads: int = 1) -> None:
-        """Prepare to fit."""
         self._pool = ThreadPoolExecutor(threads)
         self.problem = problem
         self.settings = problem.settings.search

@@ -12,8 +12,7 @@ import math
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.state import FitState, proper_precision
-from simgap.machine.arrays import Point
-from simgap.machine.effect import Form, Parameter
+from simgap.machine.contract import Form, Parameter, Point
 from simgap.settings import PenaltySettings
 
 

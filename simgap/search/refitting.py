@@ -15,9 +15,7 @@ import numpy as np
 from simgap.fit.broyden import Jacobian
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.state import FitState
-from simgap.machine.arrays import Point
-from simgap.machine.effect import Form, Parameter
-from simgap.machine.machine import Machine
+from simgap.machine.contract import Form, Machine, Parameter, Point
 from simgap.search.hypothesis import Hypothesis
 
 

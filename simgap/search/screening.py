@@ -20,8 +20,7 @@ from simgap.fit.broyden import Jacobian, transposed_product, weighted_product
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.starts import least_cost
 from simgap.fit.state import FitState, prior_precision
-from simgap.machine.arrays import FloatArray, Point
-from simgap.machine.effect import Effect, Form
+from simgap.machine.contract import Effect, FloatArray, Form, Point
 
 # How often a scan looks between the values of a single size that it has tried.
 _REFINEMENTS = 10

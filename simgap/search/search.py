@@ -31,8 +31,7 @@ import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.starts import led, settled, with_initial_conditions
 from simgap.fit.state import FitState
-from simgap.machine.arrays import Point
-from simgap.machine.effect import Form
+from simgap.machine.contract import Form, Point
 from simgap.next_test.rivals import Rival
 from simgap.search.continued import continued
 from simgap.search.hypothesis import Hypothesis
@@ -62,7 +61,6 @@ class Search:
 
     def __init__(self, problem: LeastSquares, progress: Callable[[float, str], None],
                  threads: int = 1, earlier: Sequence[Rival] = ()) -> None:
-        """Prepare to search."""
         self._pool, self._earlier = ThreadPoolExecutor(threads), earlier
         self.settings = problem.settings.search
         self.machine = problem.machine.truncated()

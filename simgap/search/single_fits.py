@@ -11,8 +11,7 @@ from typing import TypeVar
 from simgap.fit.broyden import Jacobian
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.state import FitState
-from simgap.machine.arrays import Point
-from simgap.machine.effect import Effect, Form
+from simgap.machine.contract import Effect, Form, Point
 from simgap.search.hypothesis import Hypothesis
 from simgap.search.screening import Sensitivity
 

@@ -14,12 +14,9 @@ from simgap.fit.broyden import Jacobian
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.starts import settled, with_initial_conditions
 from simgap.fit.state import FitState
-from simgap.machine.arrays import FloatArray, Point
-from simgap.machine.effect import Form, Parameter
-from simgap.machine.experiment import Experiment
-from simgap.machine.machine import Machine
-from simgap.machine.motion import TimeScales
-from simgap.machine.nuisances import Nuisances
+from simgap.machine.contract import (
+    Experiment, FloatArray, Form, Machine, Nuisances, Parameter, Point, TimeScales,
+)
 from simgap.settings import Settings
 
 
@@ -43,7 +40,6 @@ class Part(Machine):
     def __init__(self, machine: Machine, chosen: Sequence[int],
                  experiments: Sequence[Experiment] | None = None,
                  held: Point = MappingProxyType({})) -> None:
-        """Take a part of the experiments."""
         tried = machine.nuisances.initial_conditions
         super().__init__(experiments or [machine.experiments[k] for k in chosen], Nuisances(
             (), {i: tried[k] for i, k in enumerate(chosen) if k in tried}))
@@ -57,16 +53,13 @@ class Part(Machine):
 
     @property
     def time_scales(self) -> TimeScales:
-        """Return the time scales of the whole machine."""
         return self._machine.time_scales
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
-        """Return the readings of one experiment."""
         return self._machine.predict({**self._held, **point}, self.chosen[experiment])
 
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
                  until: float = math.inf) -> list[list[FloatArray | None]]:
-        """Return the readings of several variants; see `Machine.simulate`."""
         wanted = [(i, k) for i, one in enumerate(only or [None] * len(points))
                   for k in (range(len(self.chosen)) if one is None else (one,))]
         found = self._machine.simulate([{**self._held, **points[i]} for i, _ in wanted],
@@ -77,7 +70,6 @@ class Part(Machine):
         return rows
 
     def low_fidelity(self) -> Machine:
-        """Return the part of the faster machine."""
         faster = self._machine.low_fidelity()
         return self if faster is self._machine else Part(
             faster, self.chosen, self.experiments, self._held)

@@ -10,7 +10,7 @@ from statistics import fmean
 from typing import Any
 
 from simgap.fit.least_squares import LeastSquares
-from simgap.machine.machine import Machine
+from simgap.machine.contract import Machine
 from simgap.next_test.rivals import Rival
 from simgap.search.elimination import backward_elimination, converged_rivals, forward_selection
 from simgap.search.evidence import Evidence

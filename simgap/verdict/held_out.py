@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
-from simgap.machine.arrays import FloatArray
+from simgap.machine.contract import FloatArray
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import Settings
 from simgap.verdict.judge import Judge, Withheld

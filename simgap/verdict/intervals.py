@@ -29,8 +29,7 @@ from typing import Any
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.state import FitState, proper_precision
-from simgap.machine.arrays import FloatArray
-from simgap.machine.effect import Parameter
+from simgap.machine.contract import FloatArray, Parameter
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import IntervalSettings
 

@@ -18,9 +18,8 @@ from typing import Any
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.state import FitState
-from simgap.machine.arrays import FloatArray
 from simgap.machine.by_label import ByLabel, can_be_split
-from simgap.machine.effect import Form, Parameter
+from simgap.machine.contract import FloatArray, Form, Parameter
 from simgap.search.hypothesis import Hypothesis
 from simgap.verdict.held_out import held_out
 from simgap.verdict.intervals import contrast_deviation, same_number, TWO_SIDED_95

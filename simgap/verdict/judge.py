@@ -20,9 +20,7 @@ from simgap.fit.broyden import weighted_product
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.starts import led, settled, with_initial_conditions
 from simgap.fit.state import FitState, prior_precision
-from simgap.machine.arrays import FloatArray
-from simgap.machine.effect import Form, Parameter
-from simgap.machine.machine import Machine
+from simgap.machine.contract import FloatArray, Form, Machine, Parameter
 from simgap.search.hypothesis import Hypothesis
 from simgap.search.training import begun, Part, Slopes, trained
 from simgap.settings import Settings
@@ -67,7 +65,6 @@ class Judge:
 
     def __init__(self, problem: LeastSquares, none: Hypothesis, best: Hypothesis,
                  groups: Sequence[str]) -> None:
-        """Take the derivatives at the model as configured and at both optima."""
         self._problem = problem
         self._groups = groups
         self._settings: Settings = problem.settings

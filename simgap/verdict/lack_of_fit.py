@@ -12,7 +12,7 @@ import numpy as np
 from simgap.fit import residual_statistics as statistics
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.state import FitState
-from simgap.machine.arrays import FloatArray
+from simgap.machine.contract import FloatArray
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import Settings
 from simgap.verdict.intervals import covariance

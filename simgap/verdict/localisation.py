@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.state import FitState
-from simgap.machine.arrays import FloatArray
+from simgap.machine.contract import FloatArray
 from simgap.verdict import unknown_input
 from simgap.verdict.verdict import Answer, LackOfFit
 

@@ -25,10 +25,7 @@ from scipy import linalg
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import whitened
 from simgap.fit.state import prior_precision
-from simgap.machine.arrays import FloatArray
-from simgap.machine.experiment import Experiment
-from simgap.machine.machine import DisturbanceInput
-from simgap.machine.motion import TimeScales
+from simgap.machine.contract import DisturbanceInput, Experiment, FloatArray, TimeScales
 
 # Variances of the input over that of the noise that are tried.
 _RATIOS = np.logspace(-4.0, 4.0, 25)

@@ -8,12 +8,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from blas_threads import during, Look
+from lab.servo.ranking import rank_hypotheses
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
 from simgap.next_test.rivals import Rival
-from simgap.search.ranking import rank_hypotheses
 from simgap.settings import DEFAULT
 from simgap.verdict.diagnosis import diagnose, share_text
 

@@ -16,6 +16,7 @@ from simgap.fit.residual_statistics import fast_power, power, slow_excess
 from simgap.fit.state import FitState
 from simgap.machine.contract import FloatArray, Form, Parameter
 from simgap.search.elimination import backward_elimination, converged_rivals, forward_selection
+from simgap.search.full_fits import FullFits
 from simgap.search.hypothesis import Hypothesis, penalty
 from simgap.settings import DEFAULT
 from simgap.verdict.verdict import also_seen, best, decide, LackOfFit, rank, unknown_probability
@@ -203,7 +204,7 @@ def test_a_small_partner_is_listed_apart() -> None:
                     'share': pytest.approx(100.0 / 19000.0)}
 
 
-class Ends:
+class Ends(FullFits):
     """Fits whose ends are known: the cost of each set of effects."""
 
     def __init__(self, ends: dict[tuple[str, ...], float]) -> None:

@@ -22,6 +22,7 @@ from lab.servo.firmware import firmware_of
 from lab.servo.log import ServoLog
 from lab.servo.machine import ServoMachine
 from lab.servo.physics import GRAVITY, ORDER
+from lab.servo.ranking import rank_hypotheses
 from lab.servo.rounds import FitEffort, folds, lacking, numbers
 from lab.servo.study import compared, Direction, directions, summed
 import numpy as np
@@ -29,7 +30,6 @@ from numpy.typing import NDArray
 import pytest
 from scipy.integrate import solve_ivp
 from simgap.command.programs import BAD_INPUT
-from simgap.search.ranking import rank_hypotheses
 
 LOGS = Path(__file__).resolve().parents[3] / 'shared' / 'data' / 'bam_xl330'
 MASS, LENGTH, SUPPLY = 0.5, 0.1, 7.4

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from simgap.fit.blas import one_blas_thread
 from simgap.fit.least_squares import LeastSquares
-from simgap.machine.machine import Machine
+from simgap.machine.contract import Machine
 from simgap.search.full_fits import FullFits
 from simgap.search.search import Search
 from simgap.settings import DEFAULT, Settings
