@@ -40,16 +40,10 @@ class BoxQuadratic:
 
     def step(self, gradient: FloatArray, near: FloatArray | None = None) -> FloatArray:
         """
-        Return the step d within bounds that maximises gradient d - d hessian d / 2.
+        Return the step d within bounds that maximises gradient d - d hessian d / 2, shape (m,).
 
-        Parameters
-        ----------
-        gradient
-            shape (m,)
-        near
-            the step of a similar gradient, shape (m,). The search begins with what it leaves free,
-            which takes a few factors where dozens are needed without it
-
+        The search begins with what `near` leaves free, the step of a similar gradient: that takes
+        a few factors where dozens are needed without it.
         """
         hessian, low, high, scale = self._hessian, self._low, self._high, self._scale
         if near is None:

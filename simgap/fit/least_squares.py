@@ -149,21 +149,10 @@ class LeastSquares:
                  residual: FloatArray, central: bool,
                  steps: Mapping[str, float] = MappingProxyType({})) -> Jacobian:
         """
-        Return the derivative of the prediction by difference quotients.
+        Return the derivative of the prediction at a point by difference quotients, shape (n, m).
 
-        Parameters
-        ----------
-        point
-            where
-        parameters
-            with respect to what
-        residual
-            at the point, for one-sided differences
-        central
-            take central differences where the bounds leave room for them
-        steps
-            of the difference quotients, by name, where they are not the usual ones
-
+        `residual` is that at the point, for one-sided differences; `central` takes central ones
+        where the bounds leave room. `steps` has the steps, by name, that are not the usual ones.
         """
         variants, only, plan = [], [], []
         sizes = [steps.get(item.name, item.step) for item in parameters]

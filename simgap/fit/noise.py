@@ -54,15 +54,9 @@ class Process:
 
 def whitened(z: FloatArray, colour: Colour) -> FloatArray:
     """
-    Return the innovations of a residual, shape (n,), with variance 1.
+    Return the innovations of a residual at even times, shape (n,), with variance 1.
 
-    Parameters
-    ----------
-    z
-        residual at even times, shape (n,), NaN where there is none
-    colour
-        of the noise
-
+    It is NaN where there is none.
     """
     found = np.full(z.size, np.nan)
     there = np.isfinite(z)
@@ -127,15 +121,8 @@ def with_estimated_noise(experiments: Sequence[Experiment], residuals: Sequence[
     """
     Return experiments whose noise is as loud and as coloured as a residual shows.
 
-    Parameters
-    ----------
-    experiments
-        with the noise that their sensors should have
-    residuals
-        of each, measured minus predicted by the best hypothesis, shape (n, c)
-    settings
-        thresholds
-
+    They come with the noise that their sensors should have. The residuals are measured minus
+    predicted by the best hypothesis, shape (n, c) each.
     """
     colours: list[Colour] = []
     for c, channel in enumerate(experiments[0].channels):
@@ -173,15 +160,9 @@ def found_noise(experiments: Sequence[Experiment]) -> dict[str, dict[str, float]
 def with_found_noise(experiments: Sequence[Experiment],
                      found: Mapping[str, Mapping[str, float]]) -> tuple[Experiment, ...]:
     """
-    Return planned experiments with the noise that other ones have shown.
+    Return planned experiments with the noise that other ones have shown, see `found_noise`.
 
-    Parameters
-    ----------
-    experiments
-        with the noise that their sensors should have
-    found
-        as `found_noise`; a signal that it lacks has the noise that it should have
-
+    A signal that was not found has the noise that it should have.
     """
     def colour(channel: str, interval: float) -> Colour:
         if channel not in found:

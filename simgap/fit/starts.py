@@ -23,17 +23,7 @@ def settled(problem: LeastSquares, state: FitState, options: SearchSettings, pas
     """
     Go on with a fit, with fresh derivatives, as long as that gains much.
 
-    Parameters
-    ----------
-    problem, state
-        the fit
-    options
-        what is much
-    passes
-        greatest number of fresh Jacobians
-    iterations
-        of the fit between two of them
-
+    At most this many Jacobians are taken, with so many iterations after each.
     """
     for _ in range(passes):
         before = state.cost
@@ -51,14 +41,6 @@ def led(problem: LeastSquares, state: FitState, options: SearchSettings) -> FitS
     to all of them in one. The cost of a test that moves smoothly leads to its optimum. So the
     test that fits best is fitted alone, and all of them from there. If another one then fits
     best, it leads in its turn.
-
-    Parameters
-    ----------
-    problem, state
-        the fit to all experiments, after it has stopped
-    options
-        how long a fit goes on
-
     """
     def fitted(part: LeastSquares, point: Point, target: float = math.inf) -> FitState:
         begun = part.start(state.parameters, with_initial_conditions(part, dict(point)))
@@ -84,19 +66,9 @@ def led(problem: LeastSquares, state: FitState, options: SearchSettings) -> FitS
 def least_cost(problem: LeastSquares, trials: Sequence[dict[str, float]], experiment: int,
                until: float) -> tuple[float, dict[str, float]]:
     """
-    Return the least cost among trial points in the first part of one experiment, and its point.
+    Return the least cost among trial points in one experiment until a time [s], and its point.
 
-    Parameters
-    ----------
-    problem
-        what is fitted
-    trials
-        points; the first of them wins a tie
-    experiment
-        the one that is looked at
-    until
-        how much of it [s]
-
+    The first point wins a tie.
     """
     here = problem.experiments[experiment]
     early = (here.time - here.time[0] < until)[:, np.newaxis]

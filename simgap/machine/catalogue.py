@@ -52,15 +52,7 @@ class Catalogue(dict[str, Effect]):
         """
         Return the forms of an effect that are worth a fit.
 
-        Parameters
-        ----------
-        effect
-            of the catalogue
-        experiments
-            those of the machine
-        residuals
-            of each, measured minus predicted without the effect, shape (n, c)
-
+        The residuals of each experiment are measured minus predicted without the effect, (n, c).
         """
         return effect.forms
 

@@ -36,34 +36,16 @@ class Nuisances(list[Parameter]):
         """
         Return the nuisances that take over what they can of an effect that is removed.
 
-        Parameters
-        ----------
-        point
-            the nuisances
-        removed
-            the values of the effect's parameters
-
+        `point` has the nuisances, `removed` the values of the effect's parameters.
         """
         return dict(point)
 
     def take_over(self, point: Point, forms: Sequence[Form]) -> tuple[dict[str, float], set[str]]:
         """
-        Return a point at which effects alone stand for their numbers.
+        Return a point at which effects alone stand for their numbers, and what is held at zero.
 
         A nuisance may stand for the very number that an effect changes. Both together are not
         determined, so the nuisance is held at zero, and the effect takes over its value. Of
-        several nuisances it takes over what they have in common.
-
-        Parameters
-        ----------
-        point
-            nuisances and effects
-        forms
-            of the effects
-
-        Returns
-        -------
-        the point, and the names of the nuisances that are held at zero; by default none are
-
+        several nuisances it takes over what they have in common. By default none is held.
         """
         return dict(point), set()

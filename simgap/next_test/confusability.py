@@ -86,19 +86,9 @@ def confusability(machine: Machine, progress: Callable[[float], None] = lambda s
     """
     Say which effects the tests of a machine can tell apart.
 
-    Parameters
-    ----------
-    machine
-        whose measured readings are those that its model predicts
-    progress
-        called with the share that is done
-    settings
-        thresholds
-    inflated
-        by what differences of the cost are divided
-    among
-        ids of the effects that are asked for; empty for all
-
+    The measured readings are those that the model predicts. `progress` is called with the share
+    that is done, `inflated` divides differences of the cost, and `among` names the effects that
+    are asked for, or all.
     """
     problem = LeastSquares(machine.with_experiments(
         with_model_error(machine.experiments, settings.noise)), settings=settings)
@@ -111,15 +101,7 @@ def visibility(problem: LeastSquares, state: FitState,
     """
     Say how large each effect must be to show beside a fit of the nuisances, and what it is like.
 
-    Parameters
-    ----------
-    problem, state
-        the tests, and a fit of the nuisances with its Jacobian
-    progress
-        called with the share that is done
-    inflated, among
-        as in `confusability`
-
+    `state` is that fit, with its Jacobian; the others are as in `confusability`.
     """
     machine, settings = problem.machine, problem.settings
     jacobian = state.jacobian
@@ -165,17 +147,9 @@ class _Imitation:
         """
         Return the size from which an effect is named, whichever sign it has.
 
-        It is then larger than its tolerance, and more than its price is left of it.
-
-        Parameters
-        ----------
-        number
-            the effect's first
-        power, cross
-            products of its column with itself and with those of the nuisances, shape (m,)
-        price
-            in halves of a chi-square
-
+        It is then larger than its tolerance, and more than its `price` [half chi-square] is left
+        of it. `number` is the effect's first; `power` and `cross`, shape (m,), are the products of
+        its column with itself and with those of the nuisances.
         """
         # where nothing imitates it; a little less, so that rounding does not make it visible
         least = (1.0 - _SHARE) * math.sqrt(2.0 * price / power) if power > 0.0 else math.inf

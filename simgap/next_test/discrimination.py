@@ -90,17 +90,8 @@ def deviations(machine: Machine, rival: Rival, inflated: float,
     """
     Return how well the planned tests of a machine would determine the numbers of a rival.
 
-    Parameters
-    ----------
-    machine, inflated, settings
-        as in `separation`
-    rival
-        of a verdict
-
-    Returns
-    -------
-    names of its m known numbers, and their covariances before and after, shape (m, m) each
-
+    These are the names of its m known numbers, and their covariances before and after, shape (m,
+    m) each. The others are as in `separation`.
     """
     point = known_to(machine, rival)
     problem = planned(machine, [rival], [point], settings)
@@ -132,19 +123,9 @@ def _followed(problem: LeastSquares, rival: Rival, point: dict[str, float], off:
     """
     Return what remains of differences after a rival's numbers have followed them.
 
-    Parameters
-    ----------
-    problem, rival, point, inflated
-        the planned tests, and the rival where it is
-    off
-        differences in standard deviations, shape (r, n)
-
-    Returns
-    -------
-    what the steps away from what is known add to each chi-square, shape (r,), the differences that
-    are left, in standard deviations, shape (r, n), and the share to which the deviation of each
-    size in doubt shrinks
-
+    The differences `off` are in standard deviations, shape (r, n). What is returned: what the
+    steps away from what is known add to each chi-square, shape (r,), the differences that are
+    left, and the share to which the deviation of each size in doubt shrinks.
     """
     numbers = numbers_of(problem.machine, rival)
     if not numbers:

@@ -28,19 +28,8 @@ def confirmed_separation(machine: Machine, rivals: Sequence[Rival], inflated: fl
 
     The true rival is fitted as well, from a standard deviation away along each direction. A fit
     that sticks there would stick in a diagnosis, which compares two fits. What it leaves is no
-    evidence against the others.
-
-    Parameters
-    ----------
-    machine, rivals, inflated, settings
-        as in `discrimination.separation`
-    shrunk
-        what that has found of deviations; without it they stay as they are
-
-    Raises
-    ------
-    as `discrimination.separation`
-
+    evidence against the others. Deviations shrink as `shrunk` says, from
+    `discrimination.separation`, whose parameters the others are; without it they stay.
     """
     points = [known_to(machine, rival) for rival in rivals]
     problem = planned(machine, rivals, points, settings)

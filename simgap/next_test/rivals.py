@@ -214,19 +214,9 @@ def rivals_of(problem: LeastSquares, answers: Sequence[Answer], inflated: float,
     """
     Return the likeliest answers of a verdict with what is known of their numbers.
 
-    Parameters
-    ----------
-    problem
-        the whole tests
-    answers
-        of the verdict, the likeliest first
-    inflated
-        variance over that with independent noise, see `intervals.inflation`
-    settings
-        thresholds
-    doubted
-        returns what tells whether a hypothesis' effects are larger than their tolerances
-
+    `answers` has the likeliest first. `inflated` is the variance over that with independent noise,
+    and `doubted` returns what tells whether a hypothesis' effects are larger than their
+    tolerances.
     """
     found = []
     for answer in answers[:settings.rivals]:
@@ -268,17 +258,9 @@ def within(values: FloatArray, known: FloatArray, place: int, low: float, high: 
     Return the mean and the covariance of normal numbers, given that one is within bounds.
 
     The others follow it by regression (N. L. Johnson, S. Kotz, N. Balakrishnan, Continuous
-    Univariate Distributions, volume 1, chapter 13, section 10.1).
-
-    Parameters
-    ----------
-    values, known
-        mean, shape (m,), and covariance, shape (m, m)
-    place
-        of the one
-    low, high
-        its bounds; they may be equal or infinite
-
+    Univariate Distributions, volume 1, chapter 13, section 10.1). `values`, shape (m,), and
+    `known`, shape (m, m), are mean and covariance; the bounds of the one in this place may be
+    equal or infinite.
     """
     variance = known[place, place]
     if variance <= 0.0:

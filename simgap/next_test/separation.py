@@ -109,16 +109,8 @@ def _ended(doubt: Doubt, known: float, share: float, gain: float) -> FloatArray:
     Return the logarithms of the odds by which a test moves a doubt, shape (2,).
 
     By how much the doubt falls if the effect is there, and by how much the effect does if not.
-
-    Parameters
-    ----------
-    doubt
-        before the test
-    known, share
-        deviation of its size from the readings alone, and the share to which that shrinks
-    gain
-        that the test adds if the effect is there
-
+    `known` is the deviation of its size from the readings alone, which shrinks to a `share`;
+    `gain` is what the test adds if the effect is there.
     """
     # what follows from a tolerance, or from how tests differ, does not shrink
     after = replace(doubt, deviation=math.sqrt(max(

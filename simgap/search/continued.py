@@ -26,16 +26,6 @@ def continued(problem: LeastSquares, rivals: Sequence[Rival],
     Return answers of an earlier verdict as they fit all tests, at the sensors' own noise.
 
     Two answers of the same fit are one. One whose effects the machine does not know is left out.
-
-    Parameters
-    ----------
-    problem
-        all tests, those of the earlier verdict and others
-    rivals
-        its answers
-    concurrently
-        maps a function over them
-
     """
     unique = {(rival.effects, rival.forms): rival for rival in rivals
               if rival.is_known_to(problem.machine)}

@@ -26,21 +26,9 @@ def backward_elimination(fits: FullFits, hypotheses: Sequence[Hypothesis], setti
     Test each doubtful effect of the best hypothesis, until the best has none.
 
     Where its effects are one effect in each of its places, this one is tried, too, and so is a
-    simpler effect that one of them becomes at an end of its range.
-
-    Parameters
-    ----------
-    fits
-        to the whole tests, which the hypotheses come from
-    hypotheses
-        fitted ones, the nuisances alone first
-    settings
-        thresholds
-
-    Returns
-    -------
-    the hypotheses in their order, and the best of them with a fit that has converged
-
+    simpler effect that one of them becomes at an end of its range. Of the hypotheses, fitted to
+    the whole tests, the nuisances alone are the first. They are returned in their order, with the
+    best of them, whose fit has converged.
     """
     found = {frozenset(h.effects): h for h in hypotheses}
     tried: set[frozenset[str]] = set()
@@ -130,23 +118,8 @@ def forward_selection(fits: FullFits, hypotheses: Sequence[Hypothesis], best: Hy
     """
     Add effects one after the other, until none is worth its price.
 
-    A single effect is left alone if it leaves only noise: the search has tried its partners.
-
-    Parameters
-    ----------
-    fits
-        to the whole tests, which the hypotheses come from
-    hypotheses
-        from `backward_elimination`
-    best
-        the best of them, with a fit that has converged
-    settings
-        thresholds
-
-    Returns
-    -------
-    the hypotheses, and the best of them with a fit that has converged
-
+    A single effect is left alone if it leaves only noise: the search has tried its partners. Taken
+    and returned are the hypotheses, and the best of them with a fit that has converged.
     """
     found = list(hypotheses)
     while (0 < len(best.effects) < settings.search.most_effects

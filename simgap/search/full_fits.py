@@ -55,13 +55,7 @@ class FullFits:
         Fit the best of what a search has found to the whole tests; return 'none' first.
 
         All share the derivatives by the nuisances. In each pass these are taken anew, where the
-        best hypothesis is then.
-
-        Parameters
-        ----------
-        none, singles, pairs
-            the nuisances alone, and hypotheses with one and two effects, each the best first
-
+        best hypothesis is then. Those with one effect and with two come the best first.
         """
         options = self.settings
         chosen = self._chosen(singles, pairs)

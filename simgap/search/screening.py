@@ -85,16 +85,7 @@ def screened(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity
     Return the gain that each form promises beside the effects that are there, the greatest first.
 
     What the fit would gain without it, because it has not converged, is no part of the promise.
-
-    Parameters
-    ----------
-    problem, state
-        the fit that the effect is added to
-    known
-        from `sensitivities`
-    besides
-        ids of the effects that are there
-
+    The effects of the fit have the ids `besides`, and `known` comes from `sensitivities`.
     """
     names = {p.name for p in state.parameters}
     low = np.array([p.low for p in state.parameters]) - state.x
@@ -144,17 +135,8 @@ def scan(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
 
     A strong effect may bend the misfit so much that its derivative at zero tells nothing: a mode
     at another frequency, a limit that was not reached, a ripple that shakes a mode. The values are
-    sought in the worst test.
-
-    Parameters
-    ----------
-    problem, state, known, besides
-        as in `screened`
-
-    Returns
-    -------
-    sensitivities with the sizes from which a fit should begin, the best first
-
+    sought in the worst test. Each form comes with the sizes from which a fit should begin, the
+    best first. The parameters are those of `screened`.
     """
     here = state.point()
     count = problem.settings.search.scanned

@@ -134,22 +134,9 @@ def trained(part: Part, parameters: Sequence[Parameter], point: Mapping[str, flo
     Fit parameters to a part of the tests, from a point far from the optimum to the end.
 
     While much is left, the misfit counts as noise, and the noise is lowered as the fit proceeds:
-    at the sensors' own noise a robust loss does not lead across a large misfit. The derivatives
-    in `slopes` only begin the fit; at its end they are taken anew as long as that gains much.
-
-    Parameters
-    ----------
-    part
-        the tests
-    parameters
-        what is fitted
-    point
-        where the fit begins
-    slopes
-        derivatives for the beginning, and for what follows, shape (n, m) each
-    settings
-        thresholds
-
+    at the sensors' own noise a robust loss does not lead across a large misfit. The derivatives in
+    `slopes`, shape (n, m) each, only begin the fit: the first its beginning, the next what
+    follows. At its end they are taken anew as long as that gains much.
     """
     options, search = settings.held_out, settings.search
     at = with_initial_conditions(LeastSquares(part, settings=settings), dict(point))

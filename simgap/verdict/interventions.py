@@ -29,19 +29,7 @@ _ROUNDS = 2
 
 def interventions(problem: LeastSquares, none: Hypothesis, best: Hypothesis,
                   threads: int = 1) -> list[dict[str, Any]]:
-    """
-    Return what each label changes, for the JSON; empty without labels.
-
-    Parameters
-    ----------
-    problem
-        the whole tests
-    none, best
-        the hypotheses without and with the likeliest effects
-    threads
-        how many tests are withheld at once
-
-    """
+    """Return what each label of the whole tests changes, for the JSON; empty without labels."""
     machine = problem.machine
     if not isinstance(machine, ByLabel):
         return []
@@ -55,14 +43,6 @@ def simplified(problem: LeastSquares, hypotheses: Sequence[Hypothesis],
 
     The search takes an effect's form where others are still missing, and a missing effect that
     differs makes it look as if this one did.
-
-    Parameters
-    ----------
-    problem
-        the whole tests
-    hypotheses, best
-        from the search
-
     """
     machine = problem.machine
     if not isinstance(machine, ByLabel):

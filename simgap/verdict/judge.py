@@ -307,18 +307,10 @@ class Judge:
         """
         Return a fold with what is left, and with draws of the numbers that can be judged.
 
-        Parameters
-        ----------
-        fold
-            with the reasons why the others cannot
-        problem, point, residual
-            the withheld test, where it is judged, and the residual there, shape (n c,)
-        found, posterior
-            the fit to the training data, and the covariance of its numbers
-        followed
-            of residuals with draws, shape (draws, n c), those that are left once the nuisances
-            have followed
-
+        `point` and `residual`, shape (n c,), are where the withheld test is judged; `found` and
+        `posterior` are the fit to the training data and its covariance. `followed` returns, of
+        residuals with draws, shape (draws, n c), those that are left once the nuisances have
+        followed.
         """
         numbers = self._numbers(fold.reasons)
         if not numbers:

@@ -22,19 +22,10 @@ from simgap.verdict.verdict import LackOfFit
 def lack_of_fit(problem: LeastSquares, raw: FloatArray, best: Hypothesis,
                 explained: float | None) -> LackOfFit:
     """
-    Return what the best hypothesis leaves, after a fit that has converged.
+    Return what the best hypothesis leaves of the whole tests, after a fit that has converged.
 
-    Parameters
-    ----------
-    problem
-        the whole tests
-    raw
-        residuals of the model as configured, shape (n,)
-    best
-        hypothesis
-    explained
-        upper end of the interval of what it explains of withheld data, None without effects
-
+    `raw` has the residuals of the model as configured, shape (n,). `explained` is the upper end of
+    the interval of what the hypothesis explains of withheld data, None without effects.
     """
     loudest, fast, fast_left = _fast(problem, raw, best)
     signal, regular = _regular(problem, best.state)
@@ -161,15 +152,7 @@ def remainders(problem: LeastSquares, state: FitState,
     """
     Return what a hypothesis leaves of each signal, in its own unit, for the JSON.
 
-    Parameters
-    ----------
-    problem
-        the whole tests
-    state
-        of the hypothesis
-    limits
-        for some signals, the remainder beyond noise from which it matters
-
+    For some signals `limits` has the remainder beyond noise from which it matters.
     """
     predicted = problem.machine.simulate([state.point()])[0]
     found: dict[str, dict[str, Any]] = {}

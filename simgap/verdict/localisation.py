@@ -27,15 +27,7 @@ def of_effects(problem: LeastSquares, answers: Sequence[Answer], none: FitState,
     """
     Return where the effects of a verdict lie, the largest share first.
 
-    Parameters
-    ----------
-    problem
-        the machine in its experiments
-    answers
-        the hypotheses with their probabilities
-    none, best
-        where the fits ended without and with the likeliest effects
-
+    `none` and `best` are where the fits ended without and with the likeliest effects.
     """
     parts: dict[str, float] = {}
     for answer in answers:
@@ -52,20 +44,9 @@ def parts_of_the_unknown(problem: LeastSquares, none: FitState, lack: LackOfFit,
     """
     Return in which parts something may act that no effect names, and in which places.
 
-    Parameters
-    ----------
-    problem
-        the machine in its experiments
-    none
-        where the fit ended without any effect
-    lack
-        what the best hypothesis leaves: what is too fast for a pulse, or repeats itself, shows
-        in one reading, and is put there
-
-    Returns
-    -------
-    how likely each part is, empty if none is likely; the places, the likeliest first
-
+    The parts come with how likely each is, and are none if none is likely; the likeliest place is
+    the first. `none` is where the fit ended without any effect. What is too fast for a pulse, or
+    repeats itself, shows in one reading, and is put there: `lack` tells.
     """
     settings = problem.settings
     truncated = LeastSquares(problem.machine.truncated(), settings=settings)

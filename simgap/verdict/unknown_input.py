@@ -55,13 +55,7 @@ def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
     """
     Return where an unknown input may act, the likeliest place first.
 
-    Parameters
-    ----------
-    problem
-        the machine in its experiments
-    point
-        the nuisances as fitted without any effect
-
+    `point` has the nuisances as fitted without any effect.
     """
     evidence = _Evidence.at(problem, point)
     found = []
@@ -82,20 +76,9 @@ def courses(problem: LeastSquares, point: Mapping[str, float],
     """
     Return what would have to enter at a place to explain a gap, over time.
 
-    Parameters
-    ----------
-    problem
-        the machine in its experiments
-    point
-        the nuisances as fitted without any effect
-    place
-        one of the machine's disturbance inputs
-
-    Returns
-    -------
-    for each experiment times, shape (m,) [s], and the likeliest values at them, shape (m,), with
-    straight lines between, in the unit of the machine's `simulate_disturbed`
-
+    `point` is as in `places`. For each experiment these are times, shape (m,) [s], and the
+    likeliest values at them, shape (m,), with straight lines between, in the unit of the machine's
+    `simulate_disturbed`.
     """
     evidence = _Evidence.at(problem, point)
     responses, times = _columns(problem, point, place, evidence.residual)
@@ -135,13 +118,7 @@ def components(found: Sequence[Place], caution: float) -> dict[str, float]:
     """
     Return how likely each part of the machine is, by its best place; all sum to 1.
 
-    Parameters
-    ----------
-    found
-        from `places`
-    caution
-        share of the evidence that counts, because residuals are not white
-
+    Of the evidence the share `caution` counts, because residuals are not white.
     """
     best: dict[str, float] = {}
     for place in found:
