@@ -18,17 +18,10 @@ _ORDERS = 3
 
 class AntennaCatalogue(Catalogue):
     """
-    The effects of the antenna drive.
+    The effects of the antenna drive, and the orders of its waves.
 
-    Parameters
-    ----------
-    effects
-        from `catalogue`
-    modifiers
-        what their parameters do; grows as orders of waves are chosen
-    digits_seen
-        whether the readings show digits that are coarser than the sheet says
-
+    What their parameters do is registered in `modifiers`, which grows as orders are chosen.
+    `digits_seen` says whether the readings show digits that are coarser than the sheet says.
     """
 
     def __init__(self, effects: Iterable[Effect], modifiers: KnownModifiers,

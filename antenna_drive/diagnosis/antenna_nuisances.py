@@ -21,21 +21,11 @@ _STARTS = np.linspace(-0.95, 0.95, 13)
 
 class AntennaNuisances(Nuisances):
     """
-    The numbers of the antenna drive that are known within a tolerance.
+    The tolerances of the antenna drive in some tests; what they do is registered in `modifiers`.
 
     Starting places of both motors inside their gaps are tried in all combinations: where a bias
     closes both gaps at once, each motor's place looks right or wrong by the other's. One after the
     other they end in a wrong pair.
-
-    Parameters
-    ----------
-    tolerances
-        from `tolerances.nuisances`
-    tests
-        that they act on
-    modifiers
-        what parameters do
-
     """
 
     def __init__(self, tolerances: Sequence[AntennaParameter], tests: Sequence[FieldTest],

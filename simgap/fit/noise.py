@@ -78,20 +78,11 @@ def _innovations(z: FloatArray, pole: float, gain: float) -> FloatArray:
 def estimated(residuals: Sequence[FloatArray], interval_s: float, slow_limit: float,
               settings: NoiseSettings) -> Process:
     """
-    Return the noise process of a channel.
+    Return the noise process of a channel from the residuals of each experiment.
 
-    Parameters
-    ----------
-    residuals
-        of each experiment in standard deviations of the stated noise, shape (n,), NaN where there
-        is none
-    interval_s
-        between two samples [s]
-    slow_limit
-        greatest variance of the slow part that may be noise or a model's error
-    settings
-        thresholds
-
+    These are in standard deviations of the stated noise, shape (n,), NaN where there is none, at
+    an interval [s]. The slow part may have the variance `slow_limit`: more is no noise and no
+    model's error.
     """
     usable = [z for z in residuals if np.isfinite(z).sum() >= settings.least_samples]
     if not usable:

@@ -73,13 +73,7 @@ class Labels:
     """
     The names of sizes by label, and points that hold such sizes.
 
-    Parameters
-    ----------
-    groups
-        from `groups_of`
-    nuisances
-        whose names may look like those of sizes by label
-
+    `groups` comes from `groups_of`; names of nuisances may look like those of sizes by label.
     """
 
     def __init__(self, groups: Groups, nuisances: Sequence[Parameter]) -> None:
@@ -127,15 +121,8 @@ class LabelledCatalogue(Catalogue):
     """
     A catalogue with a further form of each effect for each label.
 
-    Parameters
-    ----------
-    inner
-        the catalogue
-    groups
-        from `groups_of`
-    whole
-        the form that each split form comes from, and the label; grows as forms are split
-
+    `whole` has the form that each split form comes from, and the label; it grows as forms are
+    split.
     """
 
     def __init__(self, inner: Catalogue, groups: Groups,
@@ -196,19 +183,7 @@ class _LabelledNuisances(Nuisances):
 
 
 class ByLabel(Machine):
-    """
-    A machine with a further form of each effect for each label.
-
-    Parameters
-    ----------
-    inner
-        the machine
-    labels
-        of its tests
-    whole
-        see `LabelledCatalogue`
-
-    """
+    """A machine with a further form of each effect for each label of its tests."""
 
     catalogue: LabelledCatalogue
 

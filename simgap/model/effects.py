@@ -22,13 +22,7 @@ class OwnCatalogue(Catalogue):
     """
     The catalogue of a user's machine.
 
-    Parameters
-    ----------
-    effects
-        as declared
-    angles
-        returns an angle that a wave follows, in each test at its judged samples [rad]
-
+    `angles` returns an angle that a wave follows, in each test at its judged samples [rad].
     """
 
     def __init__(self, effects: Sequence[OwnEffect],

@@ -25,20 +25,12 @@ from simgap.search.screening import screened, sensitivities, Sensitivity
 
 class FullFits:
     """
-    Fits to the whole tests.
-
-    Parameters
-    ----------
-    problem
-        the machine in its whole experiments
-    progress
-        called with the share that is done, 0 to 1, and what is being done
-    threads
-        how many hypotheses are fitted at once
+    Fits to the whole tests, as many at once as there are threads.
 
     Attributes
     ----------
     problem : with the noise of the motion that was found
+    progress : called with the share that is done, 0 to 1, and what is being done
 
     """
 

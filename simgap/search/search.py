@@ -46,17 +46,9 @@ class Search:
     """
     The search for the effects that a model lacks.
 
-    Parameters
-    ----------
-    problem
-        the machine in its experiments
-    progress
-        called with the share that is done, 0 to 1, and what is being done
-    threads
-        how many hypotheses are fitted at once
-    earlier
-        answers of a verdict on some of the tests
-
+    `progress` is called with the share that is done, 0 to 1, and what is being done. `threads`
+    hypotheses are fitted at once, and those of `earlier`, answers of a verdict on some of the
+    tests, beside all others.
     """
 
     def __init__(self, problem: LeastSquares, progress: Callable[[float, str], None],

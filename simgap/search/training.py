@@ -26,14 +26,10 @@ class Part(Machine):
 
     Parameters
     ----------
-    machine
-        in all experiments
-    chosen
-        indices of those that count
-    experiments
-        what was measured in them; None for all that the machine has
-    held
-        values of parameters that are held, by name
+    machine, chosen
+        in all experiments, and the indices of those that count
+    experiments, held
+        what was measured in them, None for all that the machine has; values that are held, by name
 
     """
 
