@@ -49,7 +49,7 @@ def groups_of(experiments: Sequence[Experiment]) -> dict[str, tuple[str, ...]]:
 def by_label(machine: Machine) -> Machine:
     """Return a machine whose effects may differ between labels; itself if there are none."""
     groups = groups_of(machine.experiments)
-    return ByLabel(machine, Labels(groups, machine.nuisances), {}) if groups else machine
+    return ByLabel(machine, Labels(groups, machine.nuisances)) if groups else machine
 
 
 def without_labels(machine: Machine) -> Machine:
@@ -71,16 +71,32 @@ def _split_name(name: str, key: str, value: str) -> str:
 
 class Labels:
     """
-    The names of sizes by label, and points that hold such sizes.
+    Forms with a size under each label, the names of such sizes, and points that hold them.
 
     `groups` comes from `groups_of`; names of nuisances may look like those of sizes by label.
     """
 
     def __init__(self, groups: Groups, nuisances: Sequence[Parameter]) -> None:
         self.groups = groups
+        # the form that each split form comes from, and the label; grows as forms are split
+        self._whole: dict[Form, tuple[Form, str]] = {}
         self._own = {p.name for p in nuisances}
         self._endings = {_split_name('', key, value): (key, value)
                          for key, values in groups.items() for value in values}
+
+    def whole(self, form: Form) -> tuple[Form, str]:
+        """Return the form that a split form comes from, and the label; '' for any other form."""
+        return self._whole.get(form, (form, ''))
+
+    def base_of(self, form: Form) -> Form:
+        """Return the form that a split form comes from; any other form itself."""
+        return self.whole(form)[0]
+
+    def split(self, form: Form, key: str) -> Form:
+        """Return a form with sizes of its own under each value of a label."""
+        found = split(form, key, self.groups[key])
+        self._whole[found] = (form, key)
+        return found
 
     def parts(self, name: str) -> tuple[str, tuple[str, str] | None]:
         """Return the machine's own name of a number, and the label of its tests."""
@@ -117,51 +133,35 @@ class Labels:
         return {name: fmean(values) for name, values in parts.items()}
 
 
-class LabelledCatalogue(Catalogue):
-    """
-    A catalogue with a further form of each effect for each label.
+class _LabelledCatalogue(Catalogue):
+    """A catalogue with a further form of each effect for each label."""
 
-    `whole` has the form that each split form comes from, and the label; it grows as forms are
-    split.
-    """
-
-    def __init__(self, inner: Catalogue, groups: Groups,
-                 whole: dict[Form, tuple[Form, str]]) -> None:
+    def __init__(self, inner: Catalogue, labels: Labels) -> None:
         super().__init__(inner.values())
-        self._inner, self._groups, self._whole = inner, groups, whole
-
-    def base_of(self, form: Form) -> Form:
-        """Return the form that a split form comes from; any other form itself."""
-        return self._whole.get(form, (form, ''))[0]
-
-    def split(self, form: Form, key: str) -> Form:
-        """Return a form with sizes of its own under each value of a label."""
-        found = split(form, key, self._groups[key])
-        self._whole[found] = (form, key)
-        return found
+        self._inner, self._labels = inner, labels
 
     def forms(self, effect: Effect, experiments: Sequence[Experiment],
               residuals: Sequence[FloatArray]) -> Sequence[Form]:
         """Return the forms that are worth a fit, with one size for all tests and split."""
         whole = self._inner.forms(effect, experiments, residuals)
-        return [*whole, *(self.split(form, key) for form in whole if can_be_split(form)
-                          for key in self._groups)]
+        return [*whole, *(self._labels.split(form, key) for form in whole if can_be_split(form)
+                          for key in self._labels.groups)]
 
     def typical_form(self, effect: Effect) -> Form:
         return self._inner.typical_form(effect)
 
     def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
-        base, key = self._whole.get(form, (form, ''))
+        base, key = self._labels.whole(form)
         found = self._inner.counterpart(base, effect, part)
-        return self.split(found, key) if key else found
+        return self._labels.split(found, key) if key else found
 
 
 class _LabelledNuisances(Nuisances):
     """Nuisances beside effects that may have a size under each label."""
 
-    def __init__(self, inner: Nuisances, labels: Labels, catalogue: LabelledCatalogue) -> None:
+    def __init__(self, inner: Nuisances, labels: Labels) -> None:
         super().__init__(inner, inner.initial_conditions)
-        self._inner, self._labels, self._catalogue = inner, labels, catalogue
+        self._inner, self._labels = inner, labels
 
     def absorb(self, point: Point, removed: Point) -> dict[str, float]:
         """Return the nuisances that take over what they can; sizes count with their mean."""
@@ -169,7 +169,8 @@ class _LabelledNuisances(Nuisances):
 
     def take_over(self, point: Point, forms: Sequence[Form]) -> tuple[dict[str, float], set[str]]:
         """Return a point at which effects alone stand for their numbers, under each label."""
-        bases, labels = [self._catalogue.base_of(form) for form in forms], self._labels
+        labels = self._labels
+        bases = [labels.base_of(form) for form in forms]
         result, held = dict(point), set[str]()
         for k in range(len(next(iter(labels.groups.values())))):
             found, names = self._inner.take_over(labels.in_test(point, k), bases)
@@ -185,14 +186,10 @@ class _LabelledNuisances(Nuisances):
 class ByLabel(Machine):
     """A machine with a further form of each effect for each label of its tests."""
 
-    catalogue: LabelledCatalogue
-
-    def __init__(self, inner: Machine, labels: Labels,
-                 whole: dict[Form, tuple[Form, str]]) -> None:
-        catalogue = LabelledCatalogue(inner.catalogue, labels.groups, whole)
-        super().__init__(inner.experiments,
-                         _LabelledNuisances(inner.nuisances, labels, catalogue), catalogue)
-        self.inner, self.labels, self._whole = inner, labels, whole
+    def __init__(self, inner: Machine, labels: Labels) -> None:
+        super().__init__(inner.experiments, _LabelledNuisances(inner.nuisances, labels),
+                         _LabelledCatalogue(inner.catalogue, labels))
+        self.inner, self.labels = inner, labels
         self.disturbance_inputs, self.notes = inner.disturbance_inputs, inner.notes
         self.diagram, self.advice = inner.diagram, inner.advice
 
@@ -235,7 +232,7 @@ class ByLabel(Machine):
         return self.inner.motion(experiment)
 
     def _around(self, inner: Machine) -> Machine:
-        return self if inner is self.inner else ByLabel(inner, self.labels, self._whole)
+        return self if inner is self.inner else ByLabel(inner, self.labels)
 
     def truncated(self) -> Machine:
         return self._around(self.inner.truncated())

@@ -50,7 +50,7 @@ def simplified(problem: LeastSquares, hypotheses: Sequence[Hypothesis],
     whole = best.with_jacobian(problem)
     forms = []
     for form in best.forms:
-        base, own = machine.catalogue.base_of(form), [p.label for p in form.sizes if p.label]
+        base, own = machine.labels.base_of(form), [p.label for p in form.sizes if p.label]
         values = [value for _, value in dict.fromkeys(own)]
         differs = any(_compared(
             problem, whole.state, size, [_of_value(form, own[0][0], value)[j] for value in values],
@@ -90,9 +90,9 @@ def _effects(numbers: Sequence[Mapping[str, Any]], differ: bool) -> list[str]:
 def _numbers(problem: LeastSquares, machine: ByLabel, best: Hypothesis,
              key: str) -> list[dict[str, Any]]:
     """Return the sizes of the named effects under each value, and their differences."""
-    bases = {effect: machine.catalogue.base_of(form) for effect, form in zip(
+    bases = {effect: machine.labels.base_of(form) for effect, form in zip(
         best.effects, best.forms, strict=True)}
-    chosen = {effect: machine.catalogue.split(form, key) for effect, form in bases.items()
+    chosen = {effect: machine.labels.split(form, key) for effect, form in bases.items()
               if effect in best.named and can_be_split(form)}
     groups = machine.labels.groups[key]
     values = list(dict.fromkeys(groups))
@@ -119,7 +119,7 @@ def _of_value(form: Form, key: str, value: str) -> list[Parameter]:
 
 def _in_common(problem: LeastSquares, machine: ByLabel, best: Hypothesis) -> Hypothesis:
     """Return the best hypothesis with one size for all tests."""
-    forms = tuple(machine.catalogue.base_of(form) for form in best.forms)
+    forms = tuple(machine.labels.base_of(form) for form in best.forms)
     if forms == best.forms:
         return best
     return Hypothesis(best.effects, forms, _fitted(
