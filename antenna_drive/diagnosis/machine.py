@@ -256,7 +256,7 @@ class AntennaMachine(Machine):
         return list(self._executor.map(run, range(len(self._tests))))
 
     def _job(self, k: int, point: Point, until: float) -> _Job:
-        """Return the run of one test at a point: what acts on readings alone is no part of it."""
+        """Return the run of one test at a point: what acts on readings alone is not part of it."""
         return _Job(k, tuple(item for item in sorted(point.items())
                              if item[0] not in self._reading_modifiers
                              and self._run_modifiers[item[0]][1] in (None, k)), until)

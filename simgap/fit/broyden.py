@@ -73,7 +73,7 @@ class BroydenModel:
         self.directions.append(new)
 
     def reweight(self, weight: FloatArray, weighted_residual: FloatArray) -> None:
-        """Take new weights and residuals; make the Hessian anew if the weights moved much."""
+        """Take new weights and residuals; recompute the Hessian if the weights moved much."""
         if float(np.mean(np.abs(weight - self._hessian_weight))) > self._settings.stale_weights:
             self.hessian = weighted_product(
                 updated(self.jacobian, self.errors, self.directions), weight)

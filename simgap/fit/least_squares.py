@@ -213,7 +213,8 @@ class LeastSquares:
         Return the state with a fresh Jacobian and fresh weights.
 
         Where sticking and slipping bend the prediction, a difference quotient over many standard
-        deviations is no derivative. The data that have been fitted tell how small a step may be.
+        deviations is not a derivative. The data that have been fitted show how small a step may
+        be.
         """
         jacobian = self.jacobian(state.point(), state.parameters, state.residual, False,
                                  self.local_steps(state))

@@ -7,7 +7,7 @@ A test sheet tells a level, and means white noise. Real noise is louder or quiet
 and no model is its machine to the last digit. Both are described by one process: white noise plus
 a part behind a first-order low-pass. Its two levels and its corner are estimated from a residual
 by the prediction error method (L. Ljung, System Identification, 2nd edition, chapter 7), within
-bounds: what is beyond them is no noise. The innovations of the process are white. Fits and tests
+bounds: what is beyond them is not noise. The innovations of the process are white. Fits and tests
 use them, so that a slow residual counts once and not with each of its samples.
 """
 
@@ -81,14 +81,14 @@ def estimated(residuals: Sequence[FloatArray], interval_s: float, slow_limit: fl
     Return the noise process of a channel from the residuals of each experiment.
 
     These are in standard deviations of the stated noise, shape (n,), NaN where there is none, at
-    an interval [s]. The slow part may have the variance `slow_limit`: more is no noise and no
+    an interval [s]. The slow part may have the variance `slow_limit`: more is neither noise nor a
     model's error.
     """
     usable = [z for z in residuals if np.isfinite(z).sum() >= settings.least_samples]
     if not usable:
         return Process(1.0, 0.0, 0.0)
     sizes = np.concatenate([np.abs(z[np.isfinite(z)]) for z in usable])
-    # an outlier is no noise: the loss of the fits copes with it
+    # an outlier is not noise: the loss of the fits copes with it
     bound = settings.clip * max(float(np.median(sizes)) / 0.6745, settings.least_level)
     clipped = [np.clip(z, -bound, bound) for z in usable]
 

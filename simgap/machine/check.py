@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a machine keeps its contract: what is missing or wrong is told by name, before a fit."""
+"""Whether a machine keeps its contract: what is missing or wrong is named before a fit."""
 
 from __future__ import annotations
 

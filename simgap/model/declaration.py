@@ -163,7 +163,7 @@ def ripple(name: str, stem: str, amplitude: Number, angle: str | Angle,
     angle
         name of a column of the logs in rad, or a function of a log that returns the angle [rad]
     orders
-        cycles per revolution that are tried; empty to find them in what is left
+        cycles per revolution that are tried; empty to find them in the residual
     harmonics
         how many the wave has, its fundamental counted; waves of real machines are seldom pure
     cause, look

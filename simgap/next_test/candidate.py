@@ -30,7 +30,7 @@ class Candidate:
     score : by the criterion; the larger the better
     coarseness : smallest size of each effect of the catalogue that shows, over that in the best
         test that was judged, in the geometric mean; NaN where it was not asked for
-    told : how well it tells the rivals apart to first order
+    promised : how well it tells the rivals apart to first order
     confirmed : the same with every rival fitted to the readings of the others
     kept : while not confirmed, the share of its promise that counts: as other tests of its
         family have kept theirs
@@ -44,7 +44,7 @@ class Candidate:
     use: Mapping[str, float]
     score: float = 0.0
     coarseness: float = math.nan
-    told: Separation | None = None
+    promised: Separation | None = None
     confirmed: Separation | None = None
     kept: float = 1.0
     deviations: Mapping[str, tuple[float, float]] = field(default_factory=dict)
@@ -53,7 +53,7 @@ class Candidate:
     @property
     def separation(self) -> Separation | None:
         """Return how well it tells the rivals apart, confirmed if it was."""
-        return self.confirmed or self.told
+        return self.confirmed or self.promised
 
     @property
     def tightest(self) -> tuple[str, float]:

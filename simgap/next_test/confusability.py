@@ -27,7 +27,7 @@ from simgap.fit.state import FitState, prior_precision, proper_precision
 from simgap.machine.contract import FloatArray, Machine, Parameter
 from simgap.settings import DEFAULT, Settings
 
-# a size is told to this share of itself
+# a size is found to this share of itself
 _SHARE = 0.01
 
 
@@ -74,7 +74,7 @@ class Confusability:
         return found
 
     def separated(self) -> float:
-        """Return the share of all pairs of effects that can be told apart."""
+        """Return the share of all pairs of effects that can be distinguished."""
         m = len(self.effects)
         pairs = self.alike[np.triu_indices(m, 1)]
         return float(np.mean(pairs < self.limit)) if pairs.size else 1.0

@@ -48,7 +48,7 @@ CRITERIA: Mapping[str, str] = {
     D_OPTIMAL: "D-optimality: determinant of the covariance of all the likeliest rival's numbers "
                '(Kiefer and Wolfowitz 1959)',
     RANDOM: 'none: the first test within the limits'}
-# Information below this is none [nat].
+# Less information than this does not count [nat].
 _NOTHING = 1e-6
 
 Progress = Callable[[float, str], None]
@@ -193,9 +193,9 @@ class TestDesign:
     def _temperature(self) -> float:
         return self._settings.verdict.temperature
 
-    def _score(self, told: Separation) -> float:
+    def _score(self, found: Separation) -> float:
         """Return the information that is left if less of the evidence comes true."""
-        return told.information(self._temperature, self._settings.planning.caution)
+        return found.information(self._temperature, self._settings.planning.caution)
 
     def _planned(self, test: Candidate) -> Machine:
         """Return the machine in a test, as noisy as it has been so far."""
@@ -212,15 +212,15 @@ class TestDesign:
         use = self._space.use(machine, points)
         if self._objective != SEPARATE:
             return replace(test, use=use)
-        told = separation(machine, self._rivals, self._inflated, self._settings, follow=False)
-        return replace(test, use=use, score=self._score(told))
+        rough = separation(machine, self._rivals, self._inflated, self._settings, follow=False)
+        return replace(test, use=use, score=self._score(rough))
 
     def _separated(self, test: Candidate) -> Candidate:
         """Judge a test with all tolerances free, to first order, and what else it shows."""
         machine = self._planned(test)
-        told = separation(machine, self._rivals, self._inflated, self._settings)
-        # no size is told, only their mean is compared
-        return replace(test, told=told, sizes=self._sizes(machine.low_fidelity()))
+        promised = separation(machine, self._rivals, self._inflated, self._settings)
+        # no size is reported, only their mean is compared
+        return replace(test, promised=promised, sizes=self._sizes(machine.low_fidelity()))
 
     def _with_fits(self, judged: Sequence[Candidate], pool: ThreadPoolExecutor) -> list[Candidate]:
         """
@@ -232,29 +232,29 @@ class TestDesign:
         for _ in range(self._effort.rounds):
             if not best or best[0].confirmed is not None:
                 break
-            promised = [test for test in best if test.confirmed is None]
+            others = [test for test in best if test.confirmed is None]
             count = self._effort.confirmed
             known = [*(test for test in best if test.confirmed is not None),
-                     *pool.map(self._confirmed, promised[:count])]
+                     *pool.map(self._confirmed, others[:count])]
             kept = self._kept(known)
             best = self._compared([*known, *(
-                replace(test, kept=kept.get(test.family, 1.0)) for test in promised[count:])])
+                replace(test, kept=kept.get(test.family, 1.0)) for test in others[count:])])
         return sorted(best, key=lambda test: test.confirmed is None)
 
     def _kept(self, confirmed: Iterable[Candidate]) -> dict[str, float]:
         """Return the share of the promises of each family that fits have kept, in the mean."""
         shares: dict[str, list[float]] = {}
         for test in confirmed:
-            assert test.told is not None and test.confirmed is not None
+            assert test.promised is not None and test.confirmed is not None
             shares.setdefault(test.family, []).append(
-                self._score(test.confirmed) / max(self._score(test.told), _NOTHING))
+                self._score(test.confirmed) / max(self._score(test.promised), _NOTHING))
         return {family: min(fmean(found), 1.0) for family, found in shares.items()}
 
     def _confirmed(self, test: Candidate) -> Candidate:
-        """Fit each rival to the readings of the others; what is left then counts in full."""
+        """Fit each rival to the readings of the others; the rest then counts in full."""
         return replace(test, kept=1.0, confirmed=confirmed_separation(
             self._planned(test), self._rivals, self._inflated, self._settings,
-            test.told.shrunk if test.told else ()))
+            test.promised.shrunk if test.promised else ()))
 
     def _sharpened(self, test: Candidate) -> Candidate:
         """Judge how well a test determines the numbers of the likeliest rival."""
@@ -321,22 +321,22 @@ class TestDesign:
         if test.separation is None:
             return -math.log(coarseness)
         unlisted = max(self._settings.planning.unlisted, self._findings.unlisted)
-        told = test.kept * self._score(test.separation)
-        return ((1.0 - unlisted) * math.log(max(told, _NOTHING))
+        information = test.kept * self._score(test.separation)
+        return ((1.0 - unlisted) * math.log(max(information, _NOTHING))
                 - unlisted * math.log(coarseness))
 
     # -- what no test tells --------------------------------------------------------------------
 
     def _alike(self, judged: Sequence[Candidate]) -> list[tuple[int, int, Mapping[str, float]]]:
         """Return the pairs of rivals that no judged test tells apart."""
-        told = [test for test in judged if test.separation is not None]
+        compared = [test for test in judged if test.separation is not None]
         limit = self._settings.planning.alike * self._temperature
         found = []
         for i, j in combinations(range(len(self._rivals)), 2):
-            lacks = [test.separation.least_lack()[i, j] for test in told
+            lacks = [test.separation.least_lack()[i, j] for test in compared
                      if test.separation is not None]
             if lacks and max(lacks) < limit:
-                best = told[int(np.argmax(lacks))]
+                best = compared[int(np.argmax(lacks))]
                 found.append((i, j, self._unread(best, i, j)))
         return found
 

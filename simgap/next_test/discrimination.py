@@ -54,7 +54,7 @@ def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
     settings
         thresholds
     follow
-        False to leave the numbers as they are: more than can be told, found without derivatives
+        False to leave the numbers as they are: an upper bound, found without derivatives
         (Hunter and Reiner's criterion)
 
     Raises

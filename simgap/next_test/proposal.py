@@ -75,7 +75,7 @@ def _told(test: Candidate, rivals: Sequence[Rival], settings: Settings) -> dict[
     if test.deviations:
         found['deviations'] = {name: {'before': before, 'after': after}
                                for name, (before, after) in test.deviations.items()}
-    told, first = test.separation, test.told
+    told, first = test.separation, test.promised
     if told is not None:
         temperature, sure = settings.verdict.temperature, settings.planning.sure
         after = told.posterior(temperature)

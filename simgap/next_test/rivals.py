@@ -118,7 +118,7 @@ class Rival:
 
         Raises
         ------
-        KeyError, TypeError, ValueError, AttributeError : it is none
+        KeyError, TypeError, ValueError, AttributeError : it is not a rival
 
         """
         names = tuple(data['names'])
@@ -183,7 +183,7 @@ class Findings:
         Take the findings from the entry `planning` of a verdict.
 
         A verdict of an earlier version lacks noise, doubts, what has shown or where something
-        unnamed may be, which is no error.
+        unnamed may be, which is not an error.
 
         Raises
         ------

@@ -115,7 +115,7 @@ def _ended(doubt: Doubt, known: float, share: float, gain: float) -> FloatArray:
     # what follows from a tolerance, or from how tests differ, does not shrink
     after = replace(doubt, deviation=math.sqrt(max(
         doubt.deviation ** 2 - (1.0 - share ** 2) * known ** 2, LEAST)))
-    # a gain that no fit has told will not be told by the next one either
+    # a gain that no fit has shown will not be shown by the next one either
     there = replace(after, gain=doubt.gain + gain if doubt.gain else 0.0)
     # the size of what is not there goes to zero as it gets certain
     absent = replace(after, excess=doubt.excess * share ** 2)

@@ -66,7 +66,7 @@ def backward_elimination(fits: FullFits, hypotheses: Sequence[Hypothesis], setti
 def converged_rivals(fits: FullFits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
                      settings: Settings) -> tuple[list[Hypothesis], Hypothesis]:
     """
-    Take fits close behind the best to their ends, too: only there can they be told apart.
+    Take fits close behind the best to their ends, too: only there can they be distinguished.
 
     A rival may be close only together with a partner that is no larger than its tolerance. It is
     then fitted without the partner, and so is the best itself. An effect in another place is a

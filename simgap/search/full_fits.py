@@ -46,7 +46,7 @@ class FullFits:
         """
         Fit the best of what a search has found to the whole tests; return 'none' first.
 
-        All share the derivatives by the nuisances. In each pass these are taken anew, where the
+        All share the derivatives by the nuisances. In each pass these are taken again, where the
         best hypothesis is then. Those with one effect and with two come the best first.
         """
         options = self.settings

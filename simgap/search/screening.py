@@ -84,7 +84,7 @@ def screened(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity
     """
     Return the gain that each form promises beside the effects that are there, the greatest first.
 
-    What the fit would gain without it, because it has not converged, is no part of the promise.
+    What the fit would gain without it, because it has not converged, is not part of the promise.
     The effects of the fit have the ids `besides`, and `known` comes from `sensitivities`.
     """
     names = {p.name for p in state.parameters}

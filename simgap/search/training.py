@@ -132,7 +132,7 @@ def trained(part: Part, parameters: Sequence[Parameter], point: Mapping[str, flo
     While much is left, the misfit counts as noise, and the noise is lowered as the fit proceeds:
     at the sensors' own noise a robust loss does not lead across a large misfit. The derivatives in
     `slopes`, shape (n, m) each, only begin the fit: the first its beginning, the next what
-    follows. At its end they are taken anew as long as that gains much.
+    follows. At its end they are taken again as long as that gains much.
     """
     options, search = settings.held_out, settings.search
     at = with_initial_conditions(LeastSquares(part, settings=settings), dict(point))

@@ -71,11 +71,11 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
     """
     whole = LeastSquares(machine, settings=settings)
 
-    def told(share: float, doing: str) -> None:
+    def report(share: float, doing: str) -> None:
         progress(0.9 * share, doing)
 
-    fits = FullFits(whole, told, threads)
-    found = fits.compared(*Search(whole, told, threads, earlier).run())
+    fits = FullFits(whole, report, threads)
+    found = fits.compared(*Search(whole, report, threads, earlier).run())
     hypotheses, best = backward_elimination(fits, found, settings)
     hypotheses, best = converged_rivals(fits, hypotheses, best, settings)
     if courses := _implausible_courses(best, settings):
@@ -131,7 +131,7 @@ def _decided(fits: FullFits, none: Hypothesis, best: Hypothesis,
     first = with_doubts(best, hypotheses)
     rests = _rests(fits, hypotheses, first, settings)
     fitted = [*hypotheses, *rests.values()]
-    # the fit that a small doubt has asked for is compared, but is no answer
+    # the fit that a small doubt has asked for is compared, but is not an answer
     answers = [*hypotheses, *(rests[effect] for effect in rests if effect in first.unsure)]
     hypotheses = [with_doubts(h, fitted) for h in answers]
     best = with_doubts(best, fitted)

@@ -28,7 +28,7 @@ class Doubt:
     excess : over the tolerance, in the unit of the number
     deviation : standard deviation of the number
     sure : excess in deviations at which the doubt is a half
-    gain : of the effect [half chi-square], over the inflation; 0 if no fit has told it
+    gain : of the effect [half chi-square], over the inflation; 0 if no fit has shown it
     sure_by_gain : gain at which the doubt is a half, however small the excess
     slope : how sharply the doubt falls beyond these limits
 

@@ -164,7 +164,7 @@ def _bootstrapped(folds: Sequence[Withheld],
 
 
 def _after(fold: Withheld) -> FloatArray:
-    """Return what is left, which is everything if nothing can be judged."""
+    """Return the rest, which is everything if nothing can be judged."""
     return fold.before if fold.after is None else fold.after
 
 

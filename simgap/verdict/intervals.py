@@ -15,7 +15,7 @@ two deviations sets the interval.
 
 Difference quotients of a drive that sticks and slips are right to a tenth. A Hessian of them knows
 nothing of directions in which two columns differ by less. There the priors alone count: without
-that, a change of a number and the tolerance of the same number would be told apart by the error of
+that, a change of a number and the tolerance of the same number would be separated by the error of
 a difference quotient.
 """
 

@@ -149,20 +149,20 @@ def _compared(problem: LeastSquares, state: FitState, base: Parameter,
     # a difference is worth the price of a parameter; that is stricter than its interval
     worth = math.sqrt(2.0 * problem.settings.penalty.parameter)
 
-    def told(contrast: FloatArray) -> tuple[float, float]:
+    def estimated(contrast: FloatArray) -> tuple[float, float]:
         return float(contrast @ state.x), math.hypot(
             contrast_deviation(problem, state, contrast),
             problem.settings.interval.model_error * float(np.abs(contrast) @ np.abs(state.x)))
 
     by_value = {}
     for name, contrast in zip(values, contrasts, strict=True):
-        value, deviation = told(contrast)
+        value, deviation = estimated(contrast)
         # the tolerance of the same number cancels in a difference, and not here
         low, high = _interval(value, math.hypot(deviation, same_number(base, value)))
         by_value[name] = {'value': value, 'ci95': [max(low, base.low), min(high, base.high)]}
     differences = []
     for name, contrast in zip(values[1:], contrasts[1:], strict=True):
-        value, deviation = told(contrast - contrasts[0])
+        value, deviation = estimated(contrast - contrasts[0])
         differences.append({
             'from': values[0], 'to': name, 'value': value, 'ci95': _interval(value, deviation),
             'differs': abs(value) > max(worth * deviation, base.tolerance)})
@@ -183,9 +183,9 @@ def lines(labels: Sequence[Mapping[str, Any]]) -> list[str]:
             unit = '' if item['unit'] == '1' else f' {item["unit"]}'
             sizes = ', '.join(f'{one["value"]:.3g}{unit} under {key} {value or "not given"}'
                               for value, one in item['values'].items())
-            told = [f'{one["value"]:+.3g}{unit} ({one["ci95"][0]:.3g} to {one["ci95"][1]:.3g}) '
-                    f'from {one["from"] or "not given"} to {one["to"] or "not given"}'
-                    for one in item['differences'] if one['differs']]
-            word = 'differs by ' + ', '.join(told) if told else 'stays'
+            changes = [f'{one["value"]:+.3g}{unit} ({one["ci95"][0]:.3g} to {one["ci95"][1]:.3g}) '
+                       f'from {one["from"] or "not given"} to {one["to"] or "not given"}'
+                       for one in item['differences'] if one['differs']]
+            word = 'differs by ' + ', '.join(changes) if changes else 'stays'
             found.append(f'{item["effect"]}: {name} {word}: {sizes}')
     return found

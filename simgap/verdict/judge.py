@@ -305,7 +305,7 @@ class Judge:
                    residual: FloatArray, found: FitState, posterior: FloatArray,
                    followed: Callable[[FloatArray], FloatArray] = lambda drawn: drawn) -> Withheld:
         """
-        Return a fold with what is left, and with draws of the numbers that can be judged.
+        Return a fold with what remains, and with draws of the numbers that can be judged.
 
         `point` and `residual`, shape (n c,), are where the withheld test is judged; `found` and
         `posterior` are the fit to the training data and its covariance. `followed` returns, of

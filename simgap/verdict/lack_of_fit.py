@@ -74,7 +74,7 @@ def _regular(problem: LeastSquares, state: FitState) -> tuple[str, float]:
     """
     Return the signal whose residual repeats itself most in a test, and by how much.
 
-    A hum, a ripple or a resonance may be no louder than a sensor's noise may be. But what is left
+    A hum, a ripple or a resonance may be no louder than a sensor's noise may be. But what remains
     of noise is white, because its colour is known. What is quieter than noise counts less.
     """
     settings = problem.settings.lack_of_fit
@@ -169,7 +169,7 @@ def remainders(problem: LeastSquares, state: FitState,
         if gap.size < problem.settings.lack_of_fit.least_samples:
             found[channel] = {'unit': unit, 'too_few_to_judge': int(gap.size)}
             continue
-        # a spike is no part of what a model leaves
+        # a spike is not part of what a model leaves
         bound = problem.settings.lack_of_fit.clip_fast * max(
             1.4826 * float(np.median(np.abs(gap))), float(np.median(noise)))
         rms = float(np.sqrt(np.mean(np.clip(gap, -bound, bound) ** 2)))

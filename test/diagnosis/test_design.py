@@ -108,7 +108,7 @@ def test_a_random_test_may_be_of_any_kind_that_is_allowed() -> None:
 def test_the_promise_for_the_best_test_is_confirmed_by_fits() -> None:
     found = TestDesign(Loads(1.6), Findings(HARD), effort=SMALL).run()
     best = found.tests[0]
-    assert best.confirmed is not None and best.told is not None
+    assert best.confirmed is not None and best.promised is not None
     data = as_data(found, Loads(1.6))
     assert data['expected']['confirmed']
     assert data['expected']['right_after'] > 0.95 > data['expected']['right_before']
@@ -265,7 +265,7 @@ def test_of_tests_that_tell_the_rivals_apart_one_that_shows_more_is_proposed(see
     found = TestDesign(Heated(1.6), Findings(HARD), effort=SMALL, seed=seed).run()
     best, cold = found.tests[0], next(t for t in found.tests if not t.test[1])
     for test in (best, cold):
-        assert test.told is not None and test.told.expected(8.0) > 0.95
+        assert test.promised is not None and test.promised.expected(8.0) > 0.95
     assert best.test[1]
     # the expansion, one effect of four, counts as a thousand times too large in the cold
     assert cold.coarseness / best.coarseness == pytest.approx(1000.0 ** 0.25, rel=0.2)
