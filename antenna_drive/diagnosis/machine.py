@@ -139,9 +139,7 @@ class AntennaMachine(Machine):
                                            for effect in effects.values()),
                                           modifiers, self._digit > 0.0))
         self.experiments = self._experiments({})
-        self._drive = drive
-        self._in_common = _in_common(test.sheet for test in self._tests)
-        self.planning = {'sheet': sheet_tree(self._in_common)}
+        self.planning = {'sheet': sheet_tree(_in_common(test.sheet for test in self._tests))}
 
     @property
     def records(self) -> Sequence[np.ndarray[Any, np.dtype[Any]]]:
