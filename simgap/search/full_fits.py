@@ -18,9 +18,12 @@ import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import same_noise, with_estimated_noise
 from simgap.fit.starts import settled
+from simgap.fit.state import FitState
+from simgap.machine.contract import Form
 from simgap.search.hypothesis import Hypothesis
 from simgap.search.refitting import dropped, refitted, shared_jacobian, SharedJacobian, taken_over
-from simgap.search.screening import screened, sensitivities, Sensitivity
+from simgap.search.screening import screened, sensitivities
+from simgap.search.single_fits import added
 
 
 class FullFits:
@@ -136,20 +139,14 @@ class FullFits:
 
     def with_another(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         """Return a hypothesis whose fit has converged with each of a few more effects."""
-        state = hypothesis.with_jacobian(self.problem).state
-        known = sensitivities(self.problem, state, self._pool.map)
+        base = hypothesis.with_jacobian(self.problem)
+        known = sensitivities(self.problem, base.state, self._pool.map)
         promising = [item for gain, item in screened(
-            self.problem, state, known, hypothesis.effects)[:self.settings.partners]
+            self.problem, base.state, known, base.effects)[:self.settings.partners]
             if gain > self.settings.partner_gain]
-
-        def added(item: Sensitivity) -> Hypothesis:
-            more = self.problem.extended(state, item.form.parameters, [
-                p.start for p in item.form.parameters], item.jacobian)
-            return Hypothesis(
-                (*hypothesis.effects, item.effect), (*hypothesis.forms, item.form),
-                self.problem.fit(more, self.settings.full_iterations)).without_jacobian(True)
-
-        return list(self._pool.map(added, promising))
+        return list(self._pool.map(lambda item: added(
+            self.problem, base, item, item.jacobian, self.settings.full_iterations,
+            ).without_jacobian(keep_hessian=True), promising))
 
     def leaves_much(self, hypothesis: Hypothesis) -> bool:
         """Return whether a hypothesis leaves more than noise in the whole tests."""
@@ -170,9 +167,7 @@ class FullFits:
         """Return a hypothesis without one of its effects, fitted until it has converged."""
         rest = self._dropped(hypothesis, effect)
         state = self.problem.start(rest.state.parameters, rest.state.point(), central=True)
-        rest = self.converged(replace(
-            rest, state=self.problem.fit(state, self.settings.iterations)))
-        return rest.without_jacobian(keep_hessian=True)
+        return self._ended(rest.effects, rest.forms, state)
 
     def simpler(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
         """Return which effects could be simpler ones that they become, each with such a one."""
@@ -203,10 +198,7 @@ class FullFits:
                       for p, size in zip(form.parameters, sizes, strict=True) if not p.is_shape})
         point, kept = taken_over(machine, point, [*rest.forms, form], rest.state.parameters)
         state = self.problem.start((*kept, *form.parameters), point)
-        found = self.converged(Hypothesis(
-            (*rest.effects, other), (*rest.forms, form),
-            self.problem.fit(state, self.settings.iterations)))
-        return found.without_jacobian(keep_hessian=True)
+        return self._ended((*rest.effects, other), (*rest.forms, form), state)
 
     def joined(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """
@@ -233,9 +225,13 @@ class FullFits:
         nuisances = [free.get(p.name, p) for p in hypothesis.state.parameters
                      if p.name not in names]
         state = self.problem.start((*nuisances, *form.parameters), point)
-        one = self.converged(Hypothesis(
-            (whole.id,), (form,), self.problem.fit(state, self.settings.iterations)))
-        return one.without_jacobian(keep_hessian=True)
+        return self._ended((whole.id,), (form,), state)
+
+    def _ended(self, effects: tuple[str, ...], forms: tuple[Form, ...],
+               state: FitState) -> Hypothesis:
+        """Return a hypothesis fitted from a state until it has converged."""
+        found = Hypothesis(effects, forms, self.problem.fit(state, self.settings.iterations))
+        return self.converged(found).without_jacobian(keep_hessian=True)
 
     def _refitted(self, shared: SharedJacobian, keep_hessian: bool,
                   hypothesis: Hypothesis) -> Hypothesis:

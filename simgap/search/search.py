@@ -197,7 +197,8 @@ class Search:
         self._take_sensitivities(none.state)
         self.progress(0.25, 'single effects')
         found = self._sorted(
-            lambda entry: added(self.problem, none, entry[1], entry[1].jacobian),
+            lambda entry: added(self.problem, none, entry[1], entry[1].jacobian,
+                                options.first_iterations),
             screened(self.problem, none.state, self.sensitivities)[:options.singles],
             options.finalists)
         if self.problem.leaves_much(none.state):
@@ -362,7 +363,8 @@ class Search:
         item, sizes = partner
         if sizes is None:
             pair = added(self.problem, base, item,
-                         jacobian_of_form(self.problem, base.state, item.form))
+                         jacobian_of_form(self.problem, base.state, item.form),
+                         self.settings.first_iterations)
         else:
             pair = added_at(self.problem, base, item, sizes)
         if pair.cost < best.cost:

@@ -19,12 +19,12 @@ Item = TypeVar('Item')
 
 
 def added(problem: LeastSquares, base: Hypothesis, item: Sensitivity,
-          columns: Jacobian) -> Hypothesis:
-    """Fit an effect on top of a hypothesis, with these derivatives, for a few iterations."""
+          columns: Jacobian, iterations: int) -> Hypothesis:
+    """Fit an effect on top of a hypothesis, with these derivatives."""
     state = problem.extended(
         base.state, item.form.parameters, [p.start for p in item.form.parameters], columns)
-    state = problem.fit(state, problem.settings.search.first_iterations)
-    return Hypothesis((*base.effects, item.effect), (*base.forms, item.form), state)
+    return Hypothesis((*base.effects, item.effect), (*base.forms, item.form),
+                      problem.fit(state, iterations))
 
 
 def added_at(problem: LeastSquares, base: Hypothesis, item: Sensitivity,
