@@ -8,16 +8,14 @@ What a user says of a machine: numbers, readings, effects, places where somethin
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 
-from simgap.logs.log import Log
-from simgap.model.declaration_check import check
 from simgap.model.declared import (
-    Angle, DrawTest, Model, ModelError, Number, OwnEffect, OwnForm, Push, Reading, Ripple,
-    Simulation,
+    Angle, Model, ModelError, Number, OwnEffect, OwnForm, Push, Reading, Ripple,
 )
 
 # Words of the declaration.
+machine = Model
 reading = Reading
 push = Push
 
@@ -174,61 +172,3 @@ def ripple(name: str, stem: str, amplitude: Number, angle: str | Angle,
     follow = angle if callable(angle) else (lambda log: log[column])
     return OwnEffect(name, cause or name.partition('.')[2].replace('_', ' '), look,
                      ripple=Ripple(stem, amplitude, follow, tuple(map(float, orders)), harmonics))
-
-
-def machine(simulate: Simulation, base: Mapping[str, Number], readings: Mapping[str, Reading],
-            effects: Sequence[OwnEffect] = (), *, per_test: Mapping[str, Number] | None = None,
-            push: Mapping[str, Push] | None = None, settles_s: float | None = None,
-            judged_hz: float | None = None, blocks: Sequence[str] = (),
-            advice: Sequence[str] = (), parallel: bool = False,
-            log: Callable[[Log], Log] | None = None,
-            tests: Mapping[str, DrawTest] | None = None,
-            limits: Mapping[str, float] | None = None) -> Model:
-    """
-    Describe a machine of your own.
-
-    Parameters
-    ----------
-    simulate
-        f(numbers, test) -> {reading: shape (n,)}. `numbers.name` is a number; `test.time` [s]
-        and `test['column']` are arrays of shape (n,), `test.push['name']` is what enters there.
-        A test may be shorter than its log, because a search looks at its beginning first
-    base
-        numbers of the model by name: `known`, `within` or `free`
-    readings
-        by name: `reading`
-    effects
-        what the model may lack: `effect` or `ripple`
-    per_test
-        numbers that each test has of its own, such as where it starts
-    push
-        places where something unknown may enter: `push` by name
-    settles_s
-        time in which the machine settles after a push [s]; None for 5 percent of the longest test
-    judged_hz
-        samples per second that are compared; None for at most 3000 samples of a test
-    blocks
-        the components in the order in which the signal passes them, for the picture
-    advice
-        tests that settle what is open, a sentence each
-    parallel
-        True if `simulate` may run in several threads at once, as compiled functions may
-    log
-        makes of a log as it was read the log that the simulation wants, e.g. with further columns
-    tests
-        what a further test may be, by kind: f(duration_s, random) -> a log with its commands and
-        without readings, drawn with `random`, a numpy Generator. `antenna-drive propose` chooses
-        among them
-    limits
-        greatest size that a reading may have in such a test, by reading
-
-    Raises
-    ------
-    ModelError : a name is there twice, or an entry is not what it should be
-
-    """
-    model = Model(simulate, dict(base), dict(readings), tuple(effects), dict(per_test or {}),
-                  dict(push or {}), settles_s, judged_hz, tuple(blocks), tuple(advice), parallel,
-                  log, dict(tests or {}), dict(limits or {}))
-    check(model)
-    return model

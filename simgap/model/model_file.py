@@ -126,7 +126,8 @@ def _model(path: Path, top: Mapping[str, Any]) -> Model:
         effects=[_effect(name, body) for name, body in _bodies('effects', top, _OF_EFFECT)],
         push={name: _push(key, name, body) for name, (key, body) in pushes.items()},
         settles_s=_optional('settles_s', top), judged_hz=_optional('judged_hz', top),
-        blocks=_list('blocks', top), advice=_list('advice', top), parallel=simulator.parallel)
+        blocks=tuple(_list('blocks', top)), advice=tuple(_list('advice', top)),
+        parallel=simulator.parallel)
 
 
 @dataclass(frozen=True)
