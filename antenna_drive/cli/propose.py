@@ -36,7 +36,8 @@ from simgap.errors import UserError
 from simgap.inputs.schema import Entry
 
 if TYPE_CHECKING:
-    from simgap.next_test.design import Proposal, TestSpace
+    from simgap.next_test.candidate import Proposal
+    from simgap.next_test.space import TestSpace
 
 _OBJECTIVES = ('separate', 'sharpen', 'detect')
 _RULES = ('d-optimal', 'random')

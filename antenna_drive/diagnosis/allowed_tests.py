@@ -18,7 +18,7 @@ from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.sheet import dump_sheet, sheet_tree, TestSheet
 import numpy as np
 from simgap.machine.contract import FloatArray, Machine, Point
-from simgap.next_test.design import TestSpace
+from simgap.next_test.space import TestSpace
 
 # Of the curve of a command [Hz].
 _DRAWN_HZ = 200.0

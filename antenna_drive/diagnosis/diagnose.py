@@ -62,7 +62,7 @@ def diagnose_recordings(recordings: Mapping[str, Recording], drive: Drive,
     """
     machine = AntennaMachine(recordings, drive, threads)
     for effect in without:
-        if effect not in machine.effects:
+        if effect not in machine.catalogue:
             raise UserError(f'{effect}: no such effect; docs/diagnosis.md lists the catalogue')
     for signal in limits or ():
         if signal not in machine.experiments[0].channels:

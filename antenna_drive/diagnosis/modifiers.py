@@ -9,6 +9,7 @@ Each entry of the catalogue, and each tolerance, declares its modifier where it 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
@@ -280,3 +281,32 @@ def scale(*fields: str) -> FieldChange:
 def set_to(*fields: str) -> FieldChange:
     """Return the modifier that sets numbers of the record."""
     return FieldChange(SET, fields)
+
+
+class KnownModifiers:
+    """
+    What parameters do, by their names: a point is plain numbers.
+
+    Attributes
+    ----------
+    of_runs, of_readings : modifiers, each with the index of the one test that it acts on, or None
+
+    """
+
+    def __init__(self) -> None:
+        self.of_runs: dict[str, tuple[RunModifier, int | None]] = {}
+        self.of_readings: dict[str, tuple[ReadingModifier, int | None]] = {}
+
+    def register(self, parameters: Iterable[Parameter]) -> None:
+        """Take further parameters."""
+        for item in parameters:
+            assert isinstance(item, AntennaParameter)
+            if isinstance(item.modifier, RunModifier):
+                self.of_runs[item.name] = item.modifier, item.experiment
+            else:
+                assert isinstance(item.modifier, ReadingModifier)
+                self.of_readings[item.name] = item.modifier, item.experiment
+
+    def of(self, name: str) -> Modifier:
+        """Return what a parameter does."""
+        return (self.of_runs.get(name) or self.of_readings[name])[0]

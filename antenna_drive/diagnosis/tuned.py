@@ -17,7 +17,8 @@ from antenna_drive.diagnosis.machine import AntennaMachine
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.recording.recording import Recording
-from simgap.fit.least_squares import LeastSquares, with_initial_conditions
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.starts import with_initial_conditions
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import DEFAULT
 

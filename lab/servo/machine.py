@@ -13,9 +13,8 @@ from lab.servo.log import CHANNELS, POSITION, ServoLog, UNITS
 from lab.servo.physics import GRAVITY
 import numpy as np
 from simgap.machine.contract import (
-    Effect, Experiment, FloatArray, Form, Machine, Parameter, Point, Regimes, TimeScales,
+    Effect, Experiment, FloatArray, Form, Machine, Motion, Parameter, Point, TimeScales,
 )
-from simgap.machine.motion import Motion
 
 # Where the model errs, neighbouring samples err alike. This many a second are judged.
 JUDGED_HZ = 20.0
@@ -99,15 +98,7 @@ class ServoMachine(Machine):
             zip(points, only or [None] * len(points), strict=True))
         return list(rows)
 
-    def regimes(self, experiment: int) -> Regimes:
-        """Return the regime of motion of each sample."""
-        return self._motion(experiment).regimes()
-
-    def covariates(self, experiment: int) -> Mapping[str, FloatArray]:
-        """Return rate, direction, load, angle, time and acceleration."""
-        return self._motion(experiment).covariates()
-
-    def _motion(self, experiment: int) -> Motion:
+    def motion(self, experiment: int) -> Motion:
         """Return the motion as it was measured, at the judged samples."""
         log, time = self.logs[experiment], self.experiments[experiment].time
         position = log.measured[::self._strides[experiment], POSITION]

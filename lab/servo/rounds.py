@@ -20,11 +20,11 @@ from lab.servo import refit as servo_refit
 from lab.servo.catalogue import BASE, catalogue, vector
 from lab.servo.log import ServoLog
 from lab.servo.machine import ServoMachine
+from lab.servo.ranking import rank_hypotheses
 from lab.servo.refit import Fit
 import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.search.hypothesis import Hypothesis
-from simgap.search.ranking import rank_hypotheses
 
 Progress = Callable[[float, str], None]
 # The effects of a model with the names of their forms, in the order in which they were added.
@@ -230,7 +230,7 @@ def _singles(problem: LeastSquares) -> list[Hypothesis]:
     """Return every single effect in its best form, after a few iterations, the best first."""
     state = problem.fit(problem.start(problem.machine.nuisances, {}), ITERATIONS)
     found = []
-    for effect in problem.machine.effects.values():
+    for effect in problem.machine.catalogue.values():
         forms = []
         for form in effect.forms:
             values = [p.start for p in form.parameters]

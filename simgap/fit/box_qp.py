@@ -29,7 +29,6 @@ class BoxQuadratic:
     """
 
     def __init__(self, hessian: FloatArray, low: FloatArray, high: FloatArray) -> None:
-        """Scale the Hessian to a diagonal of ones."""
         m = len(hessian)
         diagonal = np.diag(hessian)
         dead = diagonal <= 1e-30  # a variable that changes nothing stays where it is
@@ -41,16 +40,10 @@ class BoxQuadratic:
 
     def step(self, gradient: FloatArray, near: FloatArray | None = None) -> FloatArray:
         """
-        Return the step d within bounds that maximises gradient d - d hessian d / 2.
+        Return the step d within bounds that maximises gradient d - d hessian d / 2, shape (m,).
 
-        Parameters
-        ----------
-        gradient
-            shape (m,)
-        near
-            the step of a similar gradient, shape (m,). The search begins with what it leaves free,
-            which takes a few factors where dozens are needed without it
-
+        The search begins with what `near` leaves free, the step of a similar gradient: that takes
+        a few factors where dozens are needed without it.
         """
         hessian, low, high, scale = self._hessian, self._low, self._high, self._scale
         if near is None:

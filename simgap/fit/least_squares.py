@@ -1,93 +1,30 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Robust nonlinear least squares with bounds and Gaussian priors.
+The residuals of a machine in its experiments, as a nonlinear least-squares problem.
 
-The fits are Levenberg-Marquardt steps within a box, with iteratively reweighted residuals. A run
-of the machine is expensive and a Jacobian takes many runs. A fit therefore starts from the
-Jacobian of a fit nearby and corrects it with Broyden's rank-one updates (C. G. Broyden,
-Mathematics of Computation 19, 1965). A fresh Jacobian is taken where a fit has settled.
+    minimise  sum_i rho((measured_i - predicted_i(x)) / sigma_i) + sum_j (x_j / prior_j)^2 / 2
+    within    low <= x <= high
+
+The loss rho is in `robust_loss`, the solver in `levenberg_marquardt`. A run of the machine is
+expensive and a Jacobian takes many runs. A fit therefore starts from the Jacobian of a fit nearby.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-import math
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
-from simgap.fit.box_qp import box_constrained_step
+from simgap.fit.broyden import Jacobian
+from simgap.fit.levenberg_marquardt import LevenbergMarquardt
 from simgap.fit.noise import whitened
+from simgap.fit.robust_loss import robust_loss, robust_weight
+from simgap.fit.state import FitState, point_of, prior_precision
 from simgap.machine.contract import FloatArray, Machine, Parameter, Point
-from simgap.settings import DEFAULT, FitSettings, SearchSettings, Settings
-
-Jacobian = NDArray[np.float32]
-
-
-@dataclass(frozen=True)
-class FitState:
-    """
-    Where a fit is.
-
-    Attributes
-    ----------
-    parameters : what is fitted, m of them
-    x : their values, shape (m,)
-    residual : measured minus predicted, in standard deviations, shape (n,); zero where nothing
-        was measured
-    base_jacobian : derivative of the prediction [standard deviations per unit] as last taken,
-        shape (n, m); in single precision, because it is large and gives a direction only
-    weight : weight of each residual in iteratively reweighted least squares, shape (n,)
-    cost : sum of the robust losses (half a chi-square if all are small) and of the priors
-    broyden_errors, broyden_directions : the rank-one updates of the Jacobian since then, shapes
-        (n,) and (m,) each
-    kept_hessian : the Hessian of a state that has dropped its Jacobian
-
-    """
-
-    parameters: tuple[Parameter, ...]
-    x: FloatArray
-    residual: FloatArray
-    base_jacobian: Jacobian
-    weight: FloatArray
-    cost: float
-    broyden_errors: tuple[FloatArray, ...] = ()
-    broyden_directions: tuple[FloatArray, ...] = ()
-    kept_hessian: FloatArray | None = None
-
-    @property
-    def jacobian(self) -> Jacobian:
-        """Return the derivative of the prediction, shape (n, m); not kept, to save memory."""
-        return _updated(self.base_jacobian, self.broyden_errors, self.broyden_directions)
-
-    @property
-    def has_hessian(self) -> bool:
-        """Return whether the Hessian is known: a state may have dropped its derivatives."""
-        return self.kept_hessian is not None or self.base_jacobian.size > 0
-
-    @cached_property
-    def hessian(self) -> FloatArray:
-        """Return the Gauss-Newton Hessian without the priors, shape (m, m)."""
-        if self.kept_hessian is not None:
-            return self.kept_hessian
-        return weighted_product(self.jacobian, self.weight)
-
-    def without_jacobian(self, keep_hessian: bool = False) -> FitState:
-        """Return the state without its Jacobian, which takes most of the memory."""
-        return FitState(self.parameters, self.x, self.residual, np.empty((0, 0), np.float32),
-                        self.weight, self.cost,
-                        kept_hessian=self.hessian if keep_hessian else None)
-
-    def point(self) -> dict[str, float]:
-        """Return the values by name."""
-        return _point(self.parameters, self.x)
-
-    def value(self, name: str) -> float:
-        """Return one value by name."""
-        return self.point()[name]
+from simgap.settings import DEFAULT, Settings
 
 
 class LeastSquares:
@@ -110,7 +47,6 @@ class LeastSquares:
 
     def __init__(self, machine: Machine, used: Sequence[NDArray[np.bool_]] | None = None,
                  scale: float = 1.0, settings: Settings = DEFAULT) -> None:
-        """Lay the measured samples out in one row."""
         self.machine = machine
         self.scale = scale
         self.settings = settings
@@ -185,14 +121,14 @@ class LeastSquares:
         """Return a state of a problem with another noise scale, without its Jacobian."""
         residual = state.residual * (scale / self.scale)
         return replace(state.without_jacobian(), residual=residual,
-                       cost=self._cost(residual, state.x, prior_precision(state.parameters)))
+                       cost=self.cost(residual, state.x, prior_precision(state.parameters)))
 
-    def judged(self, state: FitState) -> FitState:
+    def evaluated(self, state: FitState) -> FitState:
         """Return a state of a problem with other noise as it is in this one, not fitted."""
         residual = self.residuals(state.point())
         return replace(state.without_jacobian(keep_hessian=True), residual=residual,
                        weight=self.weights(residual),
-                       cost=self._cost(residual, state.x, prior_precision(state.parameters)))
+                       cost=self.cost(residual, state.x, prior_precision(state.parameters)))
 
     def noise_level(self, residual: FloatArray) -> float:
         """Return the size of residuals in standard deviations of the noise, outliers clipped."""
@@ -213,21 +149,10 @@ class LeastSquares:
                  residual: FloatArray, central: bool,
                  steps: Mapping[str, float] = MappingProxyType({})) -> Jacobian:
         """
-        Return the derivative of the prediction by difference quotients.
+        Return the derivative of the prediction at a point by difference quotients, shape (n, m).
 
-        Parameters
-        ----------
-        point
-            where
-        parameters
-            with respect to what
-        residual
-            at the point, for one-sided differences
-        central
-            take central differences where the bounds leave room for them
-        steps
-            of the difference quotients, by name, where they are not the usual ones
-
+        `residual` is that at the point, for one-sided differences; `central` takes central ones
+        where the bounds leave room. `steps` has the steps, by name, that are not the usual ones.
         """
         variants, only, plan = [], [], []
         sizes = [steps.get(item.name, item.step) for item in parameters]
@@ -271,7 +196,7 @@ class LeastSquares:
               jacobian: Jacobian | None = None, central: bool = False) -> FitState:
         """Begin a fit at a point; the Jacobian is taken unless it is given."""
         x = np.array([np.clip(point.get(p.name, 0.0), p.low, p.high) for p in parameters])
-        at = _point(parameters, x)
+        at = point_of(parameters, x)
         residual = self.residuals(at)
         if jacobian is None:
             jacobian = self.jacobian(at, parameters, residual, central)
@@ -288,7 +213,8 @@ class LeastSquares:
         Return the state with a fresh Jacobian and fresh weights.
 
         Where sticking and slipping bend the prediction, a difference quotient over many standard
-        deviations is no derivative. The data that have been fitted tell how small a step may be.
+        deviations is not a derivative. The data that have been fitted show how small a step may
+        be.
         """
         jacobian = self.jacobian(state.point(), state.parameters, state.residual, False,
                                  self.local_steps(state))
@@ -311,7 +237,7 @@ class LeastSquares:
         """Return the state with more parameters, at these values, with these derivatives."""
         x = np.r_[state.x, values]
         everything = (*state.parameters, *parameters)
-        return self._state(everything, x, self.residuals(_point(everything, x)),
+        return self._state(everything, x, self.residuals(point_of(everything, x)),
                            np.column_stack([state.jacobian, columns]), state.weight)
 
     def with_columns(self, state: FitState, indices: Sequence[int],
@@ -324,50 +250,14 @@ class LeastSquares:
     def _state(self, parameters: tuple[Parameter, ...], x: FloatArray, residual: FloatArray,
                jacobian: Jacobian, weight: FloatArray) -> FitState:
         return FitState(parameters, x, residual, jacobian, weight,
-                        self._cost(residual, x, prior_precision(parameters)))
+                        self.cost(residual, x, prior_precision(parameters)))
 
     # -- fitting -------------------------------------------------------------------------------
 
     def fit(self, state: FitState, iterations: int = 10) -> FitState:
         """Run Levenberg-Marquardt iterations until they gain nothing, or this many of them."""
-        options = self.settings.fit
-        low = np.array([p.low for p in state.parameters])
-        high = np.array([p.high for p in state.parameters])
-        prior = prior_precision(state.parameters)
-        x, residual, cost, weight = state.x, state.residual, state.cost, state.weight
-        model = _LocalModel(state, options)
-        damping = options.initial_damping
-        idle = 0
-        for _ in range(iterations):
-            gradient = model.gradient(weight * residual, prior * x)
-            hessian = model.hessian + np.diag(prior)
-            diagonal = np.diag(hessian).copy()
-            step = box_constrained_step(hessian + damping * np.diag(diagonal + 1e-12), gradient,
-                                        low - x, high - x)
-            expected = float(gradient @ step - 0.5 * step @ hessian @ step)
-            if not np.any(step) or expected < options.worth_a_step * options.least_gain:
-                break
-            trial = np.clip(x + step, low, high)
-            after = self.residuals(_point(state.parameters, trial))
-            trial_cost = self._cost(after, trial, prior)
-            gained = cost - trial_cost
-            # a failed step corrects the Jacobian, too
-            model.update(step, diagonal, residual - after, weight)
-            if gained > 0.0:
-                x, residual, cost = trial, after, trial_cost
-                weight = self.weights(residual)
-                model.reweight(weight, weight * residual)
-                good = gained > options.good_step * expected
-                damping = max(damping / (options.damping_decay if good else 1.0),
-                              options.least_damping)
-                idle = idle + 1 if gained < options.least_gain else 0
-                if idle > options.idle_iterations:
-                    break
-            else:
-                damping = min(max(damping, options.damping_after_failure) * options.damping_growth,
-                              options.greatest_damping)
-        return FitState(state.parameters, x, residual, model.jacobian, weight, cost,
-                        tuple(model.errors), tuple(model.directions))
+        return LevenbergMarquardt(self.residuals, self.weights, self.cost,
+                                  self.settings.fit).minimised(state, iterations)
 
     def weights(self, residual: FloatArray) -> FloatArray:
         """Return the weight of each residual, shape (n,); 0 where nothing was measured."""
@@ -377,226 +267,6 @@ class LeastSquares:
         """Return the sum of the robust losses."""
         return robust_loss(residual, self.settings.fit.outlier)
 
-    def _cost(self, residual: FloatArray, x: FloatArray, prior: FloatArray) -> float:
+    def cost(self, residual: FloatArray, x: FloatArray, prior: FloatArray) -> float:
+        """Return the sum of the robust losses and of the priors, given their precision."""
         return self.loss(residual) + float(0.5 * x @ (prior * x))
-
-
-class _LocalModel:
-    """The linear model of the residuals about a fit, with Broyden's updates."""
-
-    def __init__(self, state: FitState, settings: FitSettings) -> None:
-        self.jacobian = state.jacobian
-        self.hessian = state.hessian.copy()
-        # the Jacobian is the given one plus a few outer products of these
-        self.errors: list[FloatArray] = []
-        self.directions: list[FloatArray] = []
-        self._settings = settings
-        self._hessian_weight = state.weight
-        self._slope = transposed_product(self.jacobian, state.weight * state.residual)
-
-    def gradient(self, weighted_residual: FloatArray, prior_slope: FloatArray) -> FloatArray:
-        """Return the gradient of the gain, shape (m,)."""
-        gradient = self._slope - prior_slope
-        for error, direction in zip(self.errors, self.directions, strict=True):
-            gradient += direction * float(error @ weighted_residual)
-        return gradient
-
-    def update(self, step: FloatArray, diagonal: FloatArray, change: FloatArray,
-               weight: FloatArray) -> None:
-        """
-        Correct the Jacobian along a step by Broyden's rule, in the metric of the Hessian.
-
-        A step whose prediction was all wrong, past a contact that was or was not made, is not
-        used.
-        """
-        metric = step * diagonal
-        length = float(step @ metric)
-        predicted = (self.jacobian @ step.astype(np.float32)).astype(np.float64)
-        for error, direction in zip(self.errors, self.directions, strict=True):
-            predicted += error * float(direction @ step)
-        wrong = change - predicted
-        if length <= 0.0 or (float(wrong @ (weight * wrong)) >= self._settings.broyden_error
-                             * float(predicted @ (weight * predicted))):
-            return
-        new = metric / length
-        weighted = weight * wrong
-        cross = transposed_product(self.jacobian, weighted)
-        for error, direction in zip(self.errors, self.directions, strict=True):
-            cross += direction * float(error @ weighted)
-        self.hessian += (np.outer(cross, new) + np.outer(new, cross)
-                         + float(wrong @ weighted) * np.outer(new, new))
-        self.errors.append(wrong)
-        self.directions.append(new)
-
-    def reweight(self, weight: FloatArray, weighted_residual: FloatArray) -> None:
-        """Take new weights and residuals; make the Hessian anew if the weights moved much."""
-        if float(np.mean(np.abs(weight - self._hessian_weight))) > self._settings.stale_weights:
-            self.hessian = weighted_product(
-                _updated(self.jacobian, self.errors, self.directions), weight)
-            self._hessian_weight = weight
-        self._slope = transposed_product(self.jacobian, weighted_residual)
-
-
-def settled(problem: LeastSquares, state: FitState, options: SearchSettings, passes: int,
-            iterations: int) -> FitState:
-    """
-    Go on with a fit, with fresh derivatives, as long as that gains much.
-
-    Parameters
-    ----------
-    problem, state
-        the fit
-    options
-        what is much
-    passes
-        greatest number of fresh Jacobians
-    iterations
-        of the fit between two of them
-
-    """
-    for _ in range(passes):
-        before = state.cost
-        state = problem.fit(problem.refreshed(state), iterations)
-        if before - state.cost < max(options.settled, options.final_gain * before):
-            break
-    return state
-
-
-def led(problem: LeastSquares, state: FitState, options: SearchSettings) -> FitState:
-    """
-    Return a fit that was led out of a local minimum, or the given one if that gains nothing.
-
-    Where motors stick and slip, the cost of a test has many minima, and a slow test holds the fit
-    to all of them in one. The cost of a test that moves smoothly leads to its optimum. So the
-    test that fits best is fitted alone, and all of them from there. If another one then fits
-    best, it leads in its turn.
-
-    Parameters
-    ----------
-    problem, state
-        the fit to all experiments, after it has stopped
-    options
-        how long a fit goes on
-
-    """
-    def fitted(part: LeastSquares, point: Point, target: float = math.inf) -> FitState:
-        begun = part.start(state.parameters, with_initial_conditions(part, dict(point)))
-        found = part.fit(begun, options.settling_iterations)
-        if found.cost >= target:
-            return found
-        return settled(part, found, options, options.final_passes, options.settling_iterations)
-
-    led_by: set[int] = set()
-    while len(led_by) < len(problem.experiments) > 1:
-        leader = problem.best_fitted(state)
-        if leader in led_by:
-            break
-        led_by.add(leader)
-        ahead = fitted(problem.of_experiment(leader), state.point())
-        found = fitted(problem, ahead.point(), state.cost)
-        if found.cost > (1.0 - options.first_gain) * state.cost:
-            break
-        state = found
-    return state
-
-
-def least_cost(problem: LeastSquares, trials: Sequence[dict[str, float]], experiment: int,
-               until: float) -> tuple[float, dict[str, float]]:
-    """
-    Return the least cost among trial points in the first part of one experiment, and its point.
-
-    Parameters
-    ----------
-    problem
-        what is fitted
-    trials
-        points; the first of them wins a tie
-    experiment
-        the one that is looked at
-    until
-        how much of it [s]
-
-    """
-    here = problem.experiments[experiment]
-    early = (here.time - here.time[0] < until)[:, np.newaxis]
-    best, least = trials[0], np.inf
-    chunk = problem.settings.fit.batch
-    for first in range(0, len(trials), chunk):
-        part = trials[first:first + chunk]
-        results = problem.machine.simulate(part, [experiment] * len(part), until)
-        for trial, result in zip(part, results, strict=True):
-            z = problem.standardised(experiment, result[experiment]).reshape(here.measured.shape)
-            cost = problem.loss(np.where(early, z, 0.0).ravel())
-            if cost < least:
-                best, least = trial, cost
-    return least, best
-
-
-def with_initial_conditions(problem: LeastSquares, point: dict[str, float]) -> dict[str, float]:
-    """Return a point with the initial conditions that fit the first moments best."""
-    until = problem.machine.time_scales.start_s
-    for k in range(len(problem.experiments)):
-        if not problem.valid[problem.rows(k)].any():
-            continue
-        for trials in problem.machine.initial_conditions(k):
-            _, point = least_cost(
-                problem, [point, *({**point, **trial} for trial in trials)], k, until)
-    return point
-
-
-def transposed_product(jacobian: Jacobian, vector: FloatArray) -> FloatArray:
-    """Return the product of the transposed Jacobian and a vector, shape (m,)."""
-    return np.asarray(jacobian.T @ vector.astype(np.float32), np.float64)
-
-
-def weighted_product(jacobian: Jacobian, weight: FloatArray,
-                     other: Jacobian | None = None) -> FloatArray:
-    """Return jacobian^T weight jacobian, or other in place of the second, shape (m, m)."""
-    other = jacobian if other is None else other
-    return np.asarray(jacobian.T @ (weight.astype(np.float32)[:, np.newaxis] * other), np.float64)
-
-
-def robust_weight(residual: FloatArray, valid: NDArray[np.bool_], outlier: float) -> FloatArray:
-    """Return the derivative of the robust loss by half the squared residual; 0 if not valid."""
-    size = np.maximum(np.abs(residual), outlier)
-    return np.asarray(np.where(valid, (outlier / size) ** 2, 0.0))
-
-
-def robust_loss(residual: FloatArray, outlier: float) -> float:
-    """
-    Return the sum of losses: half the square of small residuals, logarithmic in large ones.
-
-    After a contact that is made too late everything differs for a while. That must not bend what
-    else is known.
-    """
-    size = np.abs(residual)
-    large = np.maximum(size, outlier)
-    return float(np.sum(np.where(size < outlier, 0.5 * size ** 2,
-                                 outlier ** 2 * (0.5 + np.log(large / outlier)))))
-
-
-def prior_precision(parameters: Sequence[Parameter]) -> FloatArray:
-    """Return 1 / prior_sigma^2 of each parameter, 0 without a prior, shape (m,)."""
-    return np.array([1.0 / p.prior_sigma ** 2 if p.prior_sigma > 0.0 else 0.0
-                     for p in parameters])
-
-
-def proper_precision(parameters: Sequence[Parameter]) -> FloatArray:
-    """Return the prior precision; without a prior that of an even spread within the bounds."""
-    prior = prior_precision(parameters)
-    # one that is held has no width
-    even = np.array([12.0 / max(p.high - p.low, 1e-30) ** 2 for p in parameters])
-    return np.where(prior > 0.0, prior, even)
-
-
-def _updated(jacobian: Jacobian, errors: Sequence[FloatArray],
-             directions: Sequence[FloatArray]) -> Jacobian:
-    """Return a Jacobian with Broyden's rank-one updates."""
-    if not errors:
-        return jacobian
-    return np.asarray(jacobian + np.array(errors, np.float32).T
-                      @ np.array(directions, np.float32))
-
-
-def _point(parameters: Sequence[Parameter], x: FloatArray) -> dict[str, float]:
-    return dict(zip((p.name for p in parameters), x.tolist(), strict=True))

@@ -7,7 +7,7 @@ A test sheet tells a level, and means white noise. Real noise is louder or quiet
 and no model is its machine to the last digit. Both are described by one process: white noise plus
 a part behind a first-order low-pass. Its two levels and its corner are estimated from a residual
 by the prediction error method (L. Ljung, System Identification, 2nd edition, chapter 7), within
-bounds: what is beyond them is no noise. The innovations of the process are white. Fits and tests
+bounds: what is beyond them is not noise. The innovations of the process are white. Fits and tests
 use them, so that a slow residual counts once and not with each of its samples.
 """
 
@@ -54,15 +54,9 @@ class Process:
 
 def whitened(z: FloatArray, colour: Colour) -> FloatArray:
     """
-    Return the innovations of a residual, shape (n,), with variance 1.
+    Return the innovations of a residual at even times, shape (n,), with variance 1.
 
-    Parameters
-    ----------
-    z
-        residual at even times, shape (n,), NaN where there is none
-    colour
-        of the noise
-
+    It is NaN where there is none.
     """
     found = np.full(z.size, np.nan)
     there = np.isfinite(z)
@@ -84,26 +78,17 @@ def _innovations(z: FloatArray, pole: float, gain: float) -> FloatArray:
 def estimated(residuals: Sequence[FloatArray], interval_s: float, slow_limit: float,
               settings: NoiseSettings) -> Process:
     """
-    Return the noise process of a channel.
+    Return the noise process of a channel from the residuals of each experiment.
 
-    Parameters
-    ----------
-    residuals
-        of each experiment in standard deviations of the stated noise, shape (n,), NaN where there
-        is none
-    interval_s
-        between two samples [s]
-    slow_limit
-        greatest variance of the slow part that may be noise or a model's error
-    settings
-        thresholds
-
+    These are in standard deviations of the stated noise, shape (n,), NaN where there is none, at
+    an interval [s]. The slow part may have the variance `slow_limit`: more is neither noise nor a
+    model's error.
     """
     usable = [z for z in residuals if np.isfinite(z).sum() >= settings.least_samples]
     if not usable:
         return Process(1.0, 0.0, 0.0)
     sizes = np.concatenate([np.abs(z[np.isfinite(z)]) for z in usable])
-    # an outlier is no noise: the loss of the fits copes with it
+    # an outlier is not noise: the loss of the fits copes with it
     bound = settings.clip * max(float(np.median(sizes)) / 0.6745, settings.least_level)
     clipped = [np.clip(z, -bound, bound) for z in usable]
 
@@ -127,15 +112,8 @@ def with_estimated_noise(experiments: Sequence[Experiment], residuals: Sequence[
     """
     Return experiments whose noise is as loud and as coloured as a residual shows.
 
-    Parameters
-    ----------
-    experiments
-        with the noise that their sensors should have
-    residuals
-        of each, measured minus predicted by the best hypothesis, shape (n, c)
-    settings
-        thresholds
-
+    They come with the noise that their sensors should have. The residuals are measured minus
+    predicted by the best hypothesis, shape (n, c) each.
     """
     colours: list[Colour] = []
     for c, channel in enumerate(experiments[0].channels):
@@ -173,15 +151,9 @@ def found_noise(experiments: Sequence[Experiment]) -> dict[str, dict[str, float]
 def with_found_noise(experiments: Sequence[Experiment],
                      found: Mapping[str, Mapping[str, float]]) -> tuple[Experiment, ...]:
     """
-    Return planned experiments with the noise that other ones have shown.
+    Return planned experiments with the noise that other ones have shown, see `found_noise`.
 
-    Parameters
-    ----------
-    experiments
-        with the noise that their sensors should have
-    found
-        as `found_noise`; a signal that it lacks has the noise that it should have
-
+    A signal that was not found has the noise that it should have.
     """
     def colour(channel: str, interval: float) -> Colour:
         if channel not in found:

@@ -31,17 +31,7 @@ def power(z: FloatArray, settings: LackOfFitSettings = DEFAULT.lack_of_fit) -> f
 
 
 def slow_excess(z: FloatArray, settings: LackOfFitSettings = DEFAULT.lack_of_fit) -> float:
-    """
-    Return the power of the slow part of a residual over that of white noise, less one.
-
-    Parameters
-    ----------
-    z
-        residual at even times, shape (n,)
-    settings
-        thresholds
-
-    """
+    """Return the power of the slow part of a residual over that of white noise, less one."""
     z = _clipped(z, settings)
     length = settings.block
     count = z.size // length
@@ -84,19 +74,10 @@ def dependences(channels: Sequence[str], covariates: Sequence[Mapping[str, Float
                 residuals: Sequence[FloatArray],
                 settings: LackOfFitSettings = DEFAULT.lack_of_fit) -> list[dict[str, Any]]:
     """
-    Return what the residuals depend on, the strongest first.
+    Return what the residuals of the signals depend on, the strongest first.
 
-    Parameters
-    ----------
-    channels
-        names of the c signals
-    covariates
-        of each experiment by name, shape (n,) each
-    residuals
-        in standard deviations, shape (n, c) for each experiment
-    settings
-        thresholds
-
+    Each experiment has covariates by name, shape (n,) each, and residuals in standard deviations,
+    shape (n, c).
     """
     found = []
     for c, channel in enumerate(channels):

@@ -17,10 +17,13 @@ from dataclasses import replace
 import math
 from statistics import fmean
 
-from simgap.machine.contract import (
-    Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Point, Regimes,
-    TimeScales,
-)
+from simgap.machine.arrays import Course, FloatArray, Point
+from simgap.machine.catalogue import Catalogue
+from simgap.machine.effect import Effect, Form, Parameter
+from simgap.machine.experiment import Experiment
+from simgap.machine.machine import DisturbanceInput, Machine
+from simgap.machine.motion import Motion, TimeScales
+from simgap.machine.nuisances import Nuisances
 
 # The values of a label by test; '' where a test lacks the label.
 Groups = Mapping[str, tuple[str, ...]]
@@ -46,7 +49,7 @@ def groups_of(experiments: Sequence[Experiment]) -> dict[str, tuple[str, ...]]:
 def by_label(machine: Machine) -> Machine:
     """Return a machine whose effects may differ between labels; itself if there are none."""
     groups = groups_of(machine.experiments)
-    return ByLabel(machine, groups, {}) if groups else machine
+    return ByLabel(machine, Labels(groups, machine.nuisances)) if groups else machine
 
 
 def without_labels(machine: Machine) -> Machine:
@@ -66,35 +69,28 @@ def _split_name(name: str, key: str, value: str) -> str:
     return f'{name}[{key}={value}]'
 
 
-class ByLabel(Machine):
+class Labels:
     """
-    A machine with a further form of each effect for each label.
+    Forms with a size under each label, the names of such sizes, and points that hold them.
 
-    Parameters
-    ----------
-    inner
-        the machine
-    groups
-        from `groups_of`
-    whole
-        the form that each split form comes from, and the label; grows as forms are split
-
+    `groups` comes from `groups_of`; names of nuisances may look like those of sizes by label.
     """
 
-    def __init__(self, inner: Machine, groups: Groups,
-                 whole: dict[Form, tuple[Form, str]]) -> None:
-        """Take over what the machine says of itself."""
-        super().__init__(inner.experiments, inner.nuisances, inner.effects.values())
-        self.inner, self.groups, self._whole = inner, groups, whole
-        self.disturbance_inputs, self.notes = inner.disturbance_inputs, inner.notes
-        self.diagram, self.advice = inner.diagram, inner.advice
-        self._own = {p.name for p in inner.nuisances}
+    def __init__(self, groups: Groups, nuisances: Sequence[Parameter]) -> None:
+        self.groups = groups
+        # the form that each split form comes from, and the label; grows as forms are split
+        self._whole: dict[Form, tuple[Form, str]] = {}
+        self._own = {p.name for p in nuisances}
         self._endings = {_split_name('', key, value): (key, value)
                          for key, values in groups.items() for value in values}
 
+    def whole(self, form: Form) -> tuple[Form, str]:
+        """Return the form that a split form comes from, and the label; '' for any other form."""
+        return self._whole.get(form, (form, ''))
+
     def base_of(self, form: Form) -> Form:
         """Return the form that a split form comes from; any other form itself."""
-        return self._whole.get(form, (form, ''))[0]
+        return self.whole(form)[0]
 
     def split(self, form: Form, key: str) -> Form:
         """Return a form with sizes of its own under each value of a label."""
@@ -102,9 +98,7 @@ class ByLabel(Machine):
         self._whole[found] = (form, key)
         return found
 
-    # -- points --------------------------------------------------------------------------------
-
-    def _parts(self, name: str) -> tuple[str, tuple[str, str] | None]:
+    def parts(self, name: str) -> tuple[str, tuple[str, str] | None]:
         """Return the machine's own name of a number, and the label of its tests."""
         if name.endswith(']') and name not in self._own:
             for ending, label in self._endings.items():
@@ -112,11 +106,15 @@ class ByLabel(Machine):
                     return name.removesuffix(ending), label
         return name, None
 
+    def are_in(self, point: Point) -> bool:
+        """Return whether a point has sizes by label."""
+        return any(self.parts(name)[1] is not None for name in point)
+
     def at(self, point: Point, labels: Mapping[str, str]) -> dict[str, float]:
         """Return a point as it is in a test with some labels, in the machine's own names."""
         found, special = {}, {}
         for name, value in point.items():
-            base, label = self._parts(name)
+            base, label = self.parts(name)
             if label is None:
                 found[base] = value
             elif labels.get(label[0], '') == label[1]:
@@ -125,25 +123,88 @@ class ByLabel(Machine):
 
     def in_test(self, point: Point, experiment: int) -> dict[str, float]:
         """Return a point as it is in one test, in the machine's own names."""
-        return self.at(point, self.experiments[experiment].labels)
+        return self.at(point, {key: values[experiment] for key, values in self.groups.items()})
 
-    def _is_split(self, point: Point) -> bool:
-        return any(self._parts(name)[1] is not None for name in point)
+    def mean(self, point: Point) -> dict[str, float]:
+        """Return a point with one size for all tests, the mean of those by label."""
+        parts: dict[str, list[float]] = {}
+        for name, value in point.items():
+            parts.setdefault(self.parts(name)[0], []).append(value)
+        return {name: fmean(values) for name, values in parts.items()}
+
+
+class _LabelledCatalogue(Catalogue):
+    """A catalogue with a further form of each effect for each label."""
+
+    def __init__(self, inner: Catalogue, labels: Labels) -> None:
+        super().__init__(inner.values())
+        self._inner, self._labels = inner, labels
+
+    def forms(self, effect: Effect, experiments: Sequence[Experiment],
+              residuals: Sequence[FloatArray]) -> Sequence[Form]:
+        """Return the forms that are worth a fit, with one size for all tests and split."""
+        whole = self._inner.forms(effect, experiments, residuals)
+        return [*whole, *(self._labels.split(form, key) for form in whole if can_be_split(form)
+                          for key in self._labels.groups)]
+
+    def typical_form(self, effect: Effect) -> Form:
+        return self._inner.typical_form(effect)
+
+    def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
+        base, key = self._labels.whole(form)
+        found = self._inner.counterpart(base, effect, part)
+        return self._labels.split(found, key) if key else found
+
+
+class _LabelledNuisances(Nuisances):
+    """Nuisances beside effects that may have a size under each label."""
+
+    def __init__(self, inner: Nuisances, labels: Labels) -> None:
+        super().__init__(inner, inner.initial_conditions)
+        self._inner, self._labels = inner, labels
+
+    def absorb(self, point: Point, removed: Point) -> dict[str, float]:
+        """Return the nuisances that take over what they can; sizes count with their mean."""
+        return self._inner.absorb(point, self._labels.mean(removed))
+
+    def take_over(self, point: Point, forms: Sequence[Form]) -> tuple[dict[str, float], set[str]]:
+        """Return a point at which effects alone stand for their numbers, under each label."""
+        labels = self._labels
+        bases = [labels.base_of(form) for form in forms]
+        result, held = dict(point), set[str]()
+        for k in range(len(next(iter(labels.groups.values())))):
+            found, names = self._inner.take_over(labels.in_test(point, k), bases)
+            result.update({name: value for name, value in found.items() if name in result})
+            held |= names
+            for p in (p for form in forms for p in form.parameters):
+                base, label = labels.parts(p.name)
+                if label is None or labels.groups[label[0]][k] == label[1]:
+                    result[p.name] = found[base]
+        return result, held
+
+
+class ByLabel(Machine):
+    """A machine with a further form of each effect for each label of its tests."""
+
+    def __init__(self, inner: Machine, labels: Labels) -> None:
+        super().__init__(inner.experiments, _LabelledNuisances(inner.nuisances, labels),
+                         _LabelledCatalogue(inner.catalogue, labels))
+        self.inner, self.labels = inner, labels
+        self.disturbance_inputs, self.notes = inner.disturbance_inputs, inner.notes
+        self.diagram, self.advice = inner.diagram, inner.advice
 
     # -- readings ------------------------------------------------------------------------------
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
-        """Return the readings of one test; see `Machine.predict`."""
-        return self.inner.predict(self.in_test(point, experiment), experiment)
+        return self.inner.predict(self.labels.in_test(point, experiment), experiment)
 
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
                  until: float = math.inf) -> list[list[FloatArray | None]]:
-        """Return the readings of several variants; see `Machine.simulate`."""
         count = len(self.experiments)
         jobs: list[tuple[int, Point, int | None]] = []
         for i, (point, one) in enumerate(zip(points, only or [None] * len(points), strict=True)):
-            if self._is_split(point):
-                jobs += [(i, self.in_test(point, k), k)
+            if self.labels.are_in(point):
+                jobs += [(i, self.labels.in_test(point, k), k)
                          for k in (range(count) if one is None else (one,))]
             else:
                 jobs.append((i, point, one))
@@ -156,97 +217,40 @@ class ByLabel(Machine):
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
                            course: Course) -> list[FloatArray]:
-        """Return the readings with an unknown input; see `Machine.simulate_disturbed`."""
-        if not self._is_split(point):
+        if not self.labels.are_in(point):
             return self.inner.simulate_disturbed(point, place, course)
-        return [self.inner.simulate_disturbed(self.in_test(point, k), place, course)[k]
+        return [self.inner.simulate_disturbed(self.labels.in_test(point, k), place, course)[k]
                 for k in range(len(self.experiments))]
 
-    # -- variants of the machine ---------------------------------------------------------------
+    # -- what the machine within knows ---------------------------------------------------------
+
+    @property
+    def time_scales(self) -> TimeScales:
+        return self.inner.time_scales
+
+    def motion(self, experiment: int) -> Motion:
+        return self.inner.motion(experiment)
 
     def _around(self, inner: Machine) -> Machine:
-        return self if inner is self.inner else ByLabel(inner, self.groups, self._whole)
+        return self if inner is self.inner else ByLabel(inner, self.labels)
 
     def truncated(self) -> Machine:
-        """Return the machine with as much of each test as a search needs."""
         return self._around(self.inner.truncated())
 
     def low_fidelity(self) -> Machine:
-        """Return a faster machine."""
         return self._around(self.inner.low_fidelity())
 
     def with_experiments(self, experiments: Sequence[Experiment]) -> Machine:
-        """Return the machine with the same tests, of which more is known."""
         return self._around(self.inner.with_experiments(experiments))
 
     def without(self, effects: Collection[str]) -> Machine:
-        """Return the machine with a catalogue that lacks some effects."""
         return self._around(self.inner.without(effects))
 
     def with_noise_at(self, point: Point) -> Machine:
         """Return the machine with the noise of a motion; sizes count with their mean."""
-        return self._around(self.inner.with_noise_at(self.mean(point)))
-
-    def mean(self, point: Point) -> dict[str, float]:
-        """Return a point with one size for all tests, the mean of those by label."""
-        parts: dict[str, list[float]] = {}
-        for name, value in point.items():
-            parts.setdefault(self._parts(name)[0], []).append(value)
-        return {name: fmean(values) for name, values in parts.items()}
-
-    # -- what the machine knows better ---------------------------------------------------------
-
-    @property
-    def time_scales(self) -> TimeScales:
-        """Return how fast the machine is."""
-        return self.inner.time_scales
-
-    def initial_conditions(self, experiment: int) -> Sequence[Sequence[Point]]:
-        """Return initial conditions that are tried out before a fit."""
-        return self.inner.initial_conditions(experiment)
-
-    def regimes(self, experiment: int) -> Regimes:
-        """Return the regime of motion of each sample."""
-        return self.inner.regimes(experiment)
-
-    def covariates(self, experiment: int) -> Mapping[str, FloatArray]:
-        """Return quantities that a residual may depend on."""
-        return self.inner.covariates(experiment)
-
-    def forms(self, effect: Effect, residuals: Sequence[FloatArray]) -> Sequence[Form]:
-        """Return the forms that are worth a fit, with one size for all tests and split."""
-        whole = self.inner.forms(effect, residuals)
-        return [*whole, *(self.split(form, key) for form in whole if _can_be_split(form)
-                          for key in self.groups)]
-
-    def typical_form(self, effect: Effect) -> Form:
-        """Return the form of an effect by which planned tests are judged."""
-        return self.inner.typical_form(effect)
-
-    def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
-        """Return the form of an effect's part that corresponds to a form of the effect."""
-        base, key = self._whole.get(form, (form, ''))
-        found = self.inner.counterpart(base, effect, part)
-        return self.split(found, key) if key else found
-
-    def absorb(self, point: Point, removed: Point) -> dict[str, float]:
-        """Return the nuisances that take over what they can; sizes count with their mean."""
-        return self.inner.absorb(point, self.mean(removed))
-
-    def take_over(self, point: Point, forms: Sequence[Form]) -> tuple[dict[str, float], set[str]]:
-        """Return a point at which effects alone stand for their numbers, under each label."""
-        bases = [self.base_of(form) for form in forms]
-        result, held = dict(point), set[str]()
-        for k in range(len(self.experiments)):
-            found, names = self.inner.take_over(self.in_test(point, k), bases)
-            result.update({name: value for name, value in found.items() if name in result})
-            held |= names
-            for p in (p for form in forms for p in form.parameters):
-                base, label = self._parts(p.name)
-                if label is None or self.groups[label[0]][k] == label[1]:
-                    result[p.name] = found[base]
-        return result, held
+        return self._around(self.inner.with_noise_at(self.labels.mean(point)))
 
 
-def _can_be_split(form: Form) -> bool:
+def can_be_split(form: Form) -> bool:
+    """Return whether a form may have a size under each value of a label."""
     return not form.is_course and all(p.experiment is None for p in form.parameters)

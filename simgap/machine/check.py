@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a machine keeps its contract: what is missing or wrong is told by name, before a fit."""
+"""Whether a machine keeps its contract: what is missing or wrong is named before a fit."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import math
 
 import numpy as np
 from simgap.errors import UserError
-from simgap.machine.contract import Effect, Experiment, Form, Machine, Parameter
+from simgap.machine.effect import Effect, Form, Parameter
+from simgap.machine.experiment import Experiment
+from simgap.machine.machine import Machine
 
 _RESERVED = ('none', 'unknown')
 
@@ -39,9 +41,9 @@ def check_machine(machine: Machine) -> None:
         _check_parameter('nuisance', item, count)
         if item.name in nuisances[:number]:
             raise MachineError(f'nuisance {item.name}: the name is there twice')
-    for key, effect in machine.effects.items():
+    for key, effect in machine.catalogue.items():
         _check_effect(key, effect, machine, count)
-    if len(machine.nuisances) == 0 and not machine.effects:
+    if len(machine.nuisances) == 0 and not machine.catalogue:
         raise MachineError('neither nuisances nor effects: nothing may differ from the model')
     predicted = machine.simulate([{}])[0]
     for experiment, readings in zip(machine.experiments, predicted, strict=True):
@@ -56,8 +58,8 @@ def idle_effects(machine: Machine) -> Iterator[str]:
     and one that changes a reading while its size is zero is not neutral.
     """
     neutral = machine.simulate([{}])[0]
-    for effect in machine.effects.values():
-        form = machine.typical_form(effect)
+    for effect in machine.catalogue.values():
+        form = machine.catalogue.typical_form(effect)
         points = [form.start, *({**form.start, p.name: 0.5 * bound}
                                 for p in form.sizes for bound in (p.low, p.high) if bound)]
         changes = [_change(machine, neutral, readings) for readings in machine.simulate(points)]
@@ -134,7 +136,7 @@ def _check_effect(key: str, effect: Effect, machine: Machine, experiments: int) 
         raise MachineError(f'{name}: id: {effect.id!r} given, allowed is component.effect')
     for field in ('parts', 'simpler'):
         for other in getattr(effect, field):
-            if other not in machine.effects:
+            if other not in machine.catalogue:
                 raise MachineError(f'{name}: {field}: {other}: no such effect')
     if not effect.forms:
         raise MachineError(f'{name}: forms: there is none')

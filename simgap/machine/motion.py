@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""Regimes and covariates of a machine that moves to and fro, from its rate, load and angle."""
+"""How a machine moves: its time scales, and its regimes and covariates to and fro."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import math
 
 import numpy as np
-from simgap.machine.contract import FloatArray, Regimes
+from numpy.typing import NDArray
+from simgap.machine.arrays import FloatArray
 
 _NAMES = ('reversal', 'stick', 'saturation', 'high load', 'constant rate')
 # Below this share of the greatest rate the machine stands still.
@@ -19,29 +20,68 @@ _HIGH_LOAD_QUANTILE, _SATURATED = 0.85, 0.97
 
 
 @dataclass(frozen=True)
+class Regimes:
+    """The regime of motion of each sample: `labels`, shape (n,), are indices into `names`."""
+
+    names: tuple[str, ...]
+    labels: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class TimeScales:
+    """
+    How fast the machine is, which the search and the localisation need to know.
+
+    Attributes
+    ----------
+    start_s : time within which the effect of the initial conditions shows [s]
+    scan_s : length of the part of a test that a scan of parameter values looks at [s]
+    pulse_s : rise time of the pulses of an unknown input [s]
+    response_s : time after which the response to such a pulse has ended [s]
+    block_s : time beyond which residuals are independent, for the bootstrap [s]
+
+    """
+
+    start_s: float
+    scan_s: float
+    pulse_s: float
+    response_s: float
+    block_s: float
+
+    @classmethod
+    def of_duration(cls, duration_s: float) -> TimeScales:
+        """Return usual scales for tests of a duration [s]."""
+        return cls(start_s=0.05 * duration_s, scan_s=0.27 * duration_s,
+                   pulse_s=0.005 * duration_s, response_s=0.05 * duration_s,
+                   block_s=0.03 * duration_s)
+
+
+@dataclass(frozen=True)
 class Motion:
     """
-    How a machine moves in an experiment.
+    How a machine moves in an experiment, as far as it is known.
 
     Attributes
     ----------
     time : shape (n,) [s]
-    rate, load, angle : shape (n,), in any unit
+    rate, load, angle : shape (n,), in any unit; None for an unknown one
     load_limit : load at which the drive saturates
     reversal_s : time after a reversal that still belongs to it [s]
 
     """
 
     time: FloatArray
-    rate: FloatArray
-    load: FloatArray
-    angle: FloatArray
+    rate: FloatArray | None = None
+    load: FloatArray | None = None
+    angle: FloatArray | None = None
     load_limit: float = math.inf
     reversal_s: float = 0.4
 
     def regimes(self) -> Regimes:
         """Return the regime of each sample; a later test overrides an earlier one."""
-        moving = self._moving()
+        if self.rate is None:
+            return Regimes(('whole test',), np.zeros(self.time.size, np.int64))
+        moving = _moving(self.rate)
         direction = np.where(moving, np.sign(self.rate), 0.0)
         last = np.arange(self.time.size)
         last[direction == 0.0] = 0
@@ -51,20 +91,25 @@ class Motion:
         if reversals.size:
             k = np.searchsorted(reversals, self.time, side='right') - 1
             since = np.where(k >= 0, self.time - reversals[np.maximum(k, 0)], np.inf)
-        size = np.abs(self.load)
         labels = np.full(self.time.size, _NAMES.index('constant rate'))
-        labels[size > np.quantile(size, _HIGH_LOAD_QUANTILE)] = _NAMES.index('high load')
-        labels[size > _SATURATED * self.load_limit] = _NAMES.index('saturation')
+        if self.load is not None:
+            size = np.abs(self.load)
+            labels[size > np.quantile(size, _HIGH_LOAD_QUANTILE)] = _NAMES.index('high load')
+            labels[size > _SATURATED * self.load_limit] = _NAMES.index('saturation')
         labels[since < self.reversal_s] = _NAMES.index('reversal')
         labels[~moving] = _NAMES.index('stick')
         return Regimes(_NAMES, labels)
 
     def covariates(self) -> Mapping[str, FloatArray]:
-        """Return what a residual may depend on."""
-        return {'rate': self.rate, 'direction': np.sign(self.rate) * self._moving(),
-                'load': self.load, 'angle': self.angle, 'time': self.time,
-                'acceleration': np.gradient(self.rate, self.time)}
+        """Return quantities that a residual may depend on, shape (n,) each."""
+        if self.rate is None:
+            return {'time': self.time}
+        found = {'rate': self.rate, 'direction': np.sign(self.rate) * _moving(self.rate),
+                 'load': self.load, 'angle': self.angle, 'time': self.time,
+                 'acceleration': np.gradient(self.rate, self.time)}
+        return {name: values for name, values in found.items() if values is not None}
 
-    def _moving(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-        rate = np.abs(self.rate)
-        return np.asarray(rate > _STILL * (rate.max() + 1e-30))
+
+def _moving(rate: FloatArray) -> NDArray[np.bool_]:
+    size = np.abs(rate)
+    return np.asarray(size > _STILL * (size.max() + 1e-30))

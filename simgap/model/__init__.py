@@ -11,9 +11,9 @@ from simgap.logs.log import Log, LogError, OneTest, read_log, read_logs
 from simgap.model.allowed_tests import own_tests, OwnTests
 from simgap.model.checking import check_model, Checked
 from simgap.model.declaration import (
-    effect, form, free, known, machine, Model, ModelError, push, reading, ripple, shape, size,
-    within,
+    effect, form, free, known, machine, push, reading, ripple, shape, size, within,
 )
+from simgap.model.declared import Model, ModelError
 from simgap.model.diagnose import diagnose_logs, pushes_found, summary_of
 from simgap.model.loading import load_model
 from simgap.model.machine import OwnMachine

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from simgap.logs.log import Log
 from simgap.machine.contract import FloatArray, Machine, Point
-from simgap.model.declaration import Model, ModelError
+from simgap.model.declared import Model, ModelError
 from simgap.model.machine import OwnMachine
-from simgap.next_test.design import TestSpace
+from simgap.next_test.space import TestSpace
 import yaml
 
 

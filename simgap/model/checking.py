@@ -14,7 +14,7 @@ from simgap.errors import UserError
 from simgap.logs.log import Log, OneTest
 from simgap.machine.check import check_machine, idle_effects
 from simgap.machine.contract import FloatArray, Parameter
-from simgap.model.declaration import Model
+from simgap.model.declared import Model
 from simgap.model.machine import OwnMachine
 from simgap.model.named_numbers import Numbers
 from simgap.model.response import NO_RESPONSE, StepResponse, tests_of, where_it_acts
@@ -125,7 +125,7 @@ def _rough(machine: OwnMachine) -> Iterator[str]:
 
 def _rough_effects(machine: OwnMachine) -> Iterator[str]:
     """Yield numbers of effects by which a fit will be hard."""
-    for effect in machine.effects.values():
+    for effect in machine.catalogue.values():
         form = effect.forms[0]
         for parameter in form.sizes:
             if not any(StepResponse.at(machine, parameter, k, form.start).acts

@@ -23,7 +23,7 @@ from simgap.inputs.schema import nearest
 from simgap.logs.log import Log
 from simgap.machine.by_label import ByLabel, without_labels
 from simgap.machine.contract import Machine, Point
-from simgap.model.declaration import Model
+from simgap.model.declared import Model
 from simgap.model.machine import OwnMachine
 from simgap.model.pushes import pushes
 from simgap.model.response import derivative_error
@@ -77,9 +77,9 @@ def diagnose_logs(model: Model, logs: Sequence[Log],
     """
     machine = OwnMachine(model, logs)
     for effect in without:
-        if effect not in machine.effects:
-            raise UserError(f'{effect}: no such effect{nearest(effect, machine.effects)}; there '
-                            f'are {", ".join(machine.effects)}')
+        if effect not in machine.catalogue:
+            raise UserError(f'{effect}: no such effect{nearest(effect, machine.catalogue)}; there '
+                            f'are {", ".join(machine.catalogue)}')
     for name in limits or ():
         if name not in model.readings:
             raise UserError(f'{name}: no such reading{nearest(name, model.readings)}; there are '
@@ -103,7 +103,7 @@ def numbers_as_fitted(machine: Machine, point: Point) -> dict[str, Any]:
     own = without_labels(machine)
     assert isinstance(own, OwnMachine)
     model = own.model
-    points = [machine.in_test(point, k) if isinstance(machine, ByLabel) else point
+    points = [machine.labels.in_test(point, k) if isinstance(machine, ByLabel) else point
               for k in range(len(own.logs))]
     fitted = [own.numbers(here, k) for k, here in enumerate(points)]
     numbers: dict[str, Any] = {

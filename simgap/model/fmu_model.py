@@ -28,7 +28,7 @@ import numpy as np
 from simgap.errors import one_line
 from simgap.inputs.schema import nearest
 from simgap.machine.contract import FloatArray
-from simgap.model.declaration import ModelError
+from simgap.model.declared import ModelError
 from simgap.model.simulator import Ports
 
 _NUMBERS = {'2': ('Real',), '3': ('Float64',)}

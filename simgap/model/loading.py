@@ -11,7 +11,7 @@ import traceback
 
 from simgap.errors import UserError
 from simgap.inputs.schema import nearest
-from simgap.model.declaration import Model, ModelError
+from simgap.model.declared import Model, ModelError
 from simgap.model.model_file import load_model_file
 
 _USUAL_NAME = 'machine'

@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 import math
 from threading import RLock
 import traceback
@@ -15,22 +14,16 @@ from simgap.errors import UserError
 from simgap.inputs.schema import nearest
 from simgap.logs.log import beginning, Log, LogError, OneTest
 from simgap.machine.contract import (
-    Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point,
-    Regimes, TimeScales,
+    Course, DisturbanceInput, Experiment, FloatArray, Machine, Motion, Parameter, Point,
+    TimeScales,
 )
 from simgap.machine.diagram import Diagram
-from simgap.machine.motion import Motion
-from simgap.model.declaration import Model, ModelError, Number, OwnEffect, Reading
+from simgap.model.declared import Angle, Model, ModelError, Number, Reading
+from simgap.model.effects import absent, ORDER_MARK, OwnCatalogue
 from simgap.model.named_numbers import Numbers
-from simgap.model.orders import likely_orders, USUAL_ORDERS
 
 # Samples of a test that are compared unless the model says how many per second.
 _SAMPLES = 3000
-# Stands between the stem of a ripple's numbers and its order.
-_ORDER_MARK = '@'
-_CYCLES = ' cycles'
-# Orders of a ripple that a fit is tried with where they are not given.
-_FOUND_ORDERS = 4
 
 
 class OwnMachine(Machine):
@@ -51,24 +44,23 @@ class OwnMachine(Machine):
     """
 
     def __init__(self, model: Model, logs: Sequence[Log]) -> None:
-        """Prepare the experiments, the numbers and the catalogue."""
         self.model = model
         self.logs = [model.log(log) if model.log else log for log in logs]
         self._strides = [_stride(log, model.judged_hz) for log in self.logs]
         self._lock = None if model.parallel else RLock()
         self._values = {
             **{name: item.value for name, item in (*model.base.items(), *model.per_test.items())},
-            **{name: value for effect in model.effects for name, value in _absent(effect)}}
+            **{name: value for effect in model.effects for name, value in absent(effect)}}
         super().__init__([self._experiment(log, stride) for log, stride
                           in zip(self.logs, self._strides, strict=True)],
-                         self._nuisances(), [_effect(item) for item in model.effects])
+                         self._nuisances(), OwnCatalogue(model.effects, self._angles))
         # which number, and of which test, each parameter stands for
         self._places: dict[str, tuple[str, int | None]] = {
             **{name: (name, None) for name in model.base},
             **{f'{name}[{log.name}]': (name, k) for name in model.per_test
                for k, log in enumerate(self.logs)},
             **{f'{item.name}.{name}': (name, None) for item in model.effects
-               for name, _ in _absent(item)}}
+               for name, _ in absent(item)}}
         self.disturbance_inputs = tuple(
             DisturbanceInput(item.label, item.component) for item in model.push.values())
         self.advice = tuple(((), text) for text in model.advice)
@@ -80,7 +72,7 @@ class OwnMachine(Machine):
         """Return the numbers of the simulation in one test at a point of the diagnosis."""
         values = dict(self._values)
         for full, change in point.items():
-            name, _, order = full.partition(_ORDER_MARK)
+            name, _, order = full.partition(ORDER_MARK)
             number, test = self._places.get(full) or self._places.get(name) or ('', None)
             if not number or test not in (None, experiment):
                 continue  # an error of a reading, or of another test
@@ -93,7 +85,7 @@ class OwnMachine(Machine):
 
     def number_of(self, parameter: str) -> str:
         """Return which number of the simulation a parameter is or changes; '' for none."""
-        name = parameter.partition(_ORDER_MARK)[0]
+        name = parameter.partition(ORDER_MARK)[0]
         return (self._places.get(parameter) or self._places.get(name) or ('', None))[0]
 
     def _nuisances(self) -> list[Parameter]:
@@ -113,7 +105,6 @@ class OwnMachine(Machine):
     # -- readings ------------------------------------------------------------------------------
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
-        """Return the readings of one log at its judged samples; see `Machine.predict`."""
         return self.pushed(point, experiment, {})
 
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
@@ -129,7 +120,6 @@ class OwnMachine(Machine):
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
                            course: Course) -> list[FloatArray]:
-        """Return the readings with an unknown input; see `Machine.simulate_disturbed`."""
         name = self.push_at(place.name)
         size = self.model.push[name].size
         return [self.pushed(point, k, {name: size * course(log.time)})
@@ -208,43 +198,17 @@ class OwnMachine(Machine):
                                                                    0.27 * longest)),
                           pulse_s=0.1 * settles, response_s=settles, block_s=settles)
 
-    def form_named(self, effect: Effect, name: str) -> Form:
-        """Return the form of an effect by its name; that of a ripple says its order."""
-        own = next(item for item in self.model.effects if item.name == effect.id)
-        if own.ripple is None:
-            return super().form_named(effect, name)
-        try:
-            return _ripple_form(own, float(name.removesuffix(_CYCLES)))
-        except ValueError:
-            raise KeyError(f'{effect.id}: {name}') from None
+    def _angles(self, angle: Angle) -> list[FloatArray]:
+        """Return an angle in each test at its judged samples [rad]."""
+        return [angle(log)[::stride] for log, stride in zip(self.logs, self._strides, strict=True)]
 
-    def forms(self, effect: Effect, residuals: Sequence[FloatArray]) -> Sequence[Form]:
-        """Return the forms that are worth a fit: of a ripple, orders that stand out."""
-        own = next(item for item in self.model.effects if item.name == effect.id)
-        if own.ripple is None or own.ripple.orders:
-            return effect.forms
-        angles = [own.ripple.angle(log)[::stride]
-                  for log, stride in zip(self.logs, self._strides, strict=True)]
-        orders = likely_orders(self.experiments, residuals, angles, _FOUND_ORDERS)
-        return tuple(_ripple_form(own, order) for order in orders)
-
-    def regimes(self, experiment: int) -> Regimes:
-        """Return the regime of motion of each sample."""
-        return self._motion(experiment).regimes()
-
-    def covariates(self, experiment: int) -> Mapping[str, FloatArray]:
-        """Return rate, direction, angle, time and acceleration, as measured."""
-        found = dict(self._motion(experiment).covariates())
-        del found['load']
-        return found
-
-    def _motion(self, experiment: int) -> Motion:
+    def motion(self, experiment: int) -> Motion:
         """Return the motion by the first reading, which is taken for a position."""
         log, time = self.logs[experiment], self.experiments[experiment].time
         name, item = next(iter(self.model.readings.items()))
         position = log[item.column or name][::self._strides[experiment]]
         rate = np.gradient(position, time)
-        return Motion(time, rate=rate, load=np.zeros_like(time), angle=position,
+        return Motion(time, rate=rate, angle=position,
                       reversal_s=min(0.4, 2.0 * self.time_scales.start_s))
 
     def _experiment(self, log: Log, stride: int) -> Experiment:
@@ -281,42 +245,6 @@ def _offset(name: str, item: Number, experiment: int | None, full: str = '') -> 
 
 def _error_of_reading(name: str, unit: str, by: float, experiment: int | None) -> Parameter:
     return Parameter(name, unit, -by, by, 0.01 * by, 0.5 * by, experiment)
-
-
-def _absent(effect: OwnEffect) -> Iterator[tuple[str, float]]:
-    """Yield the numbers of an effect as they are without it."""
-    if effect.ripple is not None:
-        yield f'{effect.ripple.stem}_order', 1.0
-        yield from dict.fromkeys((*effect.ripple.fundamental, *effect.ripple.higher), 0.0).items()
-    for form in effect.forms:
-        yield from ((name, item.value) for name, item in form.numbers.items())
-
-
-def _effect(item: OwnEffect) -> Effect:
-    if item.ripple is not None:
-        forms = [_ripple_form(item, order) for order in item.ripple.orders or USUAL_ORDERS]
-    else:
-        forms = [Form(form.name, tuple(_parameter(f'{item.name}.{name}', number)
-                                       for name, number in form.numbers.items()))
-                 for form in item.forms]
-    return Effect(item.name, item.component, item.cause, item.look, tuple(forms),
-                  simpler=(item.simpler,) if item.simpler else ())
-
-
-def _parameter(name: str, item: Number) -> Parameter:
-    return Parameter(name, item.unit, item.low, item.high, item.quotient_step, start=item.value,
-                     is_shape=item.is_shape, tolerance=item.tolerance, least_step=item.step)
-
-
-def _ripple_form(item: OwnEffect, order: float) -> Form:
-    wave = item.ripple
-    assert wave is not None
-    # higher harmonics mean nothing without the fundamental, as the shape of other effects
-    numbers = {**dict.fromkeys(wave.fundamental, wave.amplitude),
-               **dict.fromkeys(wave.higher, replace(wave.amplitude, is_shape=True))}
-    return Form(f'{order:g}{_CYCLES}', tuple(
-        _parameter(f'{item.name}.{name}{_ORDER_MARK}{order:g}', number)
-        for name, number in numbers.items()), scanned=True, is_wave=True)
 
 
 def _diagram(model: Model) -> Diagram:

@@ -20,10 +20,8 @@ from simgap.inputs.plain_yaml import read_yaml
 from simgap.inputs.schema import Entry, mapping_of, ParameterError, quoted
 from simgap.logs.log import OneTest
 from simgap.machine.contract import FloatArray
-from simgap.model.declaration import (
-    effect, free, known, machine, Model, ModelError, Number, OwnEffect, Push, Reading, shape, size,
-    within,
-)
+from simgap.model.declaration import effect, free, known, machine, shape, size, within
+from simgap.model.declared import Model, ModelError, Number, OwnEffect, Push, Reading
 from simgap.model.named_numbers import Numbers
 from simgap.model.simulator import Ports, Simulator
 
@@ -128,7 +126,8 @@ def _model(path: Path, top: Mapping[str, Any]) -> Model:
         effects=[_effect(name, body) for name, body in _bodies('effects', top, _OF_EFFECT)],
         push={name: _push(key, name, body) for name, (key, body) in pushes.items()},
         settles_s=_optional('settles_s', top), judged_hz=_optional('judged_hz', top),
-        blocks=_list('blocks', top), advice=_list('advice', top), parallel=simulator.parallel)
+        blocks=tuple(_list('blocks', top)), advice=tuple(_list('advice', top)),
+        parallel=simulator.parallel)
 
 
 @dataclass(frozen=True)

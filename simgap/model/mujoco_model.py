@@ -21,7 +21,7 @@ from mujoco.rollout import Rollout
 import numpy as np
 from simgap.inputs.schema import nearest
 from simgap.machine.contract import FloatArray
-from simgap.model.declaration import ModelError
+from simgap.model.declared import ModelError
 from simgap.model.simulator import Ports
 
 _PLACE = re.compile(r'(?P<kind>\w+)\.(?:(?P<name>.+)\.)?(?P<field>\w+)(?:\[(?P<index>\d+)\])?')

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from simgap.inputs.schema import nearest
-from simgap.model.declaration import ModelError
+from simgap.model.declared import ModelError
 
 
 class Numbers(Mapping[str, float]):

@@ -69,7 +69,7 @@ def derivative_error(machine: OwnMachine) -> float:
     """
     places: list[tuple[Parameter, Point]] = [(parameter, {}) for parameter in machine.nuisances]
     places += [(parameter, where_it_acts(form, parameter))
-               for effect in machine.effects.values() for form in effect.forms
+               for effect in machine.catalogue.values() for form in effect.forms
                for parameter in form.sizes]
     return max((StepResponse.at(machine, parameter, k, point).roughness
                 for parameter, point in places for k in tests_of(machine, parameter)),

@@ -70,7 +70,7 @@ def unseen(diagnosis: Diagnosis, log: Log,
     found = {}
     points: list[Point] = [{}, *(refitted(whole, h) for h in (diagnosis.none, diagnosis.best))]
     if isinstance(whole, ByLabel):
-        points = [whole.at(point, log.labels) for point in points]
+        points = [whole.labels.at(point, log.labels) for point in points]
     readings = [other.pushed(_carried(machine, log.name, point), 0, push or {})
                 for point in points]
     for j, (name, item) in enumerate(machine.model.readings.items()):

@@ -11,7 +11,7 @@ for the other.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import cache
 import math
@@ -21,12 +21,13 @@ import numpy as np
 from scipy.optimize import brentq
 from simgap.fit.box_qp import BoxQuadratic
 from simgap.fit.cholesky import factored, ROUNDING, solved
-from simgap.fit.least_squares import FitState, LeastSquares, prior_precision, proper_precision
+from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import with_model_error
+from simgap.fit.state import FitState, prior_precision, proper_precision
 from simgap.machine.contract import FloatArray, Machine, Parameter
 from simgap.settings import DEFAULT, Settings
 
-# a size is told to this share of itself
+# a size is found to this share of itself
 _SHARE = 0.01
 
 
@@ -73,49 +74,34 @@ class Confusability:
         return found
 
     def separated(self) -> float:
-        """Return the share of all pairs of effects that can be told apart."""
+        """Return the share of all pairs of effects that can be distinguished."""
         m = len(self.effects)
         pairs = self.alike[np.triu_indices(m, 1)]
         return float(np.mean(pairs < self.limit)) if pairs.size else 1.0
 
 
 def confusability(machine: Machine, progress: Callable[[float], None] = lambda share: None,
-                  settings: Settings = DEFAULT, inflated: float = 1.0) -> Confusability:
+                  settings: Settings = DEFAULT, inflated: float = 1.0,
+                  among: Collection[str] = ()) -> Confusability:
     """
     Say which effects the tests of a machine can tell apart.
 
-    Parameters
-    ----------
-    machine
-        whose measured readings are those that its model predicts
-    progress
-        called with the share that is done
-    settings
-        thresholds
-    inflated
-        by what differences of the cost are divided
-
+    The measured readings are those that the model predicts. `progress` is called with the share
+    that is done, `inflated` divides differences of the cost, and `among` names the effects that
+    are asked for, or all.
     """
     problem = LeastSquares(machine.with_experiments(
         with_model_error(machine.experiments, settings.noise)), settings=settings)
-    return visibility(problem, problem.start(machine.nuisances, {}), progress, inflated)
+    return visibility(problem, problem.start(machine.nuisances, {}), progress, inflated, among)
 
 
 def visibility(problem: LeastSquares, state: FitState,
                progress: Callable[[float], None] = lambda share: None,
-               inflated: float = 1.0) -> Confusability:
+               inflated: float = 1.0, among: Collection[str] = ()) -> Confusability:
     """
     Say how large each effect must be to show beside a fit of the nuisances, and what it is like.
 
-    Parameters
-    ----------
-    problem, state
-        the tests, and a fit of the nuisances with its Jacobian
-    progress
-        called with the share that is done
-    inflated
-        by what differences of the cost are divided
-
+    `state` is that fit, with its Jacobian; the others are as in `confusability`.
     """
     machine, settings = problem.machine, problem.settings
     jacobian = state.jacobian
@@ -125,9 +111,10 @@ def visibility(problem: LeastSquares, state: FitState,
     ids, units, sizes, remainders = [], [], [], []
     price = inflated * (settings.penalty.effect + settings.penalty.parameter)
     imitation = _Imitation(state, settings.interval.derivative_error)
-    for i, effect in enumerate(machine.effects.values()):
-        progress(i / len(machine.effects))
-        form = machine.typical_form(effect)
+    asked = [effect for effect in machine.catalogue.values() if not among or effect.id in among]
+    for i, effect in enumerate(asked):
+        progress(i / len(asked))
+        form = machine.catalogue.typical_form(effect)
         first = form.parameters[0]
         column = problem.jacobian({**state.point(), **form.start}, [first], state.residual,
                                   central=False)[:, 0]
@@ -160,17 +147,9 @@ class _Imitation:
         """
         Return the size from which an effect is named, whichever sign it has.
 
-        It is then larger than its tolerance, and more than its price is left of it.
-
-        Parameters
-        ----------
-        number
-            the effect's first
-        power, cross
-            products of its column with itself and with those of the nuisances, shape (m,)
-        price
-            in halves of a chi-square
-
+        It is then larger than its tolerance, and more than its `price` [half chi-square] is left
+        of it. `number` is the effect's first; `power` and `cross`, shape (m,), are the products of
+        its column with itself and with those of the nuisances.
         """
         # where nothing imitates it; a little less, so that rounding does not make it visible
         least = (1.0 - _SHARE) * math.sqrt(2.0 * price / power) if power > 0.0 else math.inf

@@ -11,24 +11,24 @@ the others: what derivatives promise is not always kept.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 import math
-from pathlib import Path
 from statistics import fmean
-from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from simgap.fit.blas import one_blas_thread
 from simgap.fit.noise import with_found_noise
-from simgap.machine.contract import FloatArray, Machine, Point
+from simgap.machine.contract import FloatArray, Machine
+from simgap.next_test.candidate import Candidate, coarseness_of, of_each_family, Proposal
 from simgap.next_test.confusability import confusability
-from simgap.next_test.discrimination import deviations, known_to, refitted, Separation, separation
-from simgap.next_test.rivals import Findings, Rival
+from simgap.next_test.discrimination import deviations, separation
+from simgap.next_test.rival_fits import confirmed_separation
+from simgap.next_test.rivals import Findings, known_to
+from simgap.next_test.separation import Separation
+from simgap.next_test.space import TestSpace
 from simgap.settings import DEFAULT, Settings
 
 SEPARATE, SHARPEN, DETECT = OBJECTIVES = ('separate', 'sharpen', 'detect')
@@ -48,9 +48,7 @@ CRITERIA: Mapping[str, str] = {
     D_OPTIMAL: "D-optimality: determinant of the covariance of all the likeliest rival's numbers "
                '(Kiefer and Wolfowitz 1959)',
     RANDOM: 'none: the first test within the limits'}
-# An effect that does not show at any size is as bad as this many times the best.
-_NEVER = 1e3
-# Information below this is none [nat].
+# Less information than this does not count [nat].
 _NOTHING = 1e-6
 
 Progress = Callable[[float, str], None]
@@ -59,70 +57,6 @@ Progress = Callable[[float, str], None]
 def objective_for(findings: Findings, settings: Settings = DEFAULT) -> str:
     """Return what the next test is for: to tell open answers apart, or to contradict them."""
     return SEPARATE if findings.are_open(settings) else DETECT
-
-
-class TestSpace(ABC):
-    """
-    The tests that a machine may run.
-
-    Attributes
-    ----------
-    families : names of the kinds of test
-    limits : that a test must keep, by name
-
-    """
-
-    __test__ = False  # not a test case, whatever pytest makes of the name
-
-    families: Sequence[str]
-    limits: Mapping[str, float] = MappingProxyType({})
-
-    @abstractmethod
-    def draw(self, family: str, random: np.random.Generator) -> Any:
-        """Return a test of a family, drawn at random."""
-
-    @abstractmethod
-    def machine(self, test: Any) -> Machine:
-        """Return the machine in this test alone; what it measured does not count."""
-
-    @abstractmethod
-    def use(self, machine: Machine, points: Sequence[Point]) -> Mapping[str, float]:
-        """
-        Return the share of each limit that a test uses, 1 at the limit.
-
-        Parameters
-        ----------
-        machine
-            from `machine`
-        points
-            variants of it; the worst one counts
-
-        """
-
-    def nearby(self, family: str, test: Any, random: np.random.Generator) -> Any:
-        """Return a test like another one; by default another of the same family."""
-        return self.draw(family, random)
-
-    def command(self, test: Any) -> tuple[FloatArray, FloatArray, str] | None:
-        """Return times [s] and values of the command of a test, shape (n,), and their unit."""
-        return None
-
-    def as_data(self, test: Any) -> Any:
-        """Return a test as plain data, for the JSON."""
-        return repr(test)
-
-    def files(self, test: Any, path: Path) -> Mapping[Path, str]:
-        """Return the texts of the files from which a test is run, the first one at `path`."""
-        return {path: f'{self.as_data(test)}\n'}
-
-    def unread(self, machine: Machine, one: Point, other: Point) -> Mapping[str, float]:
-        """
-        Return by how much two variants differ in what no sensor reads.
-
-        The rms of the difference as a share of the rms of the signal, by signal. By default
-        nothing is known.
-        """
-        return {}
 
 
 @dataclass(frozen=True)
@@ -149,79 +83,6 @@ class DesignEffort:
     confirmed: int = 2
     rounds: int = 3
     margin: float = 0.9
-
-
-@dataclass(frozen=True)
-class Judged:
-    """
-    A test and what it is expected to tell.
-
-    Attributes
-    ----------
-    family, test : as the test space has drawn it
-    use : share of each limit that it uses, the worst of all rivals
-    score : by the criterion; the larger the better
-    coarseness : smallest size of each effect of the catalogue that shows, over that in the best
-        test that was judged, in the geometric mean; NaN where it was not asked for
-    told : how well it tells the rivals apart to first order
-    confirmed : the same with every rival fitted to the readings of the others
-    kept : while not confirmed, the share of its promise that counts: as other tests of its
-        family have kept theirs
-    deviations : of each number of the effects, its standard deviation before and after
-    sizes : of each effect, the smallest size that shows, and its unit
-
-    """
-
-    family: str
-    test: Any
-    use: Mapping[str, float]
-    score: float = 0.0
-    coarseness: float = math.nan
-    told: Separation | None = None
-    confirmed: Separation | None = None
-    kept: float = 1.0
-    deviations: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    sizes: Mapping[str, tuple[float, str]] = field(default_factory=dict)
-
-    @property
-    def separation(self) -> Separation | None:
-        """Return how well it tells the rivals apart, confirmed if it was."""
-        return self.confirmed or self.told
-
-    @property
-    def tightest(self) -> tuple[str, float]:
-        """Return the limit that it uses most, and its share."""
-        return max(self.use.items(), key=lambda item: item[1], default=('', 0.0))
-
-
-@dataclass(frozen=True)
-class Proposal:
-    """
-    What was found.
-
-    Attributes
-    ----------
-    objective, criterion : what was asked for, and by which rule
-    rivals : that were to be told apart
-    tests : judged ones that help, the best first; none if no test within the limits helps
-    refused : how many drawn tests each limit has cost
-    beyond : if no test helps, the best ones beyond the limits
-    alike : pairs of rivals that no judged test tells apart, with what no sensor reads in which
-        they differ, the greatest difference first
-    tried : number of tests that were simulated
-    unnamed : where something without a name may act, see `Findings`
-
-    """
-
-    objective: str
-    criterion: str
-    rivals: Sequence[Rival]
-    tests: Sequence[Judged]
-    refused: Mapping[str, int]
-    beyond: Sequence[Judged] = ()
-    alike: Sequence[tuple[int, int, Mapping[str, float]]] = ()
-    tried: int = 0
-    unnamed: Mapping[str, float] = field(default_factory=dict)
 
 
 class TestDesign:
@@ -253,13 +114,12 @@ class TestDesign:
                  objective: str = SEPARATE, suspected: Sequence[str] = (), threads: int = 2,
                  settings: Settings = DEFAULT, effort: DesignEffort = DesignEffort(),
                  seed: int = 0) -> None:
-        """Prepare to search."""
         self._space, self._findings = space, findings
         self._rivals, self._inflated = findings.rivals, findings.inflated
         self._objective, self._suspected = objective, list(suspected)
         self._threads, self._settings, self._effort = threads, settings, effort
         self._random = np.random.default_rng(seed)
-        self._judge: Callable[[Judged], Judged] = {
+        self._judge: Callable[[Candidate], Candidate] = {
             SEPARATE: self._separated, SHARPEN: self._sharpened, D_OPTIMAL: self._sharpened,
             DETECT: self._detected, RANDOM: lambda test: test}[objective]
 
@@ -273,11 +133,11 @@ class TestDesign:
 
         """
         effort = self._effort
-        drawn = [Judged(family, self._space.draw(family, self._random), {})
+        drawn = [Candidate(family, self._space.draw(family, self._random), {})
                  for _ in range(effort.drawn) for family in self._space.families]
         with one_blas_thread(), ThreadPoolExecutor(self._threads) as pool:
             progress(0.0, 'tests within the limits')
-            screened: list[Judged] = []
+            screened: list[Candidate] = []
             for test in pool.map(self._screened, drawn):
                 screened.append(test)
                 progress(0.3 * len(screened) / len(drawn), 'tests within the limits')
@@ -290,7 +150,7 @@ class TestDesign:
                 chosen = self._random.permutation(len(allowed))[:1]
                 return self._proposal([allowed[i] for i in chosen], refused, (), len(drawn))
             progress(0.3, 'the best with all tolerances free')
-            judged = self._compared(pool.map(self._judge, _of_each_family(
+            judged = self._compared(pool.map(self._judge, of_each_family(
                 allowed, effort.judged)))
             progress(0.55, 'variants of the best')
             variants = [replace(test, test=self._space.nearby(test.family, test.test,
@@ -302,25 +162,25 @@ class TestDesign:
             if self._objective == SEPARATE:
                 judged = self._with_fits(judged, pool)
             helpful = [test for test in judged if self._helps(test)]
-            beyond: Sequence[Judged] = ()
+            beyond: Sequence[Candidate] = ()
             if not helpful:
-                beyond = self._compared(pool.map(self._judge, _of_each_family(
+                beyond = self._compared(pool.map(self._judge, of_each_family(
                     [test for test in screened if not self._allowed(test)], effort.varied)))
         progress(1.0, 'done')
         return self._proposal(helpful, refused, [test for test in beyond if self._helps(test)],
                               len(drawn) + len(variants), judged)
 
-    def _proposal(self, tests: Sequence[Judged], refused: Mapping[str, int],
-                  beyond: Sequence[Judged], tried: int, judged: Sequence[Judged] = (),
+    def _proposal(self, tests: Sequence[Candidate], refused: Mapping[str, int],
+                  beyond: Sequence[Candidate], tried: int, judged: Sequence[Candidate] = (),
                   ) -> Proposal:
         return Proposal(self._objective, CRITERIA[self._objective], self._rivals, tests, refused,
                         beyond, self._alike(judged), tried,
                         self._findings.unnamed if self._objective in _BY_SIZES else {})
 
-    def _allowed(self, test: Judged) -> bool:
+    def _allowed(self, test: Candidate) -> bool:
         return test.tightest[1] <= self._effort.margin
 
-    def _helps(self, test: Judged) -> bool:
+    def _helps(self, test: Candidate) -> bool:
         least = self._settings.planning.least_information
         if test.separation is not None:
             return test.separation.information(self._temperature) >= least
@@ -333,11 +193,11 @@ class TestDesign:
     def _temperature(self) -> float:
         return self._settings.verdict.temperature
 
-    def _score(self, told: Separation) -> float:
+    def _score(self, found: Separation) -> float:
         """Return the information that is left if less of the evidence comes true."""
-        return told.information(self._temperature, self._settings.planning.caution)
+        return found.information(self._temperature, self._settings.planning.caution)
 
-    def _planned(self, test: Judged) -> Machine:
+    def _planned(self, test: Candidate) -> Machine:
         """Return the machine in a test, as noisy as it has been so far."""
         machine = self._space.machine(test.test)
         return machine.with_experiments(with_found_noise(
@@ -345,24 +205,24 @@ class TestDesign:
 
     # -- judging one test ----------------------------------------------------------------------
 
-    def _screened(self, test: Judged) -> Judged:
+    def _screened(self, test: Candidate) -> Candidate:
         """Simulate a test with each rival; no rival's numbers follow yet."""
         machine = self._planned(test).low_fidelity()
         points = [known_to(machine, rival) for rival in self._rivals] or [{}]
         use = self._space.use(machine, points)
         if self._objective != SEPARATE:
             return replace(test, use=use)
-        told = separation(machine, self._rivals, self._inflated, self._settings, follow=False)
-        return replace(test, use=use, score=self._score(told))
+        rough = separation(machine, self._rivals, self._inflated, self._settings, follow=False)
+        return replace(test, use=use, score=self._score(rough))
 
-    def _separated(self, test: Judged) -> Judged:
+    def _separated(self, test: Candidate) -> Candidate:
         """Judge a test with all tolerances free, to first order, and what else it shows."""
         machine = self._planned(test)
-        told = separation(machine, self._rivals, self._inflated, self._settings)
-        # no size is told, only their mean is compared
-        return replace(test, told=told, sizes=self._sizes(machine.low_fidelity()))
+        promised = separation(machine, self._rivals, self._inflated, self._settings)
+        # no size is reported, only their mean is compared
+        return replace(test, promised=promised, sizes=self._sizes(machine.low_fidelity()))
 
-    def _with_fits(self, judged: Sequence[Judged], pool: ThreadPoolExecutor) -> list[Judged]:
+    def _with_fits(self, judged: Sequence[Candidate], pool: ThreadPoolExecutor) -> list[Candidate]:
         """
         Confirm the best tests until no other one promises more, and put those first.
 
@@ -372,31 +232,31 @@ class TestDesign:
         for _ in range(self._effort.rounds):
             if not best or best[0].confirmed is not None:
                 break
-            promised = [test for test in best if test.confirmed is None]
+            others = [test for test in best if test.confirmed is None]
             count = self._effort.confirmed
             known = [*(test for test in best if test.confirmed is not None),
-                     *pool.map(self._confirmed, promised[:count])]
+                     *pool.map(self._confirmed, others[:count])]
             kept = self._kept(known)
             best = self._compared([*known, *(
-                replace(test, kept=kept.get(test.family, 1.0)) for test in promised[count:])])
+                replace(test, kept=kept.get(test.family, 1.0)) for test in others[count:])])
         return sorted(best, key=lambda test: test.confirmed is None)
 
-    def _kept(self, confirmed: Iterable[Judged]) -> dict[str, float]:
+    def _kept(self, confirmed: Iterable[Candidate]) -> dict[str, float]:
         """Return the share of the promises of each family that fits have kept, in the mean."""
         shares: dict[str, list[float]] = {}
         for test in confirmed:
-            assert test.told is not None and test.confirmed is not None
+            assert test.promised is not None and test.confirmed is not None
             shares.setdefault(test.family, []).append(
-                self._score(test.confirmed) / max(self._score(test.told), _NOTHING))
+                self._score(test.confirmed) / max(self._score(test.promised), _NOTHING))
         return {family: min(fmean(found), 1.0) for family, found in shares.items()}
 
-    def _confirmed(self, test: Judged) -> Judged:
-        """Fit each rival to the readings of the others; what is left then counts in full."""
-        return replace(test, kept=1.0, confirmed=refitted(
+    def _confirmed(self, test: Candidate) -> Candidate:
+        """Fit each rival to the readings of the others; the rest then counts in full."""
+        return replace(test, kept=1.0, confirmed=confirmed_separation(
             self._planned(test), self._rivals, self._inflated, self._settings,
-            test.told.shrunk if test.told else ()))
+            test.promised.shrunk if test.promised else ()))
 
-    def _sharpened(self, test: Judged) -> Judged:
+    def _sharpened(self, test: Candidate) -> Candidate:
         """Judge how well a test determines the numbers of the likeliest rival."""
         machine = self._planned(test)
         rival = max(self._rivals, key=lambda item: item.probability)
@@ -411,7 +271,7 @@ class TestDesign:
             names[j]: (math.sqrt(before[j, j]), math.sqrt(max(after[j, j], 0.0)))
             for j in wanted})
 
-    def _detected(self, test: Judged) -> Judged:
+    def _detected(self, test: Candidate) -> Candidate:
         """Judge a test by what it shows, or the tests so far have shown."""
         shown = self._findings.shown
         return replace(test, sizes={
@@ -423,28 +283,27 @@ class TestDesign:
         machine = machine.with_experiments([
             replace(e, measured=machine.predict({}, k))
             for k, e in enumerate(machine.experiments)])
-        machine.effects = {name: effect for name, effect in machine.effects.items()
-                           if not self._suspected or name in self._suspected}
-        found = confusability(machine, settings=self._settings, inflated=self._inflated)
+        found = confusability(machine, settings=self._settings, inflated=self._inflated,
+                              among=self._suspected)
         return {name: (float(size), unit) for name, size, unit in zip(
             found.effects, found.detectable, found.units, strict=True)}
 
-    def _compared(self, tests: Iterable[Judged]) -> list[Judged]:
+    def _compared(self, tests: Iterable[Candidate]) -> list[Candidate]:
         """Return judged tests by their scores, the best first."""
         found = list(tests)
         if self._objective in _BY_SIZES:
             found = [replace(test, coarseness=coarseness, score=self._compound(test, coarseness))
                      for test, coarseness in zip(
-                         found, _coarseness(found, self._weights(found)), strict=True)]
+                         found, coarseness_of(found, self._weights(found)), strict=True)]
         return sorted(found, key=lambda test: -test.score)
 
-    def _weights(self, tests: Sequence[Judged]) -> FloatArray:
+    def _weights(self, tests: Sequence[Candidate]) -> FloatArray:
         """Return how likely each effect is what has no name yet, as far as the verdict says."""
         names = list(tests[0].sizes) if tests else []
         weight = np.ones(len(names)) / max(len(names), 1)
         if not self._findings.unnamed or not names:
             return weight
-        effects = self._space.machine(tests[0].test).effects
+        effects = self._space.machine(tests[0].test).catalogue
         own = {part: np.array([effects[name].component == part for name in names])
                for part in self._findings.unnamed}
         known = {part: share for part, share in self._findings.unnamed.items() if own[part].any()}
@@ -453,7 +312,7 @@ class TestDesign:
             weight += share * own[part] / np.count_nonzero(own[part])
         return weight
 
-    def _compound(self, test: Judged, coarseness: float) -> float:
+    def _compound(self, test: Candidate, coarseness: float) -> float:
         """
         Return what a test tells of the rivals and of other effects, by their weights.
 
@@ -462,52 +321,29 @@ class TestDesign:
         if test.separation is None:
             return -math.log(coarseness)
         unlisted = max(self._settings.planning.unlisted, self._findings.unlisted)
-        told = test.kept * self._score(test.separation)
-        return ((1.0 - unlisted) * math.log(max(told, _NOTHING))
+        information = test.kept * self._score(test.separation)
+        return ((1.0 - unlisted) * math.log(max(information, _NOTHING))
                 - unlisted * math.log(coarseness))
 
     # -- what no test tells --------------------------------------------------------------------
 
-    def _alike(self, judged: Sequence[Judged]) -> list[tuple[int, int, Mapping[str, float]]]:
+    def _alike(self, judged: Sequence[Candidate]) -> list[tuple[int, int, Mapping[str, float]]]:
         """Return the pairs of rivals that no judged test tells apart."""
-        told = [test for test in judged if test.separation is not None]
+        compared = [test for test in judged if test.separation is not None]
         limit = self._settings.planning.alike * self._temperature
         found = []
         for i, j in combinations(range(len(self._rivals)), 2):
-            lacks = [test.separation.least_lack()[i, j] for test in told
+            lacks = [test.separation.least_lack()[i, j] for test in compared
                      if test.separation is not None]
             if lacks and max(lacks) < limit:
-                best = told[int(np.argmax(lacks))]
+                best = compared[int(np.argmax(lacks))]
                 found.append((i, j, self._unread(best, i, j)))
         return found
 
-    def _unread(self, test: Judged, i: int, j: int) -> Mapping[str, float]:
+    def _unread(self, test: Candidate, i: int, j: int) -> Mapping[str, float]:
         machine = self._planned(test)
         one = known_to(machine, self._rivals[i])
         other = test.confirmed.points[i, j] if test.confirmed else (
             known_to(machine, self._rivals[j]))
         unread = self._space.unread(machine, one, other)
         return dict(sorted(unread.items(), key=lambda item: -item[1]))
-
-
-def _coarseness(tests: Sequence[Judged], weights: FloatArray) -> list[float]:
-    """Return for each test the sizes that show, over the least of all, in the geometric mean."""
-    if not tests:
-        return []
-    sizes = np.array([[size for size, _ in test.sizes.values()] for test in tests])
-    seen = np.isfinite(sizes).any(axis=0)
-    if not seen.any():
-        return [1.0] * len(tests)
-    shown = sizes[:, seen]
-    over = np.minimum(shown / shown.min(axis=0), _NEVER)
-    return np.exp(np.average(np.log(over), axis=1, weights=weights[seen])).tolist()
-
-
-def _of_each_family(tests: Sequence[Judged], most: int) -> list[Judged]:
-    """Return the best tests of every family in turn: rough scores compare no families."""
-    best = sorted(tests, key=lambda test: -test.score)
-    families: dict[str, list[Judged]] = {}
-    for test in best:
-        families.setdefault(test.family, []).append(test)
-    rank = {id(test): k for group in families.values() for k, test in enumerate(group)}
-    return sorted(best, key=lambda test: rank[id(test)])[:most]

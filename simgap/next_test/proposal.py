@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 from simgap.machine.contract import FloatArray
-from simgap.next_test.design import DesignEffort, Judged, Proposal, SEPARATE, TestSpace
-from simgap.next_test.discrimination import known_to
-from simgap.next_test.rivals import Rival
+from simgap.next_test.candidate import Candidate, Proposal
+from simgap.next_test.design import DesignEffort, SEPARATE
+from simgap.next_test.rivals import known_to, Rival
+from simgap.next_test.space import TestSpace
 from simgap.settings import DEFAULT, Settings
 
 _OTHERS, _SENSORS, _SIZES = 4, 3, 12
@@ -68,13 +69,13 @@ def as_data(proposal: Proposal, space: TestSpace, settings: Settings = DEFAULT) 
     return found
 
 
-def _told(test: Judged, rivals: Sequence[Rival], settings: Settings) -> dict[str, Any]:
+def _told(test: Candidate, rivals: Sequence[Rival], settings: Settings) -> dict[str, Any]:
     """Return what a test is expected to tell, as plain data."""
     found: dict[str, Any] = {'score': test.score}
     if test.deviations:
         found['deviations'] = {name: {'before': before, 'after': after}
                                for name, (before, after) in test.deviations.items()}
-    told, first = test.separation, test.told
+    told, first = test.separation, test.promised
     if told is not None:
         temperature, sure = settings.verdict.temperature, settings.planning.sure
         after = told.posterior(temperature)

@@ -76,7 +76,7 @@ class Rival:
         KeyError : the machine's catalogue lacks an effect or a form
 
         """
-        return [machine.form_named(machine.effects[effect], form)
+        return [machine.catalogue.form_named(machine.catalogue[effect], form)
                 for effect, form in zip(self.effects, self.forms, strict=True)]
 
     def is_known_to(self, machine: Machine) -> bool:
@@ -118,7 +118,7 @@ class Rival:
 
         Raises
         ------
-        KeyError, TypeError, ValueError, AttributeError : it is none
+        KeyError, TypeError, ValueError, AttributeError : it is not a rival
 
         """
         names = tuple(data['names'])
@@ -183,7 +183,7 @@ class Findings:
         Take the findings from the entry `planning` of a verdict.
 
         A verdict of an earlier version lacks noise, doubts, what has shown or where something
-        unnamed may be, which is no error.
+        unnamed may be, which is not an error.
 
         Raises
         ------
@@ -196,6 +196,17 @@ class Findings:
                    {part: float(share) for part, share in planning.get('unnamed', {}).items()})
 
 
+def known_to(machine: Machine, rival: Rival) -> dict[str, float]:
+    """Return a rival's values as far as the planned tests have these numbers."""
+    own = {p.name for p in numbers_of(machine, rival)}
+    return {name: value for name, value in rival.point.items() if name in own}
+
+
+def numbers_of(machine: Machine, rival: Rival) -> list[Parameter]:
+    """Return the numbers of a machine that has the effects of a rival."""
+    return [*machine.nuisances, *(p for form in rival.forms_of(machine) for p in form.parameters)]
+
+
 def rivals_of(problem: LeastSquares, answers: Sequence[Answer], inflated: float,
               settings: PlanningSettings,
               doubted: Callable[[Hypothesis], Mapping[str, Doubt]] = lambda hypothesis: {},
@@ -203,19 +214,9 @@ def rivals_of(problem: LeastSquares, answers: Sequence[Answer], inflated: float,
     """
     Return the likeliest answers of a verdict with what is known of their numbers.
 
-    Parameters
-    ----------
-    problem
-        the whole tests
-    answers
-        of the verdict, the likeliest first
-    inflated
-        variance over that with independent noise, see `intervals.inflation`
-    settings
-        thresholds
-    doubted
-        returns what tells whether a hypothesis' effects are larger than their tolerances
-
+    `answers` has the likeliest first. `inflated` is the variance over that with independent noise,
+    and `doubted` returns what tells whether a hypothesis' effects are larger than their
+    tolerances.
     """
     found = []
     for answer in answers[:settings.rivals]:
@@ -257,17 +258,9 @@ def within(values: FloatArray, known: FloatArray, place: int, low: float, high: 
     Return the mean and the covariance of normal numbers, given that one is within bounds.
 
     The others follow it by regression (N. L. Johnson, S. Kotz, N. Balakrishnan, Continuous
-    Univariate Distributions, volume 1, chapter 13, section 10.1).
-
-    Parameters
-    ----------
-    values, known
-        mean, shape (m,), and covariance, shape (m, m)
-    place
-        of the one
-    low, high
-        its bounds; they may be equal or infinite
-
+    Univariate Distributions, volume 1, chapter 13, section 10.1). `values`, shape (m,), and
+    `known`, shape (m, m), are mean and covariance; the bounds of the one in this place may be
+    equal or infinite.
     """
     variance = known[place, place]
     if variance <= 0.0:

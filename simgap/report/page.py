@@ -83,7 +83,7 @@ class Contents:
 
 def contents(diagnosis: Diagnosis) -> Contents:
     """Return what the page about a diagnosis says."""
-    result, effects = diagnosis.result, diagnosis.machine.effects
+    result, effects = diagnosis.result, diagnosis.machine.catalogue
     title, lead = _VERDICTS[result['verdict']]
     suspicion = dict.fromkeys((effect.component for effect in effects.values()), 0.0)
     for entry in result['which']:
@@ -136,7 +136,7 @@ def _advice(diagnosis: Diagnosis) -> list[str]:
     names = {name for group in result['confusable'] for name in group}
     for entry in result['which']:
         if entry['probability'] > _OPEN:
-            names |= {name for name in entry['effects'] if name in diagnosis.machine.effects}
+            names |= {name for name in entry['effects'] if name in diagnosis.machine.catalogue}
     if len(names) < 2 and result['verdict'] in ('explained', 'no_gap'):
         return []
     kinds = {name.partition('.')[2] for name in names}

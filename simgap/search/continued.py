@@ -14,7 +14,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from simgap.fit.least_squares import LeastSquares, settled, with_initial_conditions
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.starts import settled, with_initial_conditions
 from simgap.next_test.rivals import Rival
 from simgap.search.hypothesis import Hypothesis
 
@@ -25,16 +26,6 @@ def continued(problem: LeastSquares, rivals: Sequence[Rival],
     Return answers of an earlier verdict as they fit all tests, at the sensors' own noise.
 
     Two answers of the same fit are one. One whose effects the machine does not know is left out.
-
-    Parameters
-    ----------
-    problem
-        all tests, those of the earlier verdict and others
-    rivals
-        its answers
-    concurrently
-        maps a function over them
-
     """
     unique = {(rival.effects, rival.forms): rival for rival in rivals
               if rival.is_known_to(problem.machine)}

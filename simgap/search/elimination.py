@@ -13,66 +13,22 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 import math
-from typing import Protocol
 
+from simgap.search.full_fits import FullFits
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import Settings
 from simgap.verdict import verdict
 
 
-class Fits(Protocol):
-    """What runs fits until they have converged, see `full_fits.FullFits`."""
-
-    def converged(self, hypothesis: Hypothesis) -> Hypothesis:
-        """Go on with a fit."""
-
-    def without(self, hypothesis: Hypothesis, effect: str) -> Hypothesis:
-        """Return a hypothesis without one of its effects, fitted until it has converged."""
-
-    def simpler(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
-        """Return which effects could be simpler ones that they become, each with such a one."""
-
-    def elsewhere(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
-        """Return which effects could act in another place, each with the effect there."""
-
-    def exchanged(self, hypothesis: Hypothesis, effect: str, other: str) -> Hypothesis:
-        """Return a hypothesis with another effect in the place of one, fitted to its end."""
-
-    def joined(self, hypothesis: Hypothesis) -> Hypothesis | None:
-        """Return one effect in place of the same one in each of its places; None if not so."""
-
-    def with_another(self, hypothesis: Hypothesis) -> list[Hypothesis]:
-        """Return a hypothesis whose fit has converged with each of a few more effects."""
-
-    def leaves_much(self, hypothesis: Hypothesis) -> bool:
-        """Return whether a hypothesis leaves more than noise."""
-
-    def judged_by(self, best: Hypothesis,
-                  hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Return hypotheses with their costs at the noise that one of them leaves."""
-
-
-def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings: Settings,
+def backward_elimination(fits: FullFits, hypotheses: Sequence[Hypothesis], settings: Settings,
                          ) -> tuple[list[Hypothesis], Hypothesis]:
     """
     Test each doubtful effect of the best hypothesis, until the best has none.
 
     Where its effects are one effect in each of its places, this one is tried, too, and so is a
-    simpler effect that one of them becomes at an end of its range.
-
-    Parameters
-    ----------
-    fits
-        to the whole tests, which the hypotheses come from
-    hypotheses
-        fitted ones, the nuisances alone first
-    settings
-        thresholds
-
-    Returns
-    -------
-    the hypotheses in their order, and the best of them with a fit that has converged
-
+    simpler effect that one of them becomes at an end of its range. Of the hypotheses, fitted to
+    the whole tests, the nuisances alone are the first. They are returned in their order, with the
+    best of them, whose fit has converged.
     """
     found = {frozenset(h.effects): h for h in hypotheses}
     tried: set[frozenset[str]] = set()
@@ -107,10 +63,10 @@ def backward_elimination(fits: Fits, hypotheses: Sequence[Hypothesis], settings:
             best, converged = leading, fits.converged(leading)
 
 
-def settled_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
-                   settings: Settings) -> tuple[list[Hypothesis], Hypothesis]:
+def converged_rivals(fits: FullFits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
+                     settings: Settings) -> tuple[list[Hypothesis], Hypothesis]:
     """
-    Take fits close behind the best to their ends, too: only there can they be told apart.
+    Take fits close behind the best to their ends, too: only there can they be distinguished.
 
     A rival may be close only together with a partner that is no larger than its tolerance. It is
     then fitted without the partner, and so is the best itself. An effect in another place is a
@@ -157,28 +113,13 @@ def settled_rivals(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesi
     return list(found.values()), best
 
 
-def forward_selection(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
+def forward_selection(fits: FullFits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
                       settings: Settings) -> tuple[list[Hypothesis], Hypothesis]:
     """
     Add effects one after the other, until none is worth its price.
 
-    A single effect is left alone if it leaves only noise: the search has tried its partners.
-
-    Parameters
-    ----------
-    fits
-        to the whole tests, which the hypotheses come from
-    hypotheses
-        from `backward_elimination`
-    best
-        the best of them, with a fit that has converged
-    settings
-        thresholds
-
-    Returns
-    -------
-    the hypotheses, and the best of them with a fit that has converged
-
+    A single effect is left alone if it leaves only noise: the search has tried its partners. Taken
+    and returned are the hypotheses, and the best of them with a fit that has converged.
     """
     found = list(hypotheses)
     while (0 < len(best.effects) < settings.search.most_effects
@@ -188,10 +129,10 @@ def forward_selection(fits: Fits, hypotheses: Sequence[Hypothesis], best: Hypoth
         more = fits.with_another(best)
         if not more:
             break
-        found = fits.judged_by(min(more, key=lambda h: h.cost), [*found, *more])
+        found = fits.at_noise_of(min(more, key=lambda h: h.cost), [*found, *more])
         leading = verdict.best(found, settings)
         if len(leading.effects) <= len(best.effects):
-            found = fits.judged_by(leading, found)
+            found = fits.at_noise_of(leading, found)
             best = next(h for h in found if set(h.effects) == set(best.effects))
             break
         best = fits.converged(leading)

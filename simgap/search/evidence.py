@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""The fits that a verdict was made from, as plain data, so that it can be decided anew."""
+"""The fits that a verdict was made from, as plain data, so that it can be decided again."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from simgap.fit.least_squares import FitState
+from simgap.fit.state import FitState
 from simgap.machine.contract import Form, Parameter
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import Settings
@@ -56,7 +56,7 @@ class Evidence:
 
         Raises
         ------
-        KeyError, TypeError : it is none
+        KeyError, TypeError : it is not evidence
 
         """
         return cls([_hypothesis(item) for item in data],

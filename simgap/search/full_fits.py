@@ -15,35 +15,30 @@ from functools import partial
 from statistics import fmean
 
 import numpy as np
-from simgap.fit.least_squares import LeastSquares, settled
+from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import same_noise, with_estimated_noise
+from simgap.fit.starts import settled
+from simgap.fit.state import FitState
+from simgap.machine.contract import Form
 from simgap.search.hypothesis import Hypothesis
 from simgap.search.refitting import dropped, refitted, shared_jacobian, SharedJacobian, taken_over
-from simgap.search.screening import screened, sensitivities, Sensitivity
+from simgap.search.screening import screened, sensitivities
+from simgap.search.single_fits import added
 
 
 class FullFits:
     """
-    Fits to the whole tests.
-
-    Parameters
-    ----------
-    problem
-        the machine in its whole experiments
-    progress
-        called with the share that is done, 0 to 1, and what is being done
-    threads
-        how many hypotheses are fitted at once
+    Fits to the whole tests, as many at once as there are threads.
 
     Attributes
     ----------
     problem : with the noise of the motion that was found
+    progress : called with the share that is done, 0 to 1, and what is being done
 
     """
 
     def __init__(self, problem: LeastSquares, progress: Callable[[float, str], None],
                  threads: int = 1) -> None:
-        """Prepare to fit."""
         self._pool = ThreadPoolExecutor(threads)
         self.problem = problem
         self.settings = problem.settings.search
@@ -54,14 +49,8 @@ class FullFits:
         """
         Fit the best of what a search has found to the whole tests; return 'none' first.
 
-        All share the derivatives by the nuisances. In each pass these are taken anew, where the
-        best hypothesis is then.
-
-        Parameters
-        ----------
-        none, singles, pairs
-            the nuisances alone, and hypotheses with one and two effects, each the best first
-
+        All share the derivatives by the nuisances. In each pass these are taken again, where the
+        best hypothesis is then. Those with one effect and with two come the best first.
         """
         options = self.settings
         chosen = self._chosen(singles, pairs)
@@ -150,27 +139,21 @@ class FullFits:
 
     def with_another(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         """Return a hypothesis whose fit has converged with each of a few more effects."""
-        state = hypothesis.with_jacobian(self.problem).state
-        known = sensitivities(self.problem, state, self._pool.map)
+        base = hypothesis.with_jacobian(self.problem)
+        known = sensitivities(self.problem, base.state, self._pool.map)
         promising = [item for gain, item in screened(
-            self.problem, state, known, hypothesis.effects)[:self.settings.partners]
+            self.problem, base.state, known, base.effects)[:self.settings.partners]
             if gain > self.settings.partner_gain]
-
-        def added(item: Sensitivity) -> Hypothesis:
-            more = self.problem.extended(state, item.form.parameters, [
-                p.start for p in item.form.parameters], item.jacobian)
-            return Hypothesis(
-                (*hypothesis.effects, item.effect), (*hypothesis.forms, item.form),
-                self.problem.fit(more, self.settings.full_iterations)).without_jacobian(True)
-
-        return list(self._pool.map(added, promising))
+        return list(self._pool.map(lambda item: added(
+            self.problem, base, item, item.jacobian, self.settings.full_iterations,
+            ).without_jacobian(keep_hessian=True), promising))
 
     def leaves_much(self, hypothesis: Hypothesis) -> bool:
         """Return whether a hypothesis leaves more than noise in the whole tests."""
         return self.problem.leaves_much(hypothesis.state)
 
-    def judged_by(self, best: Hypothesis,
-                  hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+    def at_noise_of(self, best: Hypothesis,
+                    hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         """
         Return hypotheses with their costs at the noise that one of them leaves.
 
@@ -178,26 +161,24 @@ class FullFits:
         """
         if not self._noise_taken(best):
             return list(hypotheses)
-        return [replace(h, state=self.problem.judged(h.state)) for h in hypotheses]
+        return [replace(h, state=self.problem.evaluated(h.state)) for h in hypotheses]
 
     def without(self, hypothesis: Hypothesis, effect: str) -> Hypothesis:
         """Return a hypothesis without one of its effects, fitted until it has converged."""
         rest = self._dropped(hypothesis, effect)
         state = self.problem.start(rest.state.parameters, rest.state.point(), central=True)
-        rest = self.converged(replace(
-            rest, state=self.problem.fit(state, self.settings.iterations)))
-        return rest.without_jacobian(keep_hessian=True)
+        return self._ended(rest.effects, rest.forms, state)
 
     def simpler(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
         """Return which effects could be simpler ones that they become, each with such a one."""
-        effects = self.problem.machine.effects
+        effects = self.problem.machine.catalogue
         return [(effect, other) for effect in hypothesis.effects
                 for other in effects[effect].simpler if other not in hypothesis.effects]
 
     def elsewhere(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
         """Return which effects could act in another place, each with the effect there."""
         return [(effect, other.id) for effect in hypothesis.effects
-                for other, _ in self.problem.machine.relatives(effect)
+                for other, _ in self.problem.machine.catalogue.relatives(effect)
                 if other.id not in hypothesis.effects]
 
     def exchanged(self, hypothesis: Hypothesis, effect: str, other: str) -> Hypothesis:
@@ -207,7 +188,7 @@ class FullFits:
         The fit begins at the size that does most of what the former has done, and has converged.
         """
         machine = self.problem.machine
-        rest, form = self._dropped(hypothesis, effect), machine.effects[other].forms[0]
+        rest, form = self._dropped(hypothesis, effect), machine.catalogue[other].forms[0]
         point = {**rest.state.point(), **form.start}
         bare = self.problem.residuals(point)
         done = bare - self.problem.residuals(hypothesis.state.point())
@@ -217,10 +198,7 @@ class FullFits:
                       for p, size in zip(form.parameters, sizes, strict=True) if not p.is_shape})
         point, kept = taken_over(machine, point, [*rest.forms, form], rest.state.parameters)
         state = self.problem.start((*kept, *form.parameters), point)
-        found = self.converged(Hypothesis(
-            (*rest.effects, other), (*rest.forms, form),
-            self.problem.fit(state, self.settings.iterations)))
-        return found.without_jacobian(keep_hessian=True)
+        return self._ended((*rest.effects, other), (*rest.forms, form), state)
 
     def joined(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """
@@ -228,13 +206,13 @@ class FullFits:
 
         None if its effects are not all the parts of one, in one form. The fit has converged.
         """
-        machine, effects = self.problem.machine, self.problem.machine.effects
+        machine, effects = self.problem.machine, self.problem.machine.catalogue
         whole = next((item for item in effects.values()
                       if item.parts and set(item.parts) == set(hypothesis.effects)), None)
         if whole is None:
             return None
         form, *others = {
-            machine.counterpart(form, effects[effect], whole)
+            machine.catalogue.counterpart(form, effects[effect], whole)
             for effect, form in zip(hypothesis.effects, hypothesis.forms, strict=True)}
         if others:
             return None
@@ -247,9 +225,13 @@ class FullFits:
         nuisances = [free.get(p.name, p) for p in hypothesis.state.parameters
                      if p.name not in names]
         state = self.problem.start((*nuisances, *form.parameters), point)
-        one = self.converged(Hypothesis(
-            (whole.id,), (form,), self.problem.fit(state, self.settings.iterations)))
-        return one.without_jacobian(keep_hessian=True)
+        return self._ended((whole.id,), (form,), state)
+
+    def _ended(self, effects: tuple[str, ...], forms: tuple[Form, ...],
+               state: FitState) -> Hypothesis:
+        """Return a hypothesis fitted from a state until it has converged."""
+        found = Hypothesis(effects, forms, self.problem.fit(state, self.settings.iterations))
+        return self.converged(found).without_jacobian(keep_hessian=True)
 
     def _refitted(self, shared: SharedJacobian, keep_hessian: bool,
                   hypothesis: Hypothesis) -> Hypothesis:

@@ -10,7 +10,8 @@ from itertools import compress, product
 import math
 
 import numpy as np
-from simgap.fit.least_squares import FitState, LeastSquares, proper_precision
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.state import FitState, proper_precision
 from simgap.machine.contract import Form, Parameter, Point
 from simgap.settings import PenaltySettings
 

@@ -12,7 +12,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from simgap.fit.least_squares import FitState, Jacobian, LeastSquares
+from simgap.fit.broyden import Jacobian
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.state import FitState
 from simgap.machine.contract import Form, Machine, Parameter, Point
 from simgap.search.hypothesis import Hypothesis
 
@@ -60,7 +62,7 @@ def taken_over(machine: Machine, point: Point, forms: Sequence[Form],
 
     The nuisances that stand for the same numbers are held at zero.
     """
-    at, held = machine.take_over(point, forms)
+    at, held = machine.nuisances.take_over(point, forms)
     return at, [replace(p, low=0.0, high=0.0) if p.name in held else p for p in parameters]
 
 
@@ -72,8 +74,8 @@ def dropped(machine: Machine, hypothesis: Hypothesis, effect: str) -> Hypothesis
     free = {p.name: p for p in machine.nuisances}
     kept = [j for j, p in enumerate(state.parameters) if p.name not in names]
     own: list[Parameter] = [free.get(p.name, p) for p in (state.parameters[j] for j in kept)]
-    point = machine.absorb({p.name: values[p.name] for p in own},
-                           {name: values[name] for name in names})
+    point = machine.nuisances.absorb({p.name: values[p.name] for p in own},
+                                     {name: values[name] for name in names})
     bare = replace(
         state.without_jacobian(), parameters=tuple(own),
         x=np.array([point[p.name] for p in own]),

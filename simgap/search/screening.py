@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 from simgap.fit.box_qp import box_constrained_step
-from simgap.fit.least_squares import (
-    FitState, Jacobian, least_cost, LeastSquares, prior_precision, transposed_product,
-    weighted_product,
-)
+from simgap.fit.broyden import Jacobian, transposed_product, weighted_product
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.starts import least_cost
+from simgap.fit.state import FitState, prior_precision
 from simgap.machine.contract import Effect, FloatArray, Form, Point
 
 # How often a scan looks between the values of a single size that it has tried.
@@ -51,8 +51,8 @@ def sensitivities(problem: LeastSquares, state: FitState,
     residuals = [
         state.residual[problem.rows(k)].reshape(e.measured.shape) * e.noise * problem.scale
         for k, e in enumerate(problem.experiments)]
-    forms = [(effect.id, form) for effect in machine.effects.values()
-             for form in machine.forms(effect, residuals)]
+    forms = [(effect.id, form) for effect in machine.catalogue.values()
+             for form in machine.catalogue.forms(effect, problem.experiments, residuals)]
     return list(concurrently(
         lambda item: Sensitivity(item[0], item[1], jacobian_of_form(problem, state, item[1])),
         forms))
@@ -84,17 +84,8 @@ def screened(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity
     """
     Return the gain that each form promises beside the effects that are there, the greatest first.
 
-    What the fit would gain without it, because it has not converged, is no part of the promise.
-
-    Parameters
-    ----------
-    problem, state
-        the fit that the effect is added to
-    known
-        from `sensitivities`
-    besides
-        ids of the effects that are there
-
+    What the fit would gain without it, because it has not converged, is not part of the promise.
+    The effects of the fit have the ids `besides`, and `known` comes from `sensitivities`.
     """
     names = {p.name for p in state.parameters}
     low = np.array([p.low for p in state.parameters]) - state.x
@@ -107,7 +98,7 @@ def screened(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity
     found: dict[str, list[tuple[float, Sensitivity]]] = {}
     for item in known:
         form = item.form
-        if same_effect(problem.machine.effects, item.effect, besides):
+        if same_effect(problem.machine.catalogue, item.effect, besides):
             continue
         if besides and form.is_course:
             continue  # a free course explains what any other effect leaves
@@ -144,17 +135,8 @@ def scan(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
 
     A strong effect may bend the misfit so much that its derivative at zero tells nothing: a mode
     at another frequency, a limit that was not reached, a ripple that shakes a mode. The values are
-    sought in the worst test.
-
-    Parameters
-    ----------
-    problem, state, known, besides
-        as in `screened`
-
-    Returns
-    -------
-    sensitivities with the sizes from which a fit should begin, the best first
-
+    sought in the worst test. Each form comes with the sizes from which a fit should begin, the
+    best first. The parameters are those of `screened`.
     """
     here = state.point()
     count = problem.settings.search.scanned
@@ -171,7 +153,7 @@ def scan(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
     coarse: list[tuple[float, int, Sensitivity]] = []
     for item in known:
         trials = item.form.trials
-        if trials and not same_effect(problem.machine.effects, item.effect, besides) and not any(
+        if trials and not same_effect(problem.machine.catalogue, item.effect, besides) and not any(
                 p.name in here for p in item.form.parameters):
             coarse.append((*tried(item, trials), item))
     coarse.sort(key=lambda entry: entry[0])

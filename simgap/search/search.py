@@ -25,13 +25,13 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
-from simgap.fit.least_squares import (
-    FitState, Jacobian, LeastSquares, led, settled, with_initial_conditions,
-)
-from simgap.machine.contract import Effect, Form, Point
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.starts import led, settled, with_initial_conditions
+from simgap.fit.state import FitState
+from simgap.machine.contract import Form, Point
 from simgap.next_test.rivals import Rival
 from simgap.search.continued import continued
 from simgap.search.hypothesis import Hypothesis
@@ -39,40 +39,20 @@ from simgap.search.refitting import dropped, refitted, shared_jacobian
 from simgap.search.screening import (
     jacobian_of_form, rescaled, scan, screened, sensitivities, Sensitivity,
 )
-
-Item = TypeVar('Item')
-
-
-def _others(hypothesis: Hypothesis, form: Form) -> list[int]:
-    """Return which of a hypothesis' parameters are not a form's."""
-    return [j for j, p in enumerate(hypothesis.state.parameters) if p not in form.parameters]
-
-
-def _put(items: tuple[Item, ...], place: int, item: Item) -> tuple[Item, ...]:
-    """Return a tuple with another item in a place."""
-    return (*items[:place], item, *items[place + 1:])
+from simgap.search.single_fits import added, added_at, gone_on, moved, others_than, split
 
 
 class Search:
     """
     The search for the effects that a model lacks.
 
-    Parameters
-    ----------
-    problem
-        the machine in its experiments
-    progress
-        called with the share that is done, 0 to 1, and what is being done
-    threads
-        how many hypotheses are fitted at once
-    earlier
-        answers of a verdict on some of the tests
-
+    `progress` is called with the share that is done, 0 to 1, and what is being done. `threads`
+    hypotheses are fitted at once, and those of `earlier`, answers of a verdict on some of the
+    tests, beside all others.
     """
 
     def __init__(self, problem: LeastSquares, progress: Callable[[float, str], None],
                  threads: int = 1, earlier: Sequence[Rival] = ()) -> None:
-        """Prepare to search."""
         self._pool, self._earlier = ThreadPoolExecutor(threads), earlier
         self.settings = problem.settings.search
         self.machine = problem.machine.truncated()
@@ -88,7 +68,7 @@ class Search:
         self._earlier_fits = continued(self.problem, self._earlier, self._pool.map)
         none, singles = self._none_and_singles()
         singles = self._at_lower_noise(singles)
-        singles = self._leading_settled(singles, self._to_settle(singles[0]))
+        singles = self._leading_fits(singles, self._to_settle(singles[0]))
         if self.problem.scale > 1.0:
             singles = self._at_lower_noise(self._exchanged(singles))
         self.progress(0.5, 'pairs of effects')
@@ -217,23 +197,24 @@ class Search:
         self._take_sensitivities(none.state)
         self.progress(0.25, 'single effects')
         found = self._sorted(
-            lambda entry: self._added(none, entry[1], entry[1].jacobian),
+            lambda entry: added(self.problem, none, entry[1], entry[1].jacobian,
+                                options.first_iterations),
             screened(self.problem, none.state, self.sensitivities)[:options.singles],
             options.finalists)
         if self.problem.leaves_much(none.state):
             found += self._sorted(
-                lambda entry: self._added_at(none, *entry),
+                lambda entry: added_at(self.problem, none, *entry),
                 scan(self.problem, none.state, self.sensitivities), options.finalists)
             found.sort(key=self._priced)
         self.progress(0.35, 'single effects')
-        leading = self._sorted(lambda h: self._continued(h, options.iterations),
+        leading = self._sorted(lambda h: gone_on(self.problem, h, options.iterations),
                                found[:options.finalists])
         if self.problem.leaves_much(leading[0].state):
             leading = self._with_better(leading, self._led_by_tests(
                 none, [h.effects[0] for h in leading[:options.bases]]))
         leading = self._with_better(
             leading, (h for h in self._earlier_answers() if len(h.effects) == 1))
-        leading[:2] = self._sorted(self._settled, leading[:2])
+        leading[:2] = self._sorted(self._fitted_again, leading[:2])
         leading = self._with_relatives(leading)
         return [*leading[:options.bases], *(h.without_jacobian() for h in leading[options.bases:])]
 
@@ -261,37 +242,11 @@ class Search:
                 (*none.state.parameters, *form.parameters),
                 with_initial_conditions(part, {**none.state.point(), **form.start}))
             state = part.fit(start, self.settings.settling_iterations)
-            return self._settled(Hypothesis((effect,), (form,), state))
+            return self._fitted_again(Hypothesis((effect,), (form,), state))
 
         return list(self._pool.map(fitted, asked.items()))
 
-    def _added(self, base: Hypothesis, item: Sensitivity, columns: Jacobian) -> Hypothesis:
-        """Fit an effect on top of a hypothesis, with these derivatives, for a few iterations."""
-        state = self.problem.extended(
-            base.state, item.form.parameters, [p.start for p in item.form.parameters], columns)
-        state = self.problem.fit(state, self.settings.first_iterations)
-        return Hypothesis((*base.effects, item.effect), (*base.forms, item.form), state)
-
-    def _added_at(self, base: Hypothesis, item: Sensitivity, sizes: Point) -> Hypothesis:
-        """Fit an effect on top of a hypothesis, from sizes that a scan has found."""
-        form = item.form
-        state = self.problem.start_from(
-            base.state.parameters, base.state.jacobian, form.parameters,
-            {**base.state.point(), **form.start, **sizes})
-        return Hypothesis((*base.effects, item.effect), (*base.forms, form),
-                          self.problem.fit(state, self.settings.iterations))
-
-    def _continued(self, hypothesis: Hypothesis, iterations: int) -> Hypothesis:
-        """Go on with a fit; where the effect is there, its shape has derivatives of its own."""
-        state, own = hypothesis.state, hypothesis.forms[-1].parameters
-        if any(p.is_shape for p in own):
-            names = {p.name for p in own}
-            indices = [j for j, p in enumerate(state.parameters) if p.name in names]
-            state = self.problem.with_columns(state, indices, self.problem.jacobian(
-                state.point(), own, state.residual, central=True))
-        return replace(hypothesis, state=self.problem.fit(state, iterations))
-
-    def _settled(self, hypothesis: Hypothesis) -> Hypothesis:
+    def _fitted_again(self, hypothesis: Hypothesis) -> Hypothesis:
         """Fit with a fresh Jacobian."""
         point = with_initial_conditions(self.problem, hypothesis.state.point())
         state = self.problem.start(hypothesis.state.parameters, point)
@@ -303,7 +258,7 @@ class Search:
         return (self.settings.most_finalists if self.problem.leaves_much(best.state)
                 else self.settings.bases)
 
-    def _leading_settled(self, hypotheses: Sequence[Hypothesis], count: int) -> list[Hypothesis]:
+    def _leading_fits(self, hypotheses: Sequence[Hypothesis], count: int) -> list[Hypothesis]:
         """Go on with the best fits: one that has stopped early hides what its effect can do."""
         options = self.settings
 
@@ -326,9 +281,9 @@ class Search:
         """
         best = hypotheses[0]
         return self._with_better(hypotheses, self._pool.map(
-            lambda item: self._moved(best, *item),
+            lambda item: moved(self.problem, best, *item),
             [(place, *item) for place in range(len(best.effects))
-             for item in self.machine.relatives(best.effects[place])
+             for item in self.machine.catalogue.relatives(best.effects[place])
              if item[0].id not in best.effects]))
 
     def _exchanged(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -343,11 +298,11 @@ class Search:
             return list(hypotheses)
         found: list[Hypothesis] = []
         for place, effect in enumerate(best.effects):
-            bare, kept = dropped(self.machine, best, effect), _others(best, best.forms[place])
+            bare, kept = dropped(self.machine, best, effect), others_than(best, best.forms[place])
             bare = replace(bare, state=self.problem.start(
                 bare.state.parameters, bare.state.point(), best.state.jacobian[:, kept]))
             found += self._pool.map(
-                partial(lambda base, entry: self._added_at(base, *entry), bare),
+                partial(lambda base, entry: added_at(self.problem, base, *entry), bare),
                 scan(self.problem, bare.state, self.sensitivities, bare.effects))
         return self._with_better(hypotheses, found)
 
@@ -360,26 +315,6 @@ class Search:
             if key not in found or self._priced(new) < self._priced(found[key]):
                 found[key] = new
         return sorted(found.values(), key=self._priced)
-
-    def _moved(self, base: Hypothesis, place: int, effect: Effect, factor: float) -> Hypothesis:
-        """Fit an effect in the place of one of a hypothesis', from its size times a factor."""
-        was = base.forms[place]
-        form = self.machine.counterpart(was, self.machine.effects[base.effects[place]], effect)
-        point = base.state.point()
-        for old, new in zip(was.parameters, form.parameters, strict=True):
-            point[new.name] = point.pop(old.name) * (1.0 if new.is_shape else factor)
-        return Hypothesis(
-            _put(base.effects, place, effect.id), _put(base.forms, place, form),
-            self._in_place_of(base, was, (form,), point))
-
-    def _in_place_of(self, base: Hypothesis, was: Form, forms: Sequence[Form],
-                     point: dict[str, float]) -> FitState:
-        """Fit effects in the place of one of a hypothesis', from a point."""
-        state, kept = base.state, _others(base, was)
-        start = self.problem.start_from(
-            [state.parameters[j] for j in kept], state.jacobian[:, kept],
-            [p for form in forms for p in form.parameters], point)
-        return self.problem.fit(start, self.settings.iterations)
 
     # -- pairs ---------------------------------------------------------------------------------
 
@@ -408,7 +343,7 @@ class Search:
             if self.problem.scale > 1.0 and not i:
                 pairs += self._sorted(partial(self._partnered, best, base), scan(
                     self.problem, base.state, self.sensitivities, base.effects), 0)
-            pairs += [pair.without_jacobian() for pair in self._split(base)]
+            pairs += [pair.without_jacobian() for pair in split(self.problem, base)]
             for pair in pairs:
                 key = tuple(sorted(pair.effects))
                 if key not in found or self._priced(pair) < self._priced(found[key]):
@@ -417,7 +352,7 @@ class Search:
 
     def _improved(self, pairs: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Go on with the best pair, and try others in the place of each of its effects."""
-        found = self._with_relatives(self._leading_settled(pairs, self.settings.bases))
+        found = self._with_relatives(self._leading_fits(pairs, self.settings.bases))
         if self.problem.scale > 1.0:
             found = self._at_lower_noise(self._exchanged(found))
         return found
@@ -427,24 +362,11 @@ class Search:
         """Give a hypothesis a partner, from sizes if they are given."""
         item, sizes = partner
         if sizes is None:
-            pair = self._added(base, item, jacobian_of_form(self.problem, base.state, item.form))
+            pair = added(self.problem, base, item,
+                         jacobian_of_form(self.problem, base.state, item.form),
+                         self.settings.first_iterations)
         else:
-            pair = self._added_at(base, item, sizes)
+            pair = added_at(self.problem, base, item, sizes)
         if pair.cost < best.cost:
-            return self._continued(pair, self.settings.pair_iterations)
+            return gone_on(self.problem, pair, self.settings.pair_iterations)
         return pair
-
-    def _split(self, base: Hypothesis) -> list[Hypothesis]:
-        """Return an effect that acts in several places as one effect in each, or nothing."""
-        effect = self.machine.effects[base.effects[0]]
-        if not effect.parts:
-            return []
-        forms = tuple(self.machine.counterpart(base.forms[0], effect, self.machine.effects[part])
-                      for part in effect.parts)
-        point = base.state.point()
-        whole = base.forms[0].parameters
-        for p, *own in zip(whole, *(form.parameters for form in forms), strict=True):
-            value = point.pop(p.name)
-            point.update({part.name: value for part in own})
-        state = self._in_place_of(base, base.forms[0], forms, point)
-        return [Hypothesis(effect.parts, forms, state)]

@@ -10,11 +10,12 @@ import math
 from types import MappingProxyType
 
 import numpy as np
-from simgap.fit.least_squares import (
-    FitState, Jacobian, LeastSquares, settled, with_initial_conditions,
-)
+from simgap.fit.broyden import Jacobian
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.starts import settled, with_initial_conditions
+from simgap.fit.state import FitState
 from simgap.machine.contract import (
-    Experiment, FloatArray, Form, Machine, Parameter, Point, TimeScales,
+    Experiment, FloatArray, Form, Machine, Nuisances, Parameter, Point, TimeScales,
 )
 from simgap.settings import Settings
 
@@ -25,22 +26,19 @@ class Part(Machine):
 
     Parameters
     ----------
-    machine
-        in all experiments
-    chosen
-        indices of those that count
-    experiments
-        what was measured in them; None for all that the machine has
-    held
-        values of parameters that are held, by name
+    machine, chosen
+        in all experiments, and the indices of those that count
+    experiments, held
+        what was measured in them, None for all that the machine has; values that are held, by name
 
     """
 
     def __init__(self, machine: Machine, chosen: Sequence[int],
                  experiments: Sequence[Experiment] | None = None,
                  held: Point = MappingProxyType({})) -> None:
-        """Take a part of the experiments."""
-        super().__init__(experiments or [machine.experiments[k] for k in chosen])
+        tried = machine.nuisances.initial_conditions
+        super().__init__(experiments or [machine.experiments[k] for k in chosen], Nuisances(
+            (), {i: tried[k] for i, k in enumerate(chosen) if k in tried}))
         self.chosen = tuple(chosen)
         self._machine = machine
         self._held = held
@@ -51,16 +49,13 @@ class Part(Machine):
 
     @property
     def time_scales(self) -> TimeScales:
-        """Return the time scales of the whole machine."""
         return self._machine.time_scales
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
-        """Return the readings of one experiment."""
         return self._machine.predict({**self._held, **point}, self.chosen[experiment])
 
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
                  until: float = math.inf) -> list[list[FloatArray | None]]:
-        """Return the readings of several variants; see `Machine.simulate`."""
         wanted = [(i, k) for i, one in enumerate(only or [None] * len(points))
                   for k in (range(len(self.chosen)) if one is None else (one,))]
         found = self._machine.simulate([{**self._held, **points[i]} for i, _ in wanted],
@@ -71,14 +66,9 @@ class Part(Machine):
         return rows
 
     def low_fidelity(self) -> Machine:
-        """Return the part of the faster machine."""
         faster = self._machine.low_fidelity()
         return self if faster is self._machine else Part(
             faster, self.chosen, self.experiments, self._held)
-
-    def initial_conditions(self, experiment: int) -> Sequence[Sequence[Point]]:
-        """Return initial conditions of one experiment that are tried out before a fit."""
-        return self._machine.initial_conditions(self.chosen[experiment])
 
     def parameters(self, of: Sequence[Parameter]) -> tuple[Parameter, ...]:
         """Return the parameters that act on these experiments, with the indices of this part."""
@@ -140,22 +130,9 @@ def trained(part: Part, parameters: Sequence[Parameter], point: Mapping[str, flo
     Fit parameters to a part of the tests, from a point far from the optimum to the end.
 
     While much is left, the misfit counts as noise, and the noise is lowered as the fit proceeds:
-    at the sensors' own noise a robust loss does not lead across a large misfit. The derivatives
-    in `slopes` only begin the fit; at its end they are taken anew as long as that gains much.
-
-    Parameters
-    ----------
-    part
-        the tests
-    parameters
-        what is fitted
-    point
-        where the fit begins
-    slopes
-        derivatives for the beginning, and for what follows, shape (n, m) each
-    settings
-        thresholds
-
+    at the sensors' own noise a robust loss does not lead across a large misfit. The derivatives in
+    `slopes`, shape (n, m) each, only begin the fit: the first its beginning, the next what
+    follows. At its end they are taken again as long as that gains much.
     """
     options, search = settings.held_out, settings.search
     at = with_initial_conditions(LeastSquares(part, settings=settings), dict(point))

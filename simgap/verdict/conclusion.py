@@ -12,7 +12,7 @@ from typing import Any
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import Machine
 from simgap.next_test.rivals import Rival
-from simgap.search.elimination import backward_elimination, forward_selection, settled_rivals
+from simgap.search.elimination import backward_elimination, converged_rivals, forward_selection
 from simgap.search.evidence import Evidence
 from simgap.search.full_fits import FullFits
 from simgap.search.hypothesis import Hypothesis
@@ -71,13 +71,13 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
     """
     whole = LeastSquares(machine, settings=settings)
 
-    def told(share: float, doing: str) -> None:
+    def report(share: float, doing: str) -> None:
         progress(0.9 * share, doing)
 
-    fits = FullFits(whole, told, threads)
-    found = fits.compared(*Search(whole, told, threads, earlier).run())
+    fits = FullFits(whole, report, threads)
+    found = fits.compared(*Search(whole, report, threads, earlier).run())
     hypotheses, best = backward_elimination(fits, found, settings)
-    hypotheses, best = settled_rivals(fits, hypotheses, best, settings)
+    hypotheses, best = converged_rivals(fits, hypotheses, best, settings)
     if courses := _implausible_courses(best, settings):
         names = ' + '.join(courses)
         plain = concluded(machine.without(courses), lambda share, doing: progress(
@@ -99,6 +99,14 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
                      'withheld data: no effect is named')
         hypotheses, best = [none], none.with_jacobian(problem)
         reach = held_out(problem, none, best, threads)
+    return _decided(fits, none, best, hypotheses, reach, notes)
+
+
+def _decided(fits: FullFits, none: Hypothesis, best: Hypothesis,
+             hypotheses: Sequence[Hypothesis], reach: dict[str, Any],
+             notes: list[str]) -> Conclusion:
+    """Return what follows from the fits, with their doubts and what each leaves."""
+    problem, settings = fits.problem, fits.problem.settings
     inflated = dict(zip((p.name for p in best.state.parameters),
                         inflation(problem, best.state).tolist(), strict=True))
     usual = fmean([inflated[p.name] for p, _ in best.values] or [1.0])
@@ -116,16 +124,17 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
                       settings.interval, beyond,
                       _own_gains(hypothesis, _least_costs(fitted), usual))
 
-    def judged(hypothesis: Hypothesis, fitted: Sequence[Hypothesis]) -> Hypothesis:
+    def with_doubts(hypothesis: Hypothesis, fitted: Sequence[Hypothesis]) -> Hypothesis:
         return replace(hypothesis, doubts={
             effect: doubt.probability for effect, doubt in doubted(hypothesis, fitted).items()})
 
-    first = judged(best, hypotheses)
+    first = with_doubts(best, hypotheses)
     rests = _rests(fits, hypotheses, first, settings)
     fitted = [*hypotheses, *rests.values()]
-    # the fit that a small doubt has asked for is compared, but is no answer
+    # the fit that a small doubt has asked for is compared, but is not an answer
     answers = [*hypotheses, *(rests[effect] for effect in rests if effect in first.unsure)]
-    hypotheses, best = [judged(h, fitted) for h in answers], judged(best, fitted)
+    hypotheses = [with_doubts(h, fitted) for h in answers]
+    best = with_doubts(best, fitted)
     if best.unsure:
         notes.append(f'{" + ".join(sorted(best.unsure))}: not surely beyond the tolerance, and '
                      'therefore not named')

@@ -28,7 +28,7 @@ class Doubt:
     excess : over the tolerance, in the unit of the number
     deviation : standard deviation of the number
     sure : excess in deviations at which the doubt is a half
-    gain : of the effect [half chi-square], over the inflation; 0 if no fit has told it
+    gain : of the effect [half chi-square], over the inflation; 0 if no fit has shown it
     sure_by_gain : gain at which the doubt is a half, however small the excess
     slope : how sharply the doubt falls beyond these limits
 
@@ -65,16 +65,13 @@ def doubts(hypothesis: Hypothesis, deviating: Mapping[str, float], gained: float
 
     Parameters
     ----------
-    hypothesis, deviating
-        as in `intervals.values_with_intervals`
-    gained
-        gain of all its effects [half chi-square], over the inflation
-    settings
-        thresholds
+    hypothesis, deviating, settings
+        with the standard deviations of its values, from `intervals.deviations`
+    gained, own_gains
+        gain of all its effects, and of some beside the others [half chi-square], over the
+        inflation
     beyond
         excess of the strongest effect, in deviations, at which its doubt is a half
-    own_gains
-        what an effect gains beside the others [half chi-square], over the inflation, where known
 
     """
     point = hypothesis.state.point()

@@ -37,14 +37,10 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads:
     ----------
     problem
         the whole tests
-    none, best
-        the hypotheses without and with the likeliest effects, as fitted to the whole tests
-    threads
-        how many tests are withheld at once
-    groups
-        of each test; the tests of a group are withheld together. None if each is its own
-    what
-        is withheld, for people
+    none, best, threads
+        the hypotheses without and with the likeliest effects, and how many tests go at once
+    groups, what
+        group of each test, withheld together, and its name for people; None if each is its own
 
     """
     single = len(problem.experiments) == 1
@@ -168,21 +164,16 @@ def _bootstrapped(folds: Sequence[Withheld],
 
 
 def _after(fold: Withheld) -> FloatArray:
-    """Return what is left, which is everything if nothing can be judged."""
+    """Return the rest, which is everything if nothing can be judged."""
     return fold.before if fold.after is None else fold.after
 
 
 def explained_fraction(sums: FloatArray, no_gap: float) -> float:
     """
-    Return the explained share of the energy above the noise, from -1 to 1; 0 if there is no gap.
+    Return the explained share of the energy above the noise, from -1 to 1.
 
-    Parameters
-    ----------
-    sums
-        energy before, after, and of the noise
-    no_gap
-        share of the energy below which there is no gap
-
+    `sums` has the energy before, after, and of the noise. Up to a share `no_gap` of the energy
+    there is no gap, and the explained share is 0.
     """
     before, after, noise = sums
     # with a floor above the energy that is left, more than all would be explained

@@ -15,7 +15,7 @@ two deviations sets the interval.
 
 Difference quotients of a drive that sticks and slips are right to a tenth. A Hessian of them knows
 nothing of directions in which two columns differ by less. There the priors alone count: without
-that, a change of a number and the tolerance of the same number would be told apart by the error of
+that, a change of a number and the tolerance of the same number would be separated by the error of
 a difference quotient.
 """
 
@@ -27,7 +27,8 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from simgap.fit.least_squares import FitState, LeastSquares, proper_precision
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.state import FitState, proper_precision
 from simgap.machine.contract import FloatArray, Parameter
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import IntervalSettings
@@ -39,17 +40,9 @@ _BY_DATA = 1e-6
 
 def inflation(problem: LeastSquares, state: FitState) -> FloatArray:
     """
-    Return the variance of each fitted value over that with independent noise, shape (m,).
+    Return the variance of each fitted value over that with independent noise, 1 or more, (m,).
 
-    It is 1 at least.
-
-    Parameters
-    ----------
-    problem
-        that was fitted
-    state
-        of a fit that has converged, with its Jacobian
-
+    `state` is of a fit that has converged, with its Jacobian.
     """
     posterior = covariance(state, 1.0, problem.settings.interval)
     return _inflation(problem, state, posterior)
@@ -59,13 +52,7 @@ def contrast_deviation(problem: LeastSquares, state: FitState, contrast: FloatAr
     """
     Return the standard deviation of a sum of fitted values, robust to dependent residuals.
 
-    Parameters
-    ----------
-    problem, state
-        as in `inflation`
-    contrast
-        factor of each value in the sum, shape (m,)
-
+    `contrast` has the factor of each value, shape (m,); `state` is as in `inflation`.
     """
     settings = problem.settings.interval
     along = covariance(state, 1.0, settings) @ contrast[:, np.newaxis]
@@ -93,17 +80,9 @@ def _inflation(problem: LeastSquares, state: FitState, posterior: FloatArray) ->
 
 def covariance(state: FitState, inflated: float, settings: IntervalSettings) -> FloatArray:
     """
-    Return the covariance of fitted values, shape (m, m).
+    Return the covariance of the values of a fit that has converged, shape (m, m).
 
-    Parameters
-    ----------
-    state
-        of a fit that has converged
-    inflated
-        variance over that with independent noise, 1 or more
-    settings
-        thresholds
-
+    `inflated` is the variance over that with independent noise, 1 or more.
     """
     return _covariance(state, _known(state, settings) / inflated)
 
@@ -123,15 +102,7 @@ def _known(state: FitState, settings: IntervalSettings) -> FloatArray:
 
 
 def jackknife(values: Sequence[float]) -> float:
-    """
-    Return the standard deviation of an estimate, 0 from less than two values.
-
-    Parameters
-    ----------
-    values
-        of the estimate without each test in turn
-
-    """
+    """Return the standard deviation of an estimate from those without each test; 0 from one."""
     count = len(values)
     return math.sqrt((count - 1) * float(np.var(values))) if count > 1 else 0.0
 
@@ -142,17 +113,8 @@ def deviations(hypothesis: Hypothesis, inflated: Callable[[str], float],
     """
     Return the standard deviations of the values of a hypothesis' effects, by name.
 
-    Parameters
-    ----------
-    hypothesis
-        whose fit has converged
-    inflated
-        returns the variance of a parameter over that with independent noise
-    settings
-        thresholds
-    between_tests
-        deviations by the jackknife, of some of the values by name
-
+    `inflated` returns the variance of a parameter over that with independent noise.
+    `between_tests` has deviations by the jackknife, of some of the values. The fit has converged.
     """
     state = hypothesis.state
     names = [p.name for p in state.parameters]
@@ -172,13 +134,7 @@ def values_with_intervals(hypothesis: Hypothesis,
     """
     Return the values of a hypothesis' effects with 95 percent intervals, for the JSON.
 
-    Parameters
-    ----------
-    hypothesis
-        whose fit has converged
-    deviating
-        standard deviations of its values, from `deviations`
-
+    `deviating` has their standard deviations, from `deviations`.
     """
     return {p.name: {'value': value, 'unit': p.unit, 'ci95': [
         max(value - TWO_SIDED_95 * deviating[p.name], p.low),

@@ -16,8 +16,9 @@ import math
 from typing import Any
 
 import numpy as np
-from simgap.fit.least_squares import FitState, LeastSquares
-from simgap.machine.by_label import ByLabel
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.state import FitState
+from simgap.machine.by_label import ByLabel, can_be_split
 from simgap.machine.contract import FloatArray, Form, Parameter
 from simgap.search.hypothesis import Hypothesis
 from simgap.verdict.held_out import held_out
@@ -28,23 +29,11 @@ _ROUNDS = 2
 
 def interventions(problem: LeastSquares, none: Hypothesis, best: Hypothesis,
                   threads: int = 1) -> list[dict[str, Any]]:
-    """
-    Return what each label changes, for the JSON; empty without labels.
-
-    Parameters
-    ----------
-    problem
-        the whole tests
-    none, best
-        the hypotheses without and with the likeliest effects
-    threads
-        how many tests are withheld at once
-
-    """
+    """Return what each label of the whole tests changes, for the JSON; empty without labels."""
     machine = problem.machine
     if not isinstance(machine, ByLabel):
         return []
-    return [_of_label(problem, machine, none, best, key, threads) for key in machine.groups]
+    return [_of_label(problem, machine, none, best, key, threads) for key in machine.labels.groups]
 
 
 def simplified(problem: LeastSquares, hypotheses: Sequence[Hypothesis],
@@ -54,14 +43,6 @@ def simplified(problem: LeastSquares, hypotheses: Sequence[Hypothesis],
 
     The search takes an effect's form where others are still missing, and a missing effect that
     differs makes it look as if this one did.
-
-    Parameters
-    ----------
-    problem
-        the whole tests
-    hypotheses, best
-        from the search
-
     """
     machine = problem.machine
     if not isinstance(machine, ByLabel):
@@ -69,7 +50,7 @@ def simplified(problem: LeastSquares, hypotheses: Sequence[Hypothesis],
     whole = best.with_jacobian(problem)
     forms = []
     for form in best.forms:
-        base, own = machine.base_of(form), [p.label for p in form.sizes if p.label]
+        base, own = machine.labels.base_of(form), [p.label for p in form.sizes if p.label]
         values = [value for _, value in dict.fromkeys(own)]
         differs = any(_compared(
             problem, whole.state, size, [_of_value(form, own[0][0], value)[j] for value in values],
@@ -77,14 +58,14 @@ def simplified(problem: LeastSquares, hypotheses: Sequence[Hypothesis],
         forms.append(form if differs else base)
     if tuple(forms) == best.forms:
         return list(hypotheses), best
-    point = {**machine.mean(best.state.point()), **best.state.point()}
+    point = {**machine.labels.mean(best.state.point()), **best.state.point()}
     simpler = Hypothesis(best.effects, tuple(forms), _fitted(problem, best, forms, point))
     return [simpler if set(h.effects) == set(best.effects) else h for h in hypotheses], simpler
 
 
 def _of_label(problem: LeastSquares, machine: ByLabel, none: Hypothesis, best: Hypothesis,
               key: str, threads: int) -> dict[str, Any]:
-    groups = machine.groups[key]
+    groups = machine.labels.groups[key]
     numbers = _numbers(problem, machine, best, key) if best.named else []
     common = _in_common(problem, machine, best)
     reach = held_out(problem, none, common, threads, groups,
@@ -109,13 +90,13 @@ def _effects(numbers: Sequence[Mapping[str, Any]], differ: bool) -> list[str]:
 def _numbers(problem: LeastSquares, machine: ByLabel, best: Hypothesis,
              key: str) -> list[dict[str, Any]]:
     """Return the sizes of the named effects under each value, and their differences."""
-    values = list(dict.fromkeys(machine.groups[key]))
-    bases = {effect: machine.base_of(form) for effect, form in zip(
+    bases = {effect: machine.labels.base_of(form) for effect, form in zip(
         best.effects, best.forms, strict=True)}
-    chosen = {effect: machine.split(form, key) for effect, form in bases.items()
-              if effect in best.named and not form.is_course
-              and all(p.experiment is None for p in form.parameters)}
-    point = {value: machine.in_test(best.state.point(), machine.groups[key].index(value))
+    chosen = {effect: machine.labels.split(form, key) for effect, form in bases.items()
+              if effect in best.named and can_be_split(form)}
+    groups = machine.labels.groups[key]
+    values = list(dict.fromkeys(groups))
+    point = {value: machine.labels.in_test(best.state.point(), groups.index(value))
              for value in values}
     start = {p.name: point[value][base.name] for effect, form in chosen.items()
              for value in values for base, p in zip(
@@ -138,11 +119,11 @@ def _of_value(form: Form, key: str, value: str) -> list[Parameter]:
 
 def _in_common(problem: LeastSquares, machine: ByLabel, best: Hypothesis) -> Hypothesis:
     """Return the best hypothesis with one size for all tests."""
-    forms = tuple(machine.base_of(form) for form in best.forms)
+    forms = tuple(machine.labels.base_of(form) for form in best.forms)
     if forms == best.forms:
         return best
     return Hypothesis(best.effects, forms, _fitted(
-        problem, best, forms, machine.mean(best.state.point())))
+        problem, best, forms, machine.labels.mean(best.state.point())))
 
 
 def _fitted(problem: LeastSquares, best: Hypothesis, forms: Sequence[Form],
@@ -168,20 +149,20 @@ def _compared(problem: LeastSquares, state: FitState, base: Parameter,
     # a difference is worth the price of a parameter; that is stricter than its interval
     worth = math.sqrt(2.0 * problem.settings.penalty.parameter)
 
-    def told(contrast: FloatArray) -> tuple[float, float]:
+    def estimated(contrast: FloatArray) -> tuple[float, float]:
         return float(contrast @ state.x), math.hypot(
             contrast_deviation(problem, state, contrast),
             problem.settings.interval.model_error * float(np.abs(contrast) @ np.abs(state.x)))
 
     by_value = {}
     for name, contrast in zip(values, contrasts, strict=True):
-        value, deviation = told(contrast)
+        value, deviation = estimated(contrast)
         # the tolerance of the same number cancels in a difference, and not here
         low, high = _interval(value, math.hypot(deviation, same_number(base, value)))
         by_value[name] = {'value': value, 'ci95': [max(low, base.low), min(high, base.high)]}
     differences = []
     for name, contrast in zip(values[1:], contrasts[1:], strict=True):
-        value, deviation = told(contrast - contrasts[0])
+        value, deviation = estimated(contrast - contrasts[0])
         differences.append({
             'from': values[0], 'to': name, 'value': value, 'ci95': _interval(value, deviation),
             'differs': abs(value) > max(worth * deviation, base.tolerance)})
@@ -202,9 +183,9 @@ def lines(labels: Sequence[Mapping[str, Any]]) -> list[str]:
             unit = '' if item['unit'] == '1' else f' {item["unit"]}'
             sizes = ', '.join(f'{one["value"]:.3g}{unit} under {key} {value or "not given"}'
                               for value, one in item['values'].items())
-            told = [f'{one["value"]:+.3g}{unit} ({one["ci95"][0]:.3g} to {one["ci95"][1]:.3g}) '
-                    f'from {one["from"] or "not given"} to {one["to"] or "not given"}'
-                    for one in item['differences'] if one['differs']]
-            word = 'differs by ' + ', '.join(told) if told else 'stays'
+            changes = [f'{one["value"]:+.3g}{unit} ({one["ci95"][0]:.3g} to {one["ci95"][1]:.3g}) '
+                       f'from {one["from"] or "not given"} to {one["to"] or "not given"}'
+                       for one in item['differences'] if one['differs']]
+            word = 'differs by ' + ', '.join(changes) if changes else 'stays'
             found.append(f'{item["effect"]}: {name} {word}: {sizes}')
     return found

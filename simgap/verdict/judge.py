@@ -16,10 +16,10 @@ import math
 from statistics import fmean
 
 import numpy as np
-from simgap.fit.least_squares import (
-    FitState, LeastSquares, led, prior_precision, settled, weighted_product,
-    with_initial_conditions,
-)
+from simgap.fit.broyden import weighted_product
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.starts import led, settled, with_initial_conditions
+from simgap.fit.state import FitState, prior_precision
 from simgap.machine.contract import FloatArray, Form, Machine, Parameter
 from simgap.search.hypothesis import Hypothesis
 from simgap.search.training import begun, Part, Slopes, trained
@@ -65,7 +65,6 @@ class Judge:
 
     def __init__(self, problem: LeastSquares, none: Hypothesis, best: Hypothesis,
                  groups: Sequence[str]) -> None:
-        """Take the derivatives at the model as configured and at both optima."""
         self._problem = problem
         self._groups = groups
         self._settings: Settings = problem.settings
@@ -116,7 +115,7 @@ class Judge:
 
         Only they are taken to the withheld test. What a tolerance has of them would be lost.
         """
-        at, _ = self._problem.machine.take_over(found.point(), self._best.forms)
+        at, _ = self._problem.machine.nuisances.take_over(found.point(), self._best.forms)
         if at == found.point():
             return found
         return problem.start(found.parameters, at, found.jacobian)
@@ -217,11 +216,11 @@ class Judge:
         reasons, posterior = self._undetermined(training, unaided, found)
         reasons = {**reasons, **self._unseen_labels(testing, part)}
         fold = replace(fold, reasons=reasons)
-        judged = self._judged(reasons)
-        if not judged:
+        numbers = self._numbers(reasons)
+        if not numbers:
             return fold
         held = {**dict.fromkeys(self._effects, 0.0), **self._start,
-                **{p.name: found.value(p.name) for p in judged}}
+                **{p.name: found.value(p.name) for p in numbers}}
         # the nuisances begin where training has left them
         own = {p.name for p in testing.parameters(self._nuisances) if p.experiment is not None}
         begin = {name: value for name, value in found.point().items() if name not in own}
@@ -265,8 +264,8 @@ class Judge:
             return fold
         reasons, posterior = self._undetermined(problem, unaided, found)
         fold = replace(fold, reasons=reasons)
-        judged = self._judged(reasons)
-        if not judged:
+        numbers = self._numbers(reasons)
+        if not numbers:
             return fold
         left_out = {p.name for effect, form in zip(self._best.effects, self._best.forms,
                                                    strict=True)
@@ -293,7 +292,7 @@ class Judge:
                     unseen[effect] = 'the withheld data do not show it'
         return unseen
 
-    def _judged(self, reasons: Mapping[str, str]) -> list[Parameter]:
+    def _numbers(self, reasons: Mapping[str, str]) -> list[Parameter]:
         """Return the numbers of the effects that can be judged."""
         return [p for effect, form in zip(self._best.effects, self._best.forms, strict=True)
                 if effect not in reasons for p in form.parameters]
@@ -306,39 +305,31 @@ class Judge:
                    residual: FloatArray, found: FitState, posterior: FloatArray,
                    followed: Callable[[FloatArray], FloatArray] = lambda drawn: drawn) -> Withheld:
         """
-        Return a fold with what is left, and with draws of the numbers that can be judged.
+        Return a fold with what remains, and with draws of the numbers that can be judged.
 
-        Parameters
-        ----------
-        fold
-            with the reasons why the others cannot
-        problem, point, residual
-            the withheld test, where it is judged, and the residual there, shape (n c,)
-        found, posterior
-            the fit to the training data, and the covariance of its numbers
-        followed
-            of residuals with draws, shape (draws, n c), those that are left once the nuisances
-            have followed
-
+        `point` and `residual`, shape (n c,), are where the withheld test is judged; `found` and
+        `posterior` are the fit to the training data and its covariance. `followed` returns, of
+        residuals with draws, shape (draws, n c), those that are left once the nuisances have
+        followed.
         """
-        judged = self._judged(fold.reasons)
-        if not judged:
+        numbers = self._numbers(fold.reasons)
+        if not numbers:
             return fold
         names = [p.name for p in found.parameters]
-        places = [names.index(p.name) for p in judged]
+        places = [names.index(p.name) for p in numbers]
         # rounding may leave the least variance just below zero
         draws = np.random.default_rng(0).multivariate_normal(
             found.x[places], posterior[np.ix_(places, places)], self._settings.held_out.draws,
             method='eigh', check_valid='ignore')
         drawn = followed(problem.residuals_at([
             {**point, **{p.name: min(max(value, p.low), p.high)
-                         for p, value in zip(judged, draw, strict=True)}}
+                         for p, value in zip(numbers, draw, strict=True)}}
             for draw in draws.tolist()]))
         return replace(
             fold, judged=tuple(e for e in self._best.effects if e not in fold.reasons),
             gap_after=_gap(problem.machine, point),
             after=_shaped(problem, residual),
-            names=tuple(p.name for p in judged), values=found.x[places],
+            names=tuple(p.name for p in numbers), values=found.x[places],
             drawn=np.array([_shaped(problem, z) for z in drawn]))
 
     def _fitted(self, testing: Part, nuisances: Sequence[Parameter], held: Mapping[str, float],

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 from simgap.fit import residual_statistics as statistics
-from simgap.fit.least_squares import FitState, LeastSquares
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.state import FitState
 from simgap.machine.contract import FloatArray
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import Settings
@@ -21,19 +22,10 @@ from simgap.verdict.verdict import LackOfFit
 def lack_of_fit(problem: LeastSquares, raw: FloatArray, best: Hypothesis,
                 explained: float | None) -> LackOfFit:
     """
-    Return what the best hypothesis leaves, after a fit that has converged.
+    Return what the best hypothesis leaves of the whole tests, after a fit that has converged.
 
-    Parameters
-    ----------
-    problem
-        the whole tests
-    raw
-        residuals of the model as configured, shape (n,)
-    best
-        hypothesis
-    explained
-        upper end of the interval of what it explains of withheld data, None without effects
-
+    `raw` has the residuals of the model as configured, shape (n,). `explained` is the upper end of
+    the interval of what the hypothesis explains of withheld data, None without effects.
     """
     loudest, fast, fast_left = _fast(problem, raw, best)
     signal, regular = _regular(problem, best.state)
@@ -82,7 +74,7 @@ def _regular(problem: LeastSquares, state: FitState) -> tuple[str, float]:
     """
     Return the signal whose residual repeats itself most in a test, and by how much.
 
-    A hum, a ripple or a resonance may be no louder than a sensor's noise may be. But what is left
+    A hum, a ripple or a resonance may be no louder than a sensor's noise may be. But what remains
     of noise is white, because its colour is known. What is quieter than noise counts less.
     """
     settings = problem.settings.lack_of_fit
@@ -160,15 +152,7 @@ def remainders(problem: LeastSquares, state: FitState,
     """
     Return what a hypothesis leaves of each signal, in its own unit, for the JSON.
 
-    Parameters
-    ----------
-    problem
-        the whole tests
-    state
-        of the hypothesis
-    limits
-        for some signals, the remainder beyond noise from which it matters
-
+    For some signals `limits` has the remainder beyond noise from which it matters.
     """
     predicted = problem.machine.simulate([state.point()])[0]
     found: dict[str, dict[str, Any]] = {}
@@ -185,7 +169,7 @@ def remainders(problem: LeastSquares, state: FitState,
         if gap.size < problem.settings.lack_of_fit.least_samples:
             found[channel] = {'unit': unit, 'too_few_to_judge': int(gap.size)}
             continue
-        # a spike is no part of what a model leaves
+        # a spike is not part of what a model leaves
         bound = problem.settings.lack_of_fit.clip_fast * max(
             1.4826 * float(np.median(np.abs(gap))), float(np.median(noise)))
         rms = float(np.sqrt(np.mean(np.clip(gap, -bound, bound) ** 2)))
@@ -213,6 +197,6 @@ def residual_tests(problem: LeastSquares, state: FitState, lack: LackOfFit) -> d
                 'greatest_correlation': max(
                     statistics.autocorrelation(part[:, c], settings) for part in zs),
             }
-    covariates = [problem.machine.covariates(k) for k in range(count)]
+    covariates = [problem.machine.motion(k).covariates() for k in range(count)]
     return {'excess_over_noise': lack.slow_excess, 'share_left': lack.left, 'signals': signals,
             'depends_on': statistics.dependences(channels, covariates, zs, settings)}

@@ -13,7 +13,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from simgap.fit.least_squares import FitState, LeastSquares
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.state import FitState
 from simgap.machine.contract import FloatArray
 from simgap.verdict import unknown_input
 from simgap.verdict.verdict import Answer, LackOfFit
@@ -26,20 +27,12 @@ def of_effects(problem: LeastSquares, answers: Sequence[Answer], none: FitState,
     """
     Return where the effects of a verdict lie, the largest share first.
 
-    Parameters
-    ----------
-    problem
-        the machine in its experiments
-    answers
-        the hypotheses with their probabilities
-    none, best
-        where the fits ended without and with the likeliest effects
-
+    `none` and `best` are where the fits ended without and with the likeliest effects.
     """
     parts: dict[str, float] = {}
     for answer in answers:
         for effect in answer.effects:
-            part = problem.machine.effects[effect].component
+            part = problem.machine.catalogue[effect].component
             share = answer.probability / len(answer.effects)
             parts[part] = parts.get(part, 0.0) + share
     return _located(problem, parts, lambda k: problem.residuals_of(none, k) ** 2
@@ -51,20 +44,9 @@ def parts_of_the_unknown(problem: LeastSquares, none: FitState, lack: LackOfFit,
     """
     Return in which parts something may act that no effect names, and in which places.
 
-    Parameters
-    ----------
-    problem
-        the machine in its experiments
-    none
-        where the fit ended without any effect
-    lack
-        what the best hypothesis leaves: what is too fast for a pulse, or repeats itself, shows
-        in one reading, and is put there
-
-    Returns
-    -------
-    how likely each part is, empty if none is likely; the places, the likeliest first
-
+    The parts come with how likely each is, and are none if none is likely; the likeliest place is
+    the first. `none` is where the fit ended without any effect. What is too fast for a pulse, or
+    repeats itself, shows in one reading, and is put there: `lack` tells.
     """
     settings = problem.settings
     truncated = LeastSquares(problem.machine.truncated(), settings=settings)
@@ -95,7 +77,7 @@ def _located(problem: LeastSquares, parts: Mapping[str, float],
     settings = problem.settings.localisation
     shares: dict[tuple[str, str], float] = {}
     for k, experiment in enumerate(problem.experiments):
-        regimes = problem.machine.regimes(k)
+        regimes = problem.machine.motion(k).regimes()
         sample = np.nan_to_num(energy(k))
         for c, channel in enumerate(experiment.channels):
             for r, name in enumerate(regimes.names):

@@ -22,8 +22,9 @@ from functools import partial
 
 import numpy as np
 from scipy import linalg
-from simgap.fit.least_squares import LeastSquares, prior_precision
+from simgap.fit.least_squares import LeastSquares
 from simgap.fit.noise import whitened
+from simgap.fit.state import prior_precision
 from simgap.machine.contract import DisturbanceInput, Experiment, FloatArray, TimeScales
 
 # Variances of the input over that of the noise that are tried.
@@ -54,24 +55,19 @@ def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
     """
     Return where an unknown input may act, the likeliest place first.
 
-    Parameters
-    ----------
-    problem
-        the machine in its experiments
-    point
-        the nuisances as fitted without any effect
-
+    `point` has the nuisances as fitted without any effect.
     """
     evidence = _Evidence.at(problem, point)
     found = []
     for place in problem.machine.disturbance_inputs:
         responses, _ = _columns(problem, point, place, evidence.residual)
-        found.append(Place(place.name, place.component, *evidence.judged(responses, problem)))
+        found.append(Place(place.name, place.component,
+                           *evidence.weighed(responses, problem)[:2]))
     scales = problem.machine.time_scales
     for c, channel in enumerate(problem.experiments[0].channels):
-        found.append(Place(f'reading of {channel}', channel, *evidence.judged(
+        found.append(Place(f'reading of {channel}', channel, *evidence.weighed(
             [_pulses_of_reading(experiment, c, scales) for experiment in problem.experiments],
-            problem)))
+            problem)[:2]))
     return sorted(found, key=lambda place: -place.evidence)
 
 
@@ -80,24 +76,13 @@ def courses(problem: LeastSquares, point: Mapping[str, float],
     """
     Return what would have to enter at a place to explain a gap, over time.
 
-    Parameters
-    ----------
-    problem
-        the machine in its experiments
-    point
-        the nuisances as fitted without any effect
-    place
-        one of the machine's disturbance inputs
-
-    Returns
-    -------
-    for each experiment times, shape (m,) [s], and the likeliest values at them, shape (m,), with
-    straight lines between, in the unit of the machine's `simulate_disturbed`
-
+    `point` is as in `places`. For each experiment these are times, shape (m,) [s], and the
+    likeliest values at them, shape (m,), with straight lines between, in the unit of the machine's
+    `simulate_disturbed`.
     """
     evidence = _Evidence.at(problem, point)
     responses, times = _columns(problem, point, place, evidence.residual)
-    heights = evidence.heights(responses, problem)
+    _, _, heights = evidence.weighed(responses, problem)
     found, first = [], 0
     for moments in times:
         order = np.argsort(moments)
@@ -133,13 +118,7 @@ def components(found: Sequence[Place], caution: float) -> dict[str, float]:
     """
     Return how likely each part of the machine is, by its best place; all sum to 1.
 
-    Parameters
-    ----------
-    found
-        from `places`
-    caution
-        share of the evidence that counts, because residuals are not white
-
+    Of the evidence the share `caution` counts, because residuals are not white.
     """
     best: dict[str, float] = {}
     for place in found:
@@ -219,17 +198,14 @@ class _Evidence:
                              - self._slope @ self._inverse @ self._slope)
         self._count = float(np.count_nonzero(weight))
 
-    def judged(self, responses: Sequence[FloatArray],
-               problem: LeastSquares) -> tuple[float, float]:
-        """Return the evidence for an input with these responses, and the share it explains."""
-        return self._judged(responses, problem)[:2]
-
-    def heights(self, responses: Sequence[FloatArray], problem: LeastSquares) -> FloatArray:
-        """Return the likeliest factor of each response, shape (pulses of all experiments,)."""
-        return self._judged(responses, problem)[2]
-
-    def _judged(self, responses: Sequence[FloatArray],
+    def weighed(self, responses: Sequence[FloatArray],
                 problem: LeastSquares) -> tuple[float, float, FloatArray]:
+        """
+        Return the evidence for an input with these responses, and what it explains.
+
+        That is the share of the energy that it explains, and the likeliest factor of each
+        response, shape (pulses of all experiments,).
+        """
         squares, slopes, crosses = [], [], []
         for k, columns in enumerate(responses):
             rows = problem.rows(k)

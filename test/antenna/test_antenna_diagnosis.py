@@ -42,10 +42,10 @@ def made(point: Any, seconds: float, names: tuple[str, ...] = ('square', 'triang
     """Return recordings of a drive with these parameter values."""
     tests = {name: planned(BUILT_IN[name], seconds, 100.0) for name in names}
     model = AntennaMachine(tests, load(), threads=1)
-    for effect in model.effects.values():
+    for effect in model.catalogue.values():
         for form in effect.forms:
             if isinstance(form, Wave):
-                model._wave_at(form, 12.0)
+                model.catalogue.wave_at(form, 12.0)
     values: Any = model.simulate([point])[0]
     random = np.random.default_rng(seed)
     recordings = {}

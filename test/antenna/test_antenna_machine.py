@@ -13,7 +13,8 @@ from antenna_drive.parameters import load
 from antenna_drive.recording.sheet import FixedBias, FixedStepBias
 import numpy as np
 import pytest
-from simgap.fit.least_squares import LeastSquares, with_initial_conditions
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.starts import with_initial_conditions
 
 LENGTH_S = 8.0
 
@@ -34,7 +35,7 @@ def model() -> AntennaMachine:
 def test_a_derivative_of_rough_runs_is_nearly_that_of_fine_ones(
         model: AntennaMachine, effect: str) -> None:
     """Two runs of 2.5 ms, taken here by hand, against the column that a fit is given."""
-    form = model.effects[effect].forms[0]
+    form = model.catalogue[effect].forms[0]
     size, point = form.parameters[0], form.start
     problem = LeastSquares(model)
     residual = problem.residuals(point)
@@ -50,7 +51,7 @@ def test_a_derivative_of_rough_runs_is_nearly_that_of_fine_ones(
     ('torque_share.filter_1_pole.change', 0.5)])
 def test_rough_runs_stay_within_the_noise_of_fine_ones(
         model: AntennaMachine, name: str, value: float) -> None:
-    form = next(form for effect in model.effects.values() for form in effect.forms
+    form = next(form for effect in model.catalogue.values() for form in effect.forms
                 if form.parameters[0].name == name)
     point = {**form.start, name: value}
     fine, rough = (of.simulate([point])[0] for of in (model, model.low_fidelity()))
@@ -100,14 +101,14 @@ def test_an_effect_takes_over_the_tolerance_of_its_own_number(model: AntennaMach
     for effect, path in (('axis.coulomb_friction', 'plant.axis.coulomb_torque'),
                          ('torque_share.filter_1_gain', 'torque_share.filter_1.gain'),
                          ('motors.amplifier_gain', '')):
-        form = model.effects[effect].forms[0]
+        form = model.catalogue[effect].forms[0]
         size = form.sizes[0].name
         point = {**dict.fromkeys((p.name for p in model.nuisances), 0.0), **form.start, size: 0.1}
         for name, value in ({f'offset:{path}': 0.015} if path else {
                 'offset:motor_1.amplifier.rate_gain': 0.02,
                 'offset:motor_2.amplifier.rate_gain': 0.01}).items():
             point[name] = value
-        taken, held = model.take_over(point, [form])
+        taken, held = model.nuisances.take_over(point, [form])
         assert held == ({f'offset:{path}'} if path else set())
         assert all(taken[name] == 0.0 for name in held)
         assert taken[size] == pytest.approx(1.1 * 1.015 - 1.0)

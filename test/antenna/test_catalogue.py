@@ -53,9 +53,9 @@ def model() -> Any:
 
 def forms_of(model: Any, effect: Any) -> Any:
     """Return all forms of an effect, a wave at its first order."""
-    for form in model.effects[effect.id].forms:
+    for form in model.catalogue[effect.id].forms:
         if isinstance(form, Wave):
-            form = model._wave_at(form, form.orders[3])
+            form = model.catalogue.wave_at(form, form.orders[3])
         yield form
 
 
@@ -92,14 +92,14 @@ def test_effect_knows_by_how_much_its_number_may_be_off_anyway(model: Any, name:
     """Whether a number is scaled or added to, and whatever else it moves with."""
     resistance = load().motor_2.armature.resistance
     expected = model.tolerance * (resistance if 'resistance' in name else 1.0)
-    found = {p.name: p.tolerance for effect in model.effects.values()
+    found = {p.name: p.tolerance for effect in model.catalogue.values()
              for form in effect.forms for p in form.parameters}
     assert found[name] == pytest.approx(expected)
     assert found['motor_1.viscous_friction.flow_index'] == 0.0, 'a shape may be anything'
 
 
 def test_every_effect_but_a_gust_and_lost_bits_has_a_size_that_is_healthy(model: Any) -> None:
-    without = {effect.id for effect in model.effects.values()
+    without = {effect.id for effect in model.catalogue.values()
                if not any(p.tolerance for form in effect.forms for p in form.sizes)}
     assert without == {'axis.wind_gust', 'encoder.quantisation'}
 
@@ -108,15 +108,15 @@ def test_every_effect_but_a_gust_and_lost_bits_has_a_size_that_is_healthy(model:
                          ids=lambda effect: effect.id)
 def test_effect_becomes_the_simpler_one_that_it_names(model: Any, effect: Any) -> None:
     """At the end of its range, in a slow test, most of what it does is what the other does."""
-    form = model.effects[effect.id].forms[0]
+    form = model.catalogue[effect.id].forms[0]
     if isinstance(form, Wave):
-        form = model._wave_at(form, form.orders[0])  # the longest wave
+        form = model.catalogue.wave_at(form, form.orders[0])  # the longest wave
         size, end = form.sizes[1], form.start        # a cosine does not vanish at the start
     else:
         [size] = form.sizes
         end = {p.name: p.high for p in form.parameters if p.is_shape}
     point = {**end, size.name: 4.0 * size.tolerance}
-    [simpler] = model.effects[effect.simpler[0]].forms[0].sizes
+    [simpler] = model.catalogue[effect.simpler[0]].forms[0].sizes
 
     def change(point: dict[str, float]) -> Any:
         [with_it, *_], [without, *_] = model.simulate([point, {}])
@@ -132,7 +132,7 @@ def test_effect_becomes_the_simpler_one_that_it_names(model: Any, effect: Any) -
 
 def test_time_stamps_err_more_on_what_is_faster(model: Any) -> None:
     """The noise of a reading that ripples is the sheet's and the ripple's slope times jitter."""
-    form = model._wave_at(model.effects['tach_1.ripple'].forms[0], 3.0)
+    form = model.catalogue.wave_at(model.catalogue['tach_1.ripple'].forms[0], 3.0)
     point = {**form.start, form.parameters[0].name: 0.2}
     quiet, loud = model.experiments, model.with_noise_at(point).experiments
     late = 3e-7

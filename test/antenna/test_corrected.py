@@ -22,7 +22,7 @@ from antenna_drive.recording.recording import Recording
 import numpy as np
 import pytest
 from simgap.errors import UserError
-from simgap.fit.least_squares import FitState
+from simgap.fit.state import FitState
 from simgap.machine.by_label import split
 from simgap.machine.contract import Form
 from simgap.search.hypothesis import Hypothesis
@@ -51,9 +51,9 @@ def machine(tests: dict[str, Recording]) -> AntennaMachine:
 def hypothesis(machine: AntennaMachine, point: dict[str, float]) -> Hypothesis:
     """Return the fitted effects and nuisances that have these values."""
     forms: dict[str, Form] = {}
-    for effect in machine.effects.values():
+    for effect in machine.catalogue.values():
         for form in effect.forms:
-            at = machine._wave_at(form, 12.0) if isinstance(form, Wave) else form
+            at = machine.catalogue.wave_at(form, 12.0) if isinstance(form, Wave) else form
             if effect.id not in forms and any(p.name in point for p in at.sizes):
                 forms[effect.id] = at
     parameters = (*machine.nuisances, *(p for form in forms.values() for p in form.parameters))

@@ -82,7 +82,7 @@ def test_angle_within_the_digit_that_was_read_is_no_residual(
     """An encoder of coarse digits is no gap once they are known, wherever it rounds."""
     drive, digit = load(), 2e-4
     model = AntennaMachine({'a': recorded(drive, digit, rounding)}, drive, 1)
-    step, edge = model.effects['encoder.quantisation'].forms[0].parameters
+    step, edge = model.catalogue['encoder.quantisation'].forms[0].parameters
     assert step.high == pytest.approx(digit, rel=1e-6)
     measured = model.experiments[0].measured[:, ENCODER]
     plain = readings_of(model, {})[:, ENCODER]
@@ -95,10 +95,10 @@ def test_planned_test_is_read_in_the_digits_that_were_seen() -> None:
     """A verdict that saw digits leads to a next test, whose readings are whole digits."""
     drive, digit = load(), 2e-4
     seen = AntennaMachine({'a': recorded(drive, digit, np.floor)}, drive, 1)
-    [form] = seen.effects['encoder.quantisation'].forms
+    [form] = seen.catalogue['encoder.quantisation'].forms
     next_test = AntennaMachine({'b': planned(replace(SHEET, waveform=Square(0.1, 4.0, 0.0)),
                                              5.0, 100.0)}, drive, 1)
-    own = next_test.form_named(next_test.effects['encoder.quantisation'], form.name)
+    own = next_test.catalogue.form_named(next_test.catalogue['encoder.quantisation'], form.name)
     assert {p.name for p in own.parameters} <= {p.name for p in form.parameters}
     read = readings_of(next_test, {own.parameters[0].name: digit})[:, ENCODER]
     assert np.ptp(read) > 10 * digit, 'it moves'
@@ -109,9 +109,9 @@ def test_fine_encoder_has_the_digits_of_its_sheet() -> None:
     """Digits that the sheet gives are no effect."""
     drive = load()
     model = AntennaMachine({'a': recorded(drive, 2.0 * math.pi / 2 ** 21, np.floor)}, drive, 1)
-    assert [p.name for p in model.effects['encoder.quantisation'].forms[0].parameters] == [
+    assert [p.name for p in model.catalogue['encoder.quantisation'].forms[0].parameters] == [
         'encoder.quantisation.step']
-    assert model.effects['encoder.quantisation'].forms[0].parameters[0].high > 1e-3
+    assert model.catalogue['encoder.quantisation'].forms[0].parameters[0].high > 1e-3
 
 
 def test_steps_are_short_where_a_wave_turns_fast() -> None:

@@ -26,8 +26,9 @@ from antenna_drive.recording.sheet import load_sheet, TestSheet
 import numpy as np
 import pytest
 from simgap.errors import UserError
-from simgap.next_test.design import Judged, Proposal, TestSpace
+from simgap.next_test.candidate import Candidate, Proposal
 from simgap.next_test.rivals import Findings, Rival
+from simgap.next_test.space import TestSpace
 
 DRIVE = load()
 LIMITS = DriveLimits.of_drive(DRIVE)
@@ -74,7 +75,7 @@ class Laboratory:
     def design(self, space: TestSpace, findings: Findings, objective: str, **rest: Any) -> Any:
         def search(progress: Any) -> Proposal:
             self.note(f'{objective} {len(findings.rivals)} at {findings.inflated:g}')
-            tests = [Judged('triangle', BUILT_IN['triangle'], {'rate_deg_s': 0.5})]
+            tests = [Candidate('triangle', BUILT_IN['triangle'], {'rate_deg_s': 0.5})]
             return Proposal(objective, 'by hand', (), tests if self.helps else [], {})
         return SimpleNamespace(run=search)
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 from antenna_drive.diagnosis.field_test import ENCODER, TACH_1, TACH_2
 from antenna_drive.diagnosis.late_readings import dense, parts_of, read_at
 from antenna_drive.diagnosis.machine import AntennaMachine, LOW_FIDELITY_STEP
+from antenna_drive.diagnosis.plans import Plans
 from antenna_drive.diagnosis.prediction import predict, RecorderErrors
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
 from antenna_drive.parameters import load
@@ -86,7 +87,7 @@ def test_a_jump_between_two_samples_moves_the_whole_response() -> None:
     moved, _ = stepping(2.001)
     moved._tests = [replace(test, command=replace(
         test.command, time=test.command.time + shift, jumps=test.command.jumps + shift))]
-    moved._plans.clear()
+    moved._plans = Plans()
     moved._runs.clear()
     exact, found = moved.predict({}, 0), machine.predict({jump.name: shift}, 0)
     plain = machine.predict({}, 0)

@@ -120,9 +120,9 @@ def test_a_sheet_says_what_else_may_be_off(tolerant: AntennaMachine) -> None:
     assert bounds['zero:current_1:made'] == (-0.02, 0.02)
     assert bounds['clock_rate:made'] == pytest.approx((-1e-4, 1e-4))
     # the effect in the same number knows its tolerance
-    effect = tolerant.effects['tach_2.offset'].forms[0].parameters[0]
+    effect = tolerant.catalogue['tach_2.offset'].forms[0].parameters[0]
     assert effect.tolerance == 0.01
-    assert tolerant.effects['current_1.gain'].forms[0].parameters[0].tolerance == 0.01
+    assert tolerant.catalogue['current_1.gain'].forms[0].parameters[0].tolerance == 0.01
 
 
 def test_a_delayed_channel_reads_what_was_a_moment_before(tolerant: AntennaMachine) -> None:

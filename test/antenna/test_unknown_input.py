@@ -87,7 +87,7 @@ def test_evidence_is_that_of_a_normal_distribution() -> None:
             """Return all rows."""
             return slice(0, 40)
 
-    evidence, _ = inputs.judged([columns], One())  # type: ignore[arg-type]
+    evidence, *_ = inputs.weighed([columns], One())  # type: ignore[arg-type]
 
     def worst(size: FloatArray) -> float:
         spread = np.exp(size[0]) * (np.eye(40) + np.exp(size[1]) * columns @ columns.T)

@@ -8,12 +8,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from blas_threads import during, Look
+from lab.servo.ranking import rank_hypotheses
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
 from simgap.next_test.rivals import Rival
-from simgap.search.ranking import rank_hypotheses
 from simgap.settings import DEFAULT
 from simgap.verdict.diagnosis import diagnose, share_text
 
@@ -141,7 +141,7 @@ def test_an_effect_that_the_catalogue_lacks_is_unknown() -> None:
     unknown = [next(e['probability'] for e in result['which'] if e['effects'] == ['unknown'])
                for result in (whole, withheld)]
     assert unknown[1] > unknown[0] + 0.5
-    assert 'heater.step' in body.effects, 'the machine itself stays as it is'
+    assert 'heater.step' in body.catalogue, 'the machine itself stays as it is'
 
 
 class Weather(Form):
@@ -160,8 +160,8 @@ class BodyInWeather(Body):
         weather = Weather('', tuple(
             Parameter(f'air.weather.{name}', 'K', -1.0, 1.0, 1e-3)
             for name in ('step', 'wave')), is_course=True)
-        self.effects = {**self.effects, 'air.weather': Effect(
-            'air.weather', 'air', 'a cause', 'a look', (weather,))}
+        self.catalogue['air.weather'] = Effect(
+            'air.weather', 'air', 'a cause', 'a look', (weather,))
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
         """Return what both thermometers say."""
@@ -232,11 +232,10 @@ def test_no_gap_says_what_could_hide() -> None:
 def test_what_could_hide_is_said_beside_an_effect_within_its_tolerance() -> None:
     """Its shape has no prior, and nothing in the data tells it."""
     body = Body({'heater.step.size': 0.05})
-    heater = body.effects['heater.step']
+    heater = body.catalogue['heater.step']
     tolerant = replace(heater.forms[0].parameters[0], tolerance=0.1)
     shape = Parameter('heater.step.shape', '1', 0.5, 2.0, 0.1, start=1.0, is_shape=True)
-    body.effects = {**body.effects, 'heater.step': replace(
-        heater, forms=(Form('', (tolerant, shape)),))}
+    body.catalogue['heater.step'] = replace(heater, forms=(Form('', (tolerant, shape)),))
     result = diagnose(body).result
     assert result['verdict'] == 'no_gap'
     assert [item['effect'] for item in result['also_seen']] == ['heater.step']

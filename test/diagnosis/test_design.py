@@ -14,10 +14,13 @@ import numpy as np
 import pytest
 from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
 from simgap.next_test import design
-from simgap.next_test.design import CRITERIA, DesignEffort, Judged, TestDesign, TestSpace
-from simgap.next_test.discrimination import refitted, Separation
+from simgap.next_test.candidate import Candidate
+from simgap.next_test.design import CRITERIA, DesignEffort, TestDesign
 from simgap.next_test.proposal import as_data, contents, lines
+from simgap.next_test.rival_fits import confirmed_separation
 from simgap.next_test.rivals import Findings, Rival
+from simgap.next_test.separation import Separation
+from simgap.next_test.space import TestSpace
 from simgap.settings import DEFAULT
 
 SMALL = DesignEffort(drawn=8, judged=6, varied=2, variants=2, confirmed=2)
@@ -105,7 +108,7 @@ def test_a_random_test_may_be_of_any_kind_that_is_allowed() -> None:
 def test_the_promise_for_the_best_test_is_confirmed_by_fits() -> None:
     found = TestDesign(Loads(1.6), Findings(HARD), effort=SMALL).run()
     best = found.tests[0]
-    assert best.confirmed is not None and best.told is not None
+    assert best.confirmed is not None and best.promised is not None
     data = as_data(found, Loads(1.6))
     assert data['expected']['confirmed']
     assert data['expected']['right_after'] > 0.95 > data['expected']['right_before']
@@ -125,10 +128,10 @@ class Promising(Loads):
 def test_where_a_family_breaks_its_promises_another_one_is_confirmed(
         monkeypatch: pytest.MonkeyPatch) -> None:
     def fitted(machine: Lever, *rest: Any) -> Separation:
-        told = refitted(machine, *rest)
+        told = confirmed_separation(machine, *rest)
         return replace(told, lack=1e-3 * told.lack) if machine.load > 1.0 else told
 
-    monkeypatch.setattr(design, 'refitted', fitted)
+    monkeypatch.setattr(design, 'confirmed_separation', fitted)
     found = TestDesign(Promising(2.0), Findings(HARD), effort=SMALL).run()
     great = [test for test in found.tests if test.family == 'great']
     assert len(great) > SMALL.rounds * SMALL.confirmed
@@ -146,7 +149,7 @@ def test_what_is_confirmed_counts_in_full_though_its_family_broke_promises() -> 
     assert found.score == pytest.approx(_compound(found, DEFAULT.planning.unlisted))
 
 
-def _compound(test: Judged, unlisted: float) -> float:
+def _compound(test: Candidate, unlisted: float) -> float:
     assert test.confirmed is not None
     told = test.confirmed.information(DEFAULT.verdict.temperature, DEFAULT.planning.caution)
     return (1.0 - unlisted) * np.log(told) - unlisted * np.log(test.coarseness)
@@ -240,7 +243,7 @@ class Heated(Loads):
     def machine(self, test: Any) -> Lever:
         load, hot = test
         lever = HotLever(load) if hot else Lever(load)
-        lever.effects = {**lever.effects, EXPANSION.id: EXPANSION}
+        lever.catalogue[EXPANSION.id] = EXPANSION
         return lever
 
 
@@ -262,7 +265,7 @@ def test_of_tests_that_tell_the_rivals_apart_one_that_shows_more_is_proposed(see
     found = TestDesign(Heated(1.6), Findings(HARD), effort=SMALL, seed=seed).run()
     best, cold = found.tests[0], next(t for t in found.tests if not t.test[1])
     for test in (best, cold):
-        assert test.told is not None and test.told.expected(8.0) > 0.95
+        assert test.promised is not None and test.promised.expected(8.0) > 0.95
     assert best.test[1]
     # the expansion, one effect of four, counts as a thousand times too large in the cold
     assert cold.coarseness / best.coarseness == pytest.approx(1000.0 ** 0.25, rel=0.2)
@@ -279,7 +282,7 @@ def test_what_the_tests_so_far_have_shown_counts_for_no_further_test() -> None:
             load, hot = test
             return super().machine((load / 2.0 if hot else load, hot))
 
-    def found(shown: Mapping[str, float]) -> Judged:
+    def found(shown: Mapping[str, float]) -> Candidate:
         return TestDesign(Softened(1.6), Findings(shown=shown), 'detect',
                           effort=SMALL).run().tests[0]
 
@@ -302,7 +305,7 @@ def test_the_next_test_shows_the_part_where_something_without_a_name_may_lie(
         def machine(self, test: Any) -> Lever:
             load, hot = test
             lever = super().machine((load / 50.0 if hot else load, hot))
-            lever.effects = {**lever.effects, EXPANSION.id: replace(EXPANSION, component='oven')}
+            lever.catalogue[EXPANSION.id] = replace(EXPANSION, component='oven')
             return lever
 
     found = TestDesign(Faint(1.6), Findings(unnamed=unnamed), 'detect', effort=SMALL).run()
@@ -329,7 +332,7 @@ def test_the_same_seed_proposes_the_same_test() -> None:
     one, other, third = (
         TestDesign(Loads(1.6), Findings(HARD), effort=SMALL, seed=seed).run().tests[0]
         for seed in (3, 3, 4))
-    assert isinstance(one, Judged) and one.test == other.test != third.test
+    assert isinstance(one, Candidate) and one.test == other.test != third.test
 
 
 def test_linear_algebra_has_one_thread_because_tests_are_judged_side_by_side() -> None:

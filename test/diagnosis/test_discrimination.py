@@ -12,8 +12,10 @@ import math
 import numpy as np
 import pytest
 from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
-from simgap.next_test.discrimination import refitted, Separation, separation
+from simgap.next_test.discrimination import separation
+from simgap.next_test.rival_fits import confirmed_separation
 from simgap.next_test.rivals import Rival
+from simgap.next_test.separation import Separation
 from simgap.verdict.doubts import Doubt
 
 WIDE = 1e3
@@ -93,7 +95,7 @@ def test_fits_of_linear_curves_end_where_the_projection_says() -> None:
     x = np.linspace(-1.0, 1.0, 200)
     rivals = [rival('waves', TRUE, 0.02, 0.7), rival('parabola', (1.0, 0.0, -1.8), 0.2, 0.3)]
     machine = Curves(x, 0.5)
-    promised, kept = separation(machine, rivals, 1.6), refitted(machine, rivals, 1.6)
+    promised, kept = separation(machine, rivals, 1.6), confirmed_separation(machine, rivals, 1.6)
     assert kept.lack == pytest.approx(promised.lack, rel=2e-3, abs=1e-6)
     assert kept.points[0, 1].keys() == {f'parabola_{k}' for k in range(3)}
 
@@ -118,7 +120,7 @@ def lack_of_silence(deviation: float, order: int = 1) -> float:
     tone = Rival(('part.tone',), ('part.tone',), ('',), 0.5, ('frequency',), np.array([1.0]),
                  np.array([[deviation ** 2]]))
     silence = Rival((), (), (), 0.5, (), np.zeros(0), np.zeros((0, 0)))
-    lack = refitted(Tone(), [tone, silence][::order], 1.0).lack[::order, ::order]
+    lack = confirmed_separation(Tone(), [tone, silence][::order], 1.0).lack[::order, ::order]
     return float(lack[0, 1])
 
 
@@ -221,7 +223,7 @@ def test_a_doubt_falls_as_the_verdict_will_see_the_deviation_shrink(known: float
     # far more than that tells their fits apart
     assert found.lack[0, 1] > 10.0 * wanted
     assert found.evidence(1.0)[0, 1] == found.odds[0, 1]
-    kept = refitted(Curves(np.zeros(n), s), rivals, f, shrunk=found.shrunk)
+    kept = confirmed_separation(Curves(np.zeros(n), s), rivals, f, shrunk=found.shrunk)
     assert kept.odds == pytest.approx(found.odds)
 
 

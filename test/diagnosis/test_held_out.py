@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import (
-    Colour, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point,
+    Colour, Effect, Experiment, FloatArray, Form, Machine, Nuisances, Parameter, Point,
 )
 from simgap.search.hypothesis import Hypothesis
 from simgap.search.training import Part, Slopes, trained
@@ -97,6 +97,14 @@ class Shared(Ramp):
         whole = point.get(SIZE.name, 0.0) + point.get('tolerance', 0.0)
         return super().predict({**point, SIZE.name: whole}, experiment)
 
+    def __init__(self, truths: Sequence[float]) -> None:
+        super().__init__(truths)
+        self.nuisances = SharedNumbers(self.nuisances)
+
+
+class SharedNumbers(Nuisances):
+    """Nuisances whose tolerance an effect takes over."""
+
     def take_over(self, point: Point, forms: Sequence[Form]) -> tuple[dict[str, float], set[str]]:
         """Return a point at which the effect alone stands for the number."""
         if SIZE.name not in point:
@@ -122,7 +130,7 @@ class Thrown(Ramp):
 
     def __init__(self) -> None:
         super().__init__([0.5, 0.5, 0.5])
-        self.nuisances = [ZERO, *self.starts]
+        self.nuisances = Nuisances([ZERO, *self.starts])
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
         """Return the ramp, and for 0.4 s what a start on the other side does."""
@@ -265,15 +273,16 @@ def test_what_a_training_in_a_local_minimum_taught_is_not_judged(truth: float) -
 class Placed(Ramp):
     """A slow ramp whose zero may be either of two places, until its size tells which."""
 
+    def __init__(self, truths: Sequence[float], shows: Sequence[float]) -> None:
+        super().__init__(truths, shows=shows)
+        self.nuisances = Nuisances(self.nuisances, dict.fromkeys(
+            range(len(truths)), [[{'zero': 0.5}, {'zero': -0.5}]]))
+
     def predict(self, point: Point, experiment: int) -> FloatArray:
         """Return the ramp, with a wave that grows with the size and turns with the zero."""
         size, zero = point.get(SIZE.name, 0.0), point.get('zero', 0.0)
         return np.asarray(size * self._shown[experiment] + zero ** 2 - 0.25
                           + 0.1 * size * zero * np.sin(3.0 * TIME))[:, None]
-
-    def initial_conditions(self, experiment: int) -> Sequence[Sequence[Point]]:
-        """Return both places."""
-        return [[{'zero': 0.5}, {'zero': -0.5}]]
 
 
 @pytest.mark.parametrize('passes, wanting, can_judge', [

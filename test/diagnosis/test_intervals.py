@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from simgap.fit.least_squares import FitState
+from simgap.fit.state import FitState
 from simgap.machine.contract import Form, Parameter
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import DEFAULT

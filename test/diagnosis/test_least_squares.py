@@ -14,7 +14,9 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 from simgap.fit.box_qp import box_constrained_step, BoxQuadratic
-from simgap.fit.least_squares import LeastSquares, led, robust_loss, robust_weight, settled
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.robust_loss import robust_loss, robust_weight
+from simgap.fit.starts import led, settled
 from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
 from simgap.settings import DEFAULT
 

@@ -9,8 +9,8 @@ import pytest
 from scipy.signal import lfilter
 from simgap.fit.least_squares import LeastSquares
 from simgap.machine.contract import (
-    Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Parameter, Point,
-    Regimes, TimeScales,
+    Course, DisturbanceInput, Effect, Experiment, FloatArray, Form, Machine, Motion, Parameter,
+    Point, Regimes, TimeScales,
 )
 from simgap.search.hypothesis import Hypothesis
 from simgap.verdict.diagnosis import diagnose
@@ -58,7 +58,15 @@ class TwoLags(Machine):
         readings[:, int(place.component == 'right')] += answered(course(TIME))
         return [readings]
 
-    def regimes(self, experiment: int) -> Regimes:
+    def motion(self, experiment: int) -> Motion:
+        """Return the halves of the test."""
+        return Halves(TIME)
+
+
+class Halves(Motion):
+    """A motion whose regimes are the halves of a test."""
+
+    def regimes(self) -> Regimes:
         """Return the half of the test."""
         return Regimes(('first half', 'second half'), HALF.astype(np.int64))
 
@@ -72,7 +80,7 @@ def smooth(seed: int) -> FloatArray:
 
 def test_an_effect_lies_in_its_part_its_signal_and_its_regime() -> None:
     problem = LeastSquares(TwoLags(2.0 * HALF.astype(np.float64), 0.0 * TIME))
-    effect = problem.machine.effects['left.step']
+    effect = problem.machine.catalogue['left.step']
     none = problem.fit(problem.start(problem.machine.nuisances, {}), 10)
     number = effect.forms[0].parameters[0]
     best = problem.fit(problem.start((*problem.machine.nuisances, number), {}), 10)

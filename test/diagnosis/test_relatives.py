@@ -60,7 +60,7 @@ def test_the_same_effect_in_other_places_is_tried(left: float, right: float, lea
     machine = Springs(left, right)
     problem = LeastSquares(machine)
     search = Search(problem, lambda share, doing: None)
-    form = machine.effects[leading].forms[0]
+    form = machine.catalogue[leading].forms[0]
     start = problem.start([*machine.nuisances, *form.parameters], {f'{leading}.pull': size})
     singles = search._with_relatives([Hypothesis((leading,), (form,), problem.fit(start, 5))])
     assert {h.effects[0] for h in singles} == {'left.pull', 'right.pull', 'both.pull'}
@@ -75,7 +75,7 @@ def test_a_member_of_a_pair_is_tried_in_its_other_places() -> None:
     machine = Springs(0.0, 1.0)
     problem = LeastSquares(machine)
     search = Search(problem, lambda share, doing: None)
-    forms = tuple(machine.effects[key].forms[0] for key in ('left.pull', 'drift'))
+    forms = tuple(machine.catalogue[key].forms[0] for key in ('left.pull', 'drift'))
     start = problem.start([*machine.nuisances, *(p for form in forms for p in form.parameters)],
                           {'left.pull.pull': 1.0, 'drift.pull': 0.1})
     pairs = search._with_relatives([Hypothesis(('left.pull', 'drift'), forms,
@@ -90,7 +90,7 @@ def test_no_pair_has_one_effect_twice() -> None:
     machine = Springs(0.5, 0.2)
     problem = LeastSquares(machine)
     search = Search(problem, lambda share, doing: None)
-    forms = tuple(machine.effects[key].forms[0] for key in ('left.pull', 'right.pull'))
+    forms = tuple(machine.catalogue[key].forms[0] for key in ('left.pull', 'right.pull'))
     start = problem.start([*machine.nuisances, *(p for form in forms for p in form.parameters)],
                           {'left.pull.pull': 0.5, 'right.pull.pull': 0.2})
     pairs = search._with_relatives([Hypothesis(('left.pull', 'right.pull'), forms,
@@ -105,7 +105,7 @@ def test_a_base_that_was_not_settled_is_given_partners_too() -> None:
     search = Search(problem, lambda share, doing: None)
     none = search._nuisances_alone()
     search._take_sensitivities(none.state)
-    form = problem.machine.effects['left.pull'].forms[0]
+    form = problem.machine.catalogue['left.pull'].forms[0]
     start = search.problem.start([*problem.machine.nuisances, *form.parameters], {})
     bare = Hypothesis(('left.pull',), (form,), search.problem.fit(start, 5)).without_jacobian()
     assert {frozenset(h.effects) for h in search._pairs([bare])} >= {
@@ -139,7 +139,7 @@ class Scale(Machine):
 
 def of(problem: LeastSquares, ident: str, **at: float) -> Hypothesis:
     """Return a hypothesis with one effect, fitted from a point."""
-    form = problem.machine.effects[ident].forms[0]
+    form = problem.machine.catalogue[ident].forms[0]
     start = problem.start([*problem.machine.nuisances, *form.parameters],
                           {f'{ident}.{name}': value for name, value in at.items()})
     return Hypothesis((ident,), (form,), problem.fit(start, 10))
@@ -160,9 +160,9 @@ def test_a_simpler_effect_begins_at_the_size_that_does_as_much() -> None:
 
 
 def test_an_effect_that_is_left_out_takes_along_what_becomes_it() -> None:
-    assert list(Scale().without(['scale.zero']).effects) == []
-    assert list(Scale().without(['scale.wave']).effects) == ['scale.zero']
-    assert list(Springs(0.0, 1.0).without(['left.pull']).effects) == ['right.pull', 'drift']
+    assert list(Scale().without(['scale.zero']).catalogue) == []
+    assert list(Scale().without(['scale.wave']).catalogue) == ['scale.zero']
+    assert list(Springs(0.0, 1.0).without(['left.pull']).catalogue) == ['right.pull', 'drift']
 
 
 class Tilted(Machine):
@@ -200,7 +200,7 @@ def test_an_effect_that_nothing_shows_where_a_fit_began_is_found_by_a_scan() -> 
     search = Search(problem, lambda share, doing: None)
     none = problem.start(machine.nuisances, {})
     search._take_sensitivities(none)
-    form = machine.effects['push'].forms[0]
+    form = machine.catalogue['push'].forms[0]
     start = problem.start([*machine.nuisances, *form.parameters], {'push.pull': 1.0})
     singles = search._exchanged([Hypothesis(('push',), (form,), problem.fit(start, 10))])
     assert singles[0].effects == ('weight',)
@@ -227,7 +227,7 @@ def test_training_begins_at_a_size_that_its_own_tests_ask_for() -> None:
     """Where the weight sticks no derivative leads to it; the withheld test has no say."""
     machine = Tilted(2.0)
     part = Part(machine, [0, 1])
-    form = machine.effects['weight'].forms[0]
+    form = machine.catalogue['weight'].forms[0]
     size = begun(part, [form], {}, DEFAULT)['weight.pull']
     others = [5.0 * share for share in (-0.9, -0.4, 0.0, 0.1, 0.9)]
     loss = LeastSquares(part).loss

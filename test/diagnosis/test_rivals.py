@@ -39,7 +39,7 @@ class Gauge(Machine):
 
 def answers_of(machine: Machine) -> list[Rival]:
     problem = LeastSquares(machine)
-    [form] = machine.effects['gauge.gain'].forms
+    [form] = machine.catalogue['gauge.gain'].forms
     state = problem.fit(problem.start([*machine.nuisances, *form.parameters], {}), 20)
     fitted = Hypothesis(('gauge.gain',), (form,), state)
     return rivals_of(problem, [Answer(fitted, 0.0, 0.7, ('gauge.gain',)),

@@ -12,10 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
-from simgap.fit.least_squares import FitState
 from simgap.fit.residual_statistics import fast_power, power, slow_excess
+from simgap.fit.state import FitState
 from simgap.machine.contract import FloatArray, Form, Parameter
-from simgap.search.elimination import backward_elimination, forward_selection, settled_rivals
+from simgap.search.elimination import backward_elimination, converged_rivals, forward_selection
+from simgap.search.full_fits import FullFits
 from simgap.search.hypothesis import Hypothesis, penalty
 from simgap.settings import DEFAULT
 from simgap.verdict.verdict import also_seen, best, decide, LackOfFit, rank, unknown_probability
@@ -203,7 +204,7 @@ def test_a_small_partner_is_listed_apart() -> None:
                     'share': pytest.approx(100.0 / 19000.0)}
 
 
-class Ends:
+class Ends(FullFits):
     """Fits whose ends are known: the cost of each set of effects."""
 
     def __init__(self, ends: dict[tuple[str, ...], float]) -> None:
@@ -239,8 +240,8 @@ class Ends:
         return [fitted(more, cost) for more, cost in self.ends.items()
                 if set(hypothesis.effects) < set(more)]
 
-    def judged_by(self, best: Hypothesis,
-                  hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+    def at_noise_of(self, best: Hypothesis,
+                    hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         return list(hypotheses)
 
     def leaves_much(self, hypothesis: Hypothesis) -> bool:
@@ -302,7 +303,7 @@ def test_a_simpler_effect_is_named_if_it_fits_as_well(end: float, expected: str)
 
 def test_the_best_is_fitted_again_if_a_partner_of_no_size_helps_it_along() -> None:
     fits = Ends({('a',): 15500.0})
-    hypotheses, end = settled_rivals(
+    hypotheses, end = converged_rivals(
         fits, [fitted((), 90000.0), fitted(('a',), 15550.0),
                within_tolerance(fitted(('a', 'b'), 15496.0), 'b')],
         fitted(('a',), 15550.0), DEFAULT)
@@ -313,12 +314,12 @@ def test_the_best_is_fitted_again_if_a_partner_of_no_size_helps_it_along() -> No
 def test_an_effect_in_another_place_that_was_given_up_is_tried_before_one_is_named() -> None:
     fits = Ends({('left',): 15990.0, ('right',): 15900.0})
     known = [fitted((), 90000.0), fitted(('left',), 16000.0)]
-    hypotheses, end = settled_rivals(fits, known, fitted(('left',), 15990.0), DEFAULT)
+    hypotheses, end = converged_rivals(fits, known, fitted(('left',), 15990.0), DEFAULT)
     assert end.effects == best(hypotheses, DEFAULT).effects == ('right',)
     assert fits.asked == [('right',)]
     # where it is among the hypotheses, it is a rival as any other: far behind, it stays there
     fits.asked.clear()
-    settled_rivals(fits, [*known, fitted(('right',), 50000.0)], end, DEFAULT)
+    converged_rivals(fits, [*known, fitted(('right',), 50000.0)], end, DEFAULT)
     assert fits.asked == []
 
 
@@ -326,7 +327,7 @@ def test_an_effect_in_another_place_whose_fit_got_stuck_begins_where_the_best_ha
     fits = Ends({('left',): 15990.0, ('right',): 15900.0})
     stuck = fitted(('right',), 16040.0)
     fits.converged = lambda hypothesis: hypothesis  # type: ignore[method-assign]
-    hypotheses, end = settled_rivals(
+    hypotheses, end = converged_rivals(
         fits, [fitted((), 90000.0), fitted(('left',), 15990.0), stuck],
         fitted(('left',), 15990.0), DEFAULT)
     assert end.effects == ('right',)
@@ -339,7 +340,7 @@ def test_only_the_nearest_of_several_ways_to_the_same_effects_is_taken() -> None
     helped = [within_tolerance(fitted((name, partner), cost), partner) for name, partner, cost in (
         ('a', 'c', 15980.0), ('a', 'd', 15981.0), ('a', 'e', 15982.0), ('b', 'c', 16060.0),
         ('x', 'c', 16050.0), ('x', 'd', 16090.0), ('y', 'c', 16070.0), ('b', 'd', 16080.0))]
-    hypotheses, _ = settled_rivals(
+    hypotheses, _ = converged_rivals(
         fits, [fitted((), 90000.0), fitted(('a',), 15995.0), *helped],
         fitted(('a',), 15995.0), DEFAULT)
     # the best, and the two rivals that are nearest in any way
@@ -375,7 +376,7 @@ def test_a_close_rival_is_taken_to_its_end_before_one_is_named() -> None:
     fits = Ends({('a',): 15995.0, ('b',): 15970.0, ('c',): 15000.0})
     found = [fitted((), 90000.0), fitted(('a',), 16000.0), fitted(('b',), 16010.0),
              fitted(('c',), 17500.0)]  # not close
-    hypotheses, end = settled_rivals(fits, found, fitted(('a',), 15995.0), DEFAULT)
+    hypotheses, end = converged_rivals(fits, found, fitted(('a',), 15995.0), DEFAULT)
     assert (end.effects, end.cost) == (('b',), 15970.0)
     # costs stay comparable: all but the rival are as far from their ends as the first was, five
     assert [h.cost for h in hypotheses] == [90000.0, 16000.0, 15975.0, 17500.0]
@@ -385,7 +386,7 @@ def test_a_close_rival_is_taken_to_its_end_before_one_is_named() -> None:
 def test_a_rival_is_found_behind_a_partner_within_its_tolerance() -> None:
     fits = Ends({('a',): 15995.0, ('b',): 15960.0})
     pair = within_tolerance(fitted(('b', 'c'), 15990.0), 'c')
-    hypotheses, end = settled_rivals(
+    hypotheses, end = converged_rivals(
         fits, [fitted((), 90000.0), fitted(('a',), 16000.0), pair], fitted(('a',), 15995.0),
         DEFAULT)
     assert (end.effects, end.cost) == (('b',), 15960.0)

@@ -22,6 +22,7 @@ from lab.servo.firmware import firmware_of
 from lab.servo.log import ServoLog
 from lab.servo.machine import ServoMachine
 from lab.servo.physics import GRAVITY, ORDER
+from lab.servo.ranking import rank_hypotheses
 from lab.servo.rounds import FitEffort, folds, lacking, numbers
 from lab.servo.study import compared, Direction, directions, summed
 import numpy as np
@@ -29,7 +30,6 @@ from numpy.typing import NDArray
 import pytest
 from scipy.integrate import solve_ivp
 from simgap.command.programs import BAD_INPUT
-from simgap.search.ranking import rank_hypotheses
 
 LOGS = Path(__file__).resolve().parents[3] / 'shared' / 'data' / 'bam_xl330'
 MASS, LENGTH, SUPPLY = 0.5, 0.1, 7.4
@@ -211,9 +211,9 @@ def test_threads_change_no_figure(plain_tests: list[ServoLog]) -> None:
 def test_an_effect_that_is_there_is_no_candidate(plain_tests: list[ServoLog]) -> None:
     values = {**TRUTH, 'load_friction': 0.1, 'ripple_cosine@8': 0.01, 'ripple_sine@8': 0.0}
     model = ServoMachine(plain_tests, values, tuple(values))
-    assert 'gearbox.load_dependent_friction' not in model.effects
-    assert 'motor.torque_ripple' not in model.effects  # the physics has one wave of each kind
-    assert 'gearbox.position_dependent_friction' in model.effects
+    assert 'gearbox.load_dependent_friction' not in model.catalogue
+    assert 'motor.torque_ripple' not in model.catalogue  # the physics has one wave of each kind
+    assert 'gearbox.position_dependent_friction' in model.catalogue
     # an offset of nought is the value itself, for logarithmic numbers too
     assert model.numbers(dict.fromkeys(values, 0.0)) == pytest.approx(values)
 

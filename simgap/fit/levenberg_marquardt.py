@@ -1,0 +1,86 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Levenberg-Marquardt within a box, with iteratively reweighted residuals.
+
+Each step d solves, within the bounds of the parameters,
+
+    (H + damping diag(H)) d = J^T W r - P x,    H = J^T W J + P
+
+with the weights W of the robust loss and the precision P of the priors. A step is taken if it
+gains. The damping falls after a good step and grows after one that failed. The linear model is in
+`broyden`, the step in `box_qp`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from simgap.fit.box_qp import box_constrained_step
+from simgap.fit.broyden import BroydenModel
+from simgap.fit.state import FitState, point_of, prior_precision
+from simgap.machine.contract import FloatArray
+from simgap.settings import FitSettings
+
+
+@dataclass(frozen=True)
+class LevenbergMarquardt:
+    """
+    The solver of a least-squares problem.
+
+    Attributes
+    ----------
+    residuals : returns those at a point, shape (n,)
+    weights : returns those of residuals, shape (n,)
+    cost : returns the sum of the losses and of the priors, given residuals, values and precisions
+    settings : thresholds
+
+    """
+
+    residuals: Callable[[dict[str, float]], FloatArray]
+    weights: Callable[[FloatArray], FloatArray]
+    cost: Callable[[FloatArray, FloatArray, FloatArray], float]
+    settings: FitSettings
+
+    def minimised(self, state: FitState, iterations: int) -> FitState:
+        """Run iterations until they gain nothing, or this many of them."""
+        options = self.settings
+        low = np.array([p.low for p in state.parameters])
+        high = np.array([p.high for p in state.parameters])
+        prior = prior_precision(state.parameters)
+        x, residual, cost, weight = state.x, state.residual, state.cost, state.weight
+        model = BroydenModel(state.jacobian, state.hessian, weight, residual, options)
+        damping = options.initial_damping
+        idle = 0
+        for _ in range(iterations):
+            gradient = model.gradient(weight * residual, prior * x)
+            hessian = model.hessian + np.diag(prior)
+            diagonal = np.diag(hessian).copy()
+            step = box_constrained_step(hessian + damping * np.diag(diagonal + 1e-12), gradient,
+                                        low - x, high - x)
+            expected = float(gradient @ step - 0.5 * step @ hessian @ step)
+            if not np.any(step) or expected < options.worth_a_step * options.least_gain:
+                break
+            trial = np.clip(x + step, low, high)
+            after = self.residuals(point_of(state.parameters, trial))
+            trial_cost = self.cost(after, trial, prior)
+            gained = cost - trial_cost
+            # a failed step corrects the Jacobian, too
+            model.update(step, diagonal, residual - after, weight)
+            if gained > 0.0:
+                x, residual, cost = trial, after, trial_cost
+                weight = self.weights(residual)
+                model.reweight(weight, weight * residual)
+                good = gained > options.good_step * expected
+                damping = max(damping / (options.damping_decay if good else 1.0),
+                              options.least_damping)
+                idle = idle + 1 if gained < options.least_gain else 0
+                if idle > options.idle_iterations:
+                    break
+            else:
+                damping = min(max(damping, options.damping_after_failure) * options.damping_growth,
+                              options.greatest_damping)
+        return FitState(state.parameters, x, residual, model.jacobian, weight, cost,
+                        tuple(model.errors), tuple(model.directions))

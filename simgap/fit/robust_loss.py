@@ -1,0 +1,35 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The robust loss of a residual r: half its square up to a bound k, its logarithm beyond.
+
+    rho(r) = r^2 / 2                         for |r| < k
+           = k^2 (1/2 + log(|r| / k))        for |r| >= k
+
+Its weight in iteratively reweighted least squares is rho'(r) / r, which is 1 or (k / r)^2.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from simgap.machine.contract import FloatArray
+
+
+def robust_weight(residual: FloatArray, valid: NDArray[np.bool_], outlier: float) -> FloatArray:
+    """Return the derivative of the robust loss by half the squared residual; 0 if not valid."""
+    size = np.maximum(np.abs(residual), outlier)
+    return np.asarray(np.where(valid, (outlier / size) ** 2, 0.0))
+
+
+def robust_loss(residual: FloatArray, outlier: float) -> float:
+    """
+    Return the sum of losses: half the square of small residuals, logarithmic in large ones.
+
+    After a contact that is made too late everything differs for a while. That must not bend what
+    else is known.
+    """
+    size = np.abs(residual)
+    large = np.maximum(size, outlier)
+    return float(np.sum(np.where(size < outlier, 0.5 * size ** 2,
+                                 outlier ** 2 * (0.5 + np.log(large / outlier)))))

@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Where a fit begins and goes on: the initial conditions, fresh derivatives, and a leading test.
+
+All three lead a fit past minima that derivatives do not lead out of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+
+import numpy as np
+from simgap.fit.least_squares import LeastSquares
+from simgap.fit.state import FitState
+from simgap.machine.contract import Point
+from simgap.settings import SearchSettings
+
+
+def settled(problem: LeastSquares, state: FitState, options: SearchSettings, passes: int,
+            iterations: int) -> FitState:
+    """
+    Go on with a fit, with fresh derivatives, as long as that gains much.
+
+    At most this many Jacobians are taken, with so many iterations after each.
+    """
+    for _ in range(passes):
+        before = state.cost
+        state = problem.fit(problem.refreshed(state), iterations)
+        if before - state.cost < max(options.settled, options.final_gain * before):
+            break
+    return state
+
+
+def led(problem: LeastSquares, state: FitState, options: SearchSettings) -> FitState:
+    """
+    Return a fit that was led out of a local minimum, or the given one if that gains nothing.
+
+    Where motors stick and slip, the cost of a test has many minima, and a slow test holds the fit
+    to all of them in one. The cost of a test that moves smoothly leads to its optimum. So the
+    test that fits best is fitted alone, and all of them from there. If another one then fits
+    best, it leads in its turn.
+    """
+    def fitted(part: LeastSquares, point: Point, target: float = math.inf) -> FitState:
+        begun = part.start(state.parameters, with_initial_conditions(part, dict(point)))
+        found = part.fit(begun, options.settling_iterations)
+        if found.cost >= target:
+            return found
+        return settled(part, found, options, options.final_passes, options.settling_iterations)
+
+    led_by: set[int] = set()
+    while len(led_by) < len(problem.experiments) > 1:
+        leader = problem.best_fitted(state)
+        if leader in led_by:
+            break
+        led_by.add(leader)
+        ahead = fitted(problem.of_experiment(leader), state.point())
+        found = fitted(problem, ahead.point(), state.cost)
+        if found.cost > (1.0 - options.first_gain) * state.cost:
+            break
+        state = found
+    return state
+
+
+def least_cost(problem: LeastSquares, trials: Sequence[dict[str, float]], experiment: int,
+               until: float) -> tuple[float, dict[str, float]]:
+    """
+    Return the least cost among trial points in one experiment until a time [s], and its point.
+
+    The first point wins a tie.
+    """
+    here = problem.experiments[experiment]
+    early = (here.time - here.time[0] < until)[:, np.newaxis]
+    best, least = trials[0], np.inf
+    chunk = problem.settings.fit.batch
+    for first in range(0, len(trials), chunk):
+        part = trials[first:first + chunk]
+        results = problem.machine.simulate(part, [experiment] * len(part), until)
+        for trial, result in zip(part, results, strict=True):
+            z = problem.standardised(experiment, result[experiment]).reshape(here.measured.shape)
+            cost = problem.loss(np.where(early, z, 0.0).ravel())
+            if cost < least:
+                best, least = trial, cost
+    return least, best
+
+
+def with_initial_conditions(problem: LeastSquares, point: dict[str, float]) -> dict[str, float]:
+    """Return a point with the initial conditions that fit the first moments best."""
+    until = problem.machine.time_scales.start_s
+    for k in range(len(problem.experiments)):
+        if not problem.valid[problem.rows(k)].any():
+            continue
+        for trials in problem.machine.nuisances.initial_conditions.get(k, ()):
+            _, point = least_cost(
+                problem, [point, *({**point, **trial} for trial in trials)], k, until)
+    return point

@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where a fit is: values, residuals, and what is known of their derivatives and priors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from simgap.fit.broyden import Jacobian, updated, weighted_product
+from simgap.machine.contract import FloatArray, Parameter
+
+
+@dataclass(frozen=True)
+class FitState:
+    """
+    Where a fit is.
+
+    Attributes
+    ----------
+    parameters : what is fitted, m of them
+    x : their values, shape (m,)
+    residual : measured minus predicted, in standard deviations, shape (n,); zero where nothing
+        was measured
+    base_jacobian : derivative of the prediction [standard deviations per unit] as last taken,
+        shape (n, m); in single precision, because it is large and gives a direction only
+    weight : weight of each residual in iteratively reweighted least squares, shape (n,)
+    cost : sum of the robust losses (half a chi-square if all are small) and of the priors
+    broyden_errors, broyden_directions : the rank-one updates of the Jacobian since then, shapes
+        (n,) and (m,) each
+    kept_hessian : the Hessian of a state that has dropped its Jacobian
+
+    """
+
+    parameters: tuple[Parameter, ...]
+    x: FloatArray
+    residual: FloatArray
+    base_jacobian: Jacobian
+    weight: FloatArray
+    cost: float
+    broyden_errors: tuple[FloatArray, ...] = ()
+    broyden_directions: tuple[FloatArray, ...] = ()
+    kept_hessian: FloatArray | None = None
+
+    @property
+    def jacobian(self) -> Jacobian:
+        """Return the derivative of the prediction, shape (n, m); not kept, to save memory."""
+        return updated(self.base_jacobian, self.broyden_errors, self.broyden_directions)
+
+    @property
+    def has_hessian(self) -> bool:
+        """Return whether the Hessian is known: a state may have dropped its derivatives."""
+        return self.kept_hessian is not None or self.base_jacobian.size > 0
+
+    @cached_property
+    def hessian(self) -> FloatArray:
+        """Return the Gauss-Newton Hessian without the priors, shape (m, m)."""
+        if self.kept_hessian is not None:
+            return self.kept_hessian
+        return weighted_product(self.jacobian, self.weight)
+
+    def without_jacobian(self, keep_hessian: bool = False) -> FitState:
+        """Return the state without its Jacobian, which takes most of the memory."""
+        return FitState(self.parameters, self.x, self.residual, np.empty((0, 0), np.float32),
+                        self.weight, self.cost,
+                        kept_hessian=self.hessian if keep_hessian else None)
+
+    def point(self) -> dict[str, float]:
+        """Return the values by name."""
+        return point_of(self.parameters, self.x)
+
+    def value(self, name: str) -> float:
+        """Return one value by name."""
+        return self.point()[name]
+
+
+def point_of(parameters: Sequence[Parameter], x: FloatArray) -> dict[str, float]:
+    """Return values by the names of their parameters."""
+    return dict(zip((p.name for p in parameters), x.tolist(), strict=True))
+
+
+def prior_precision(parameters: Sequence[Parameter]) -> FloatArray:
+    """Return 1 / prior_sigma^2 of each parameter, 0 without a prior, shape (m,)."""
+    return np.array([1.0 / p.prior_sigma ** 2 if p.prior_sigma > 0.0 else 0.0
+                     for p in parameters])
+
+
+def proper_precision(parameters: Sequence[Parameter]) -> FloatArray:
+    """Return the prior precision; without a prior that of an even spread within the bounds."""
+    prior = prior_precision(parameters)
+    # one that is held has no width
+    even = np.array([12.0 / max(p.high - p.low, 1e-30) ** 2 for p in parameters])
+    return np.where(prior > 0.0, prior, even)

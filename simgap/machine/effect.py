@@ -1,0 +1,142 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""A number that may differ from the model, and an effect: such numbers with one physical cause."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+import math
+
+from simgap.machine.arrays import Point
+
+# Sizes that may be tried out before a fit: of a single number as shares of its bounds; of a wave
+# the least amplitude in steps, the factor to the next one, and the phases [rad].
+_SHARES = (-0.9, -0.6, -0.4, -0.25, -0.15, -0.08, 0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 0.9)
+_LEAST_AMPLITUDE = 2.5
+_GROWTH = 2.5
+_PHASES = tuple(2.0 * math.pi * k / 6 for k in range(6))
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """
+    A number in which the machine may differ from its model; zero is the model as configured.
+
+    Attributes
+    ----------
+    name : unique in its machine
+    unit : of the value
+    low, high : hard bounds, with zero between them
+    step : of the difference quotient, in the unit of the value
+    prior_sigma : standard deviation of a Gaussian prior about zero; 0 for no prior
+    experiment : index of the one experiment that it acts on; None for all
+    start : where a fit begins
+    is_shape : True for a shape parameter, which has no meaning while its effect is absent
+    tolerance : size up to which the model's number may be off without being wrong
+    label : key and value of the label of the tests that it acts on; None for all
+    least_step : least step of a difference quotient, for a prediction that is a staircase in the
+        value, such as a delay in samples; 0 for none
+
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    step: float
+    prior_sigma: float = 0.0
+    experiment: int | None = None
+    start: float = 0.0
+    is_shape: bool = False
+    tolerance: float = 0.0
+    label: tuple[str, str] | None = field(default=None, kw_only=True)
+    least_step: float = field(default=0.0, kw_only=True)
+
+
+@dataclass(frozen=True)
+class Form:
+    """
+    One mathematical form of an effect.
+
+    Attributes
+    ----------
+    name : for people
+    parameters : those that are no shape parameters are zero where the effect is absent
+    scanned : True if the form was chosen by a scan of many, such as the orders of a ripple
+    is_course : True for a course over time that is free at every moment, such as a gust
+    is_wave : True if its two sizes are the sine and the cosine part of a wave
+
+    """
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    scanned: bool = field(default=False, kw_only=True)
+    is_course: bool = field(default=False, kw_only=True)
+    is_wave: bool = field(default=False, kw_only=True)
+
+    @property
+    def sizes(self) -> list[Parameter]:
+        """Return the parameters that vanish with the effect."""
+        return [p for p in self.parameters if not p.is_shape]
+
+    @property
+    def start(self) -> dict[str, float]:
+        """Return the point at which a fit of this form begins."""
+        return {p.name: p.start for p in self.parameters}
+
+    @property
+    def trials(self) -> list[dict[str, float]]:
+        """
+        Return sizes, far from zero, that may be tried out before a fit.
+
+        Of a single size these are shares of its bounds, denser near zero. Of a wave they are
+        amplitudes that grow from a few steps to the bound, each in several phases. Other forms
+        have none.
+        """
+        if self.is_wave and len(self.sizes) == 2:  # with labels there are more
+            sine, cosine = self.sizes
+            least = _LEAST_AMPLITUDE * sine.step
+            amplitudes = [least * _GROWTH ** k for k in range(
+                1 + int(math.log(max(sine.high / least, 1.0), _GROWTH)))]
+            return [{sine.name: amplitude * math.sin(phase),
+                     cosine.name: amplitude * math.cos(phase)}
+                    for amplitude in amplitudes for phase in _PHASES]
+        if len(self.sizes) != 1:
+            return []
+        [size] = self.sizes
+        return [{size.name: share * (size.high if share > 0.0 else -size.low)}
+                for share in _SHARES if share > 0.0 or size.low < 0.0]
+
+    def implausibility(self, point: Point, deviations: Point) -> float:
+        """
+        Return how little these values look like the effect; above 1 is implausible.
+
+        `deviations` has their standard deviations; it is empty where they are not known.
+        """
+        return 0.0
+
+
+@dataclass(frozen=True)
+class Effect:
+    """
+    Something that the model may lack.
+
+    Attributes
+    ----------
+    id : 'component.effect'
+    component : the part of the machine that it sits in
+    cause : its physical cause, one sentence
+    look : what it looks like in the signals, one sentence
+    forms : alternatives; the best one counts
+    parts : ids of the effects that act together in it, each in its own place
+    simpler : ids of the effects that it becomes at an end of its range
+
+    """
+
+    id: str  # noqa: A003: the word of the verdict's format
+    component: str
+    cause: str
+    look: str
+    forms: tuple[Form, ...]
+    parts: tuple[str, ...] = ()
+    simpler: tuple[str, ...] = ()

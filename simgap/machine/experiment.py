@@ -1,0 +1,69 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""What was measured in one test, and the noise in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from simgap.machine.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class Colour:
+    """
+    The colour of noise: a filter whose output is white, see `noise`.
+
+    Attributes
+    ----------
+    pole : of the slow part, for one sample; 0 if there is none
+    gain : share of an innovation that stays in the slow part
+    level : standard deviation of the innovations, in units of the stated noise
+
+    """
+
+    pole: float = 0.0
+    gain: float = 0.0
+    level: float = 1.0
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """
+    What was measured in one test.
+
+    Attributes
+    ----------
+    name : for people
+    time : shape (n,) [s]
+    channels : names of the c signals
+    units : of the signals
+    measured : shape (n, c); NaN where there is no sample
+    noise : standard deviation of the residuals of a perfect model, shape (n, c)
+    quantised : names of signals whose residual at rest is a fraction of a digit, not noise
+    model_error : slow error that the model may have in each signal however right it is, shape
+        (c,), in the signals' units; None for a usual share of the motion
+    colours : of the noise, one for each signal, as a diagnosis finds it; empty for white noise
+    labels : what was different in this test, such as load: A; see `interventions`
+
+    """
+
+    name: str
+    time: FloatArray
+    channels: tuple[str, ...]
+    units: tuple[str, ...]
+    measured: FloatArray
+    noise: FloatArray
+    quantised: tuple[str, ...] = ()
+    model_error: FloatArray | None = None
+    colours: tuple[Colour, ...] = ()
+    labels: Mapping[str, str] = field(default_factory=dict)
+
+    def model_error_of(self, channel: int, share: float) -> float:
+        """Return the model's error in a signal; by default a share of the signal's spread."""
+        if self.model_error is not None:
+            return float(self.model_error[channel])
+        values = self.measured[:, channel]
+        return share * float(np.nanstd(values)) if np.isfinite(values).any() else 0.0

@@ -1,0 +1,201 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The seam between the diagnosis and the machine: what a diagnosis asks of a machine.
+
+A machine of your own needs two things: a simulation (`Machine.predict`) and the numbers that may
+differ from your model (`nuisances` and `effects`). Everything else has a default that you may
+override, for speed or because you know your machine better.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass
+import math
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from simgap.machine.arrays import Course, FloatArray, Point
+from simgap.machine.catalogue import Catalogue
+from simgap.machine.diagram import Diagram
+from simgap.machine.effect import Effect, Parameter
+from simgap.machine.experiment import Experiment
+from simgap.machine.motion import Motion, TimeScales
+from simgap.machine.nuisances import Nuisances
+
+
+@dataclass(frozen=True)
+class DisturbanceInput:
+    """
+    A place where an unknown input may act on the machine.
+
+    Attributes
+    ----------
+    name : unique in its machine, for people
+    component : the part of the machine that it acts on
+
+    """
+
+    name: str
+    component: str
+
+
+class Machine(ABC):
+    """
+    A machine that can be simulated, and the experiments that were made with it.
+
+    Parameters
+    ----------
+    experiments
+        what was measured
+    nuisances
+        numbers that are known only within a tolerance; they are fitted beside any effect
+    effects
+        the catalogue of what the model may lack
+
+    Attributes
+    ----------
+    experiments, nuisances, catalogue : as given; the effects by id
+    disturbance_inputs : where an unknown input may act; readings need not be listed
+    notes : what the machine inferred or missed, for people
+    diagram : picture of the machine for the page; None for a block for each component
+    advice : tests that settle what is open: names of effects without their component (empty for
+        any), and what to record
+    planning : what the design of a further test must know of the tests, as plain data
+
+    """
+
+    experiments: Sequence[Experiment]
+    nuisances: Nuisances
+    catalogue: Catalogue
+    disturbance_inputs: Sequence[DisturbanceInput] = ()
+    notes: Sequence[str] = ()
+    diagram: Diagram | None = None
+    advice: Sequence[tuple[Sequence[str], str]] = ()
+    planning: Mapping[str, Any] = MappingProxyType({})
+
+    def __init__(self, experiments: Iterable[Experiment], nuisances: Iterable[Parameter] = (),
+                 effects: Iterable[Effect] | Catalogue = ()) -> None:
+        self.experiments = tuple(experiments)
+        self.nuisances = nuisances if isinstance(nuisances, Nuisances) else Nuisances(nuisances)
+        self.catalogue = effects if isinstance(effects, Catalogue) else Catalogue(effects)
+
+    # -- what a machine must give --------------------------------------------------------------
+
+    @abstractmethod
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        """
+        Return the readings of one experiment, had the machine these parameter values.
+
+        Parameters
+        ----------
+        point
+            parameter values by name; a parameter that is not named is zero, a shape parameter
+            that is not named has no effect
+        experiment
+            its index
+
+        Returns
+        -------
+        array of shape (n, c), as `Experiment.measured`; NaN or infinite where the run diverged
+
+        """
+
+    # -- what it may override for speed --------------------------------------------------------
+
+    def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
+                 until: float = math.inf) -> list[list[FloatArray | None]]:
+        """
+        Return the readings of several variants.
+
+        Parameters
+        ----------
+        points
+            parameter values by name, one mapping for each variant
+        only
+            for each variant the index of the one experiment that is wanted, None for all
+        until
+            end of the simulation after an experiment's first sample [s]; later readings are NaN
+
+        Returns
+        -------
+        for each variant and experiment an array of shape (n, c), or None where not wanted
+
+        """
+        results: list[list[FloatArray | None]] = []
+        for point, one in zip(points, only or [None] * len(points), strict=True):
+            row: list[FloatArray | None] = [None] * len(self.experiments)
+            for k in range(len(row)) if one is None else (one,):
+                readings = self.predict(point, k)
+                if math.isfinite(until):
+                    time = self.experiments[k].time
+                    readings = np.where((time - time[0] > until)[:, np.newaxis], np.nan, readings)
+                row[k] = readings
+            results.append(row)
+        return results
+
+    def truncated(self) -> Machine:
+        """Return the machine with as much of each test as a search needs."""
+        return self
+
+    def low_fidelity(self) -> Machine:
+        """Return a faster machine with nearly the same readings, for derivatives."""
+        return self
+
+    # -- what it may know better ---------------------------------------------------------------
+
+    @property
+    def time_scales(self) -> TimeScales:
+        """Return how fast the machine is; by default in proportion to the longest test."""
+        return TimeScales.of_duration(max(
+            float(e.time[-1] - e.time[0]) for e in self.experiments))
+
+    def motion(self, experiment: int) -> Motion:
+        """Return how it moves in an experiment; by default nothing is known."""
+        return Motion(self.experiments[experiment].time)
+
+    def with_experiments(self, experiments: Sequence[Experiment]) -> Machine:
+        """Return the machine with the same experiments, of which more is known."""
+        other = copy(self)
+        other.experiments = tuple(experiments)
+        return other
+
+    def without(self, effects: Collection[str]) -> Machine:
+        """Return the machine without some effects, see `Catalogue.without`."""
+        other = copy(self)
+        other.catalogue = self.catalogue.without(effects)
+        return other
+
+    def with_noise_at(self, point: Point) -> Machine:
+        """
+        Return the machine with the noise that its sensors have where it moves as at `point`.
+
+        A jitter of the time stamps makes a fast reading noisier than a slow one.
+        """
+        return self
+
+    def simulate_disturbed(self, point: Point, place: DisturbanceInput,
+                           course: Course) -> list[FloatArray]:
+        """
+        Return the readings with an unknown input.
+
+        Parameters
+        ----------
+        point
+            parameter values by name
+        place
+            where it acts, one of `disturbance_inputs`
+        course
+            the input over time, in a unit that moves the machine a little
+
+        Returns
+        -------
+        for each experiment an array of shape (n, c)
+
+        """
+        raise NotImplementedError(f'{type(self).__name__} names disturbance_inputs '
+                                  'and lacks simulate_disturbed')

@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""Each rival fitted to the readings that each other one would give in a planned test."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import replace
+
+import numpy as np
+from simgap.fit.least_squares import LeastSquares
+from simgap.machine.contract import FloatArray, Machine, Parameter, Point
+from simgap.next_test.discrimination import planned
+from simgap.next_test.rivals import known_to, numbers_of, Rival
+from simgap.next_test.separation import odds_of, prior_of, Separation
+from simgap.settings import DEFAULT, Settings
+
+# A fit goes this many standard deviations away at most, and a difference quotient this far.
+_FAR, _STEP = 8.0, 0.3
+
+
+def confirmed_separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
+                         settings: Settings = DEFAULT,
+                         shrunk: Sequence[Mapping[str, float]] = ()) -> Separation:
+    """
+    Return how well tests tell rivals apart, with each fitted to the readings of each other one.
+
+    The true rival is fitted as well, from a standard deviation away along each direction. A fit
+    that sticks there would stick in a diagnosis, which compares two fits. What it leaves is no
+    evidence against the others. Deviations shrink as `shrunk` says, from
+    `discrimination.separation`, whose parameters the others are; without it they stay.
+    """
+    points = [known_to(machine, rival) for rival in rivals]
+    problem = planned(machine, rivals, points, settings)
+    readings = machine.simulate(points)
+    left = np.zeros((len(rivals), len(rivals)))
+    ends: dict[tuple[int, int], Point] = {}
+    for j, rival in enumerate(rivals):
+        own = _Continued(problem.machine, rival, inflated)
+        jacobian = None
+        for i, truth in enumerate(readings):
+            fitted = LeastSquares(own.with_experiments([
+                replace(e, measured=values) for e, values in zip(
+                    problem.experiments, truth, strict=True) if values is not None]),
+                settings=settings)
+            if i == j:
+                state = fitted.start(own.nuisances, own.elsewhere(), None)
+            else:
+                state = fitted.start(own.nuisances, {}, jacobian)
+                # it depends on the point, and not on what was measured
+                jacobian = state.base_jacobian
+            state = fitted.fit(state, settings.search.iterations)
+            for _ in range(settings.planning.passes):
+                state = fitted.fit(fitted.refreshed(state), settings.search.iterations)
+            left[i, j] = state.cost / inflated
+            ends[i, j] = own.own(state.point())
+    lack = np.maximum(left - np.diag(left)[:, np.newaxis], 0.0)
+    shrunk = shrunk or [{} for _ in rivals]
+    return Separation(prior_of(rivals), lack, points=ends, odds=odds_of(rivals, lack, shrunk),
+                      shrunk=shrunk)
+
+
+class _Continued(Machine):
+    """
+    A machine whose numbers count from where the tests so far have left them.
+
+    Each of its numbers is a standard deviation along one direction that the tests have left free.
+    """
+
+    def __init__(self, machine: Machine, rival: Rival, inflated: float) -> None:
+        numbers = numbers_of(machine, rival)
+        self._machine = machine
+        self._known = [p for p in numbers if p.name in rival.names]
+        self._centre = np.array([rival.point[p.name] for p in self._known])
+        values, vectors = np.linalg.eigh(rival.covariance_of([p.name for p in self._known]))
+        self._directions = vectors * np.sqrt(np.maximum(values, 0.0))
+        free = [Parameter(f'direction {k}', '1', -_FAR, _FAR, _STEP, 1.0 / np.sqrt(inflated))
+                for k in range(len(self._known))]
+        super().__init__(machine.experiments,
+                         [*free, *(p for p in numbers if p.name not in rival.names)])
+        self._free = [p.name for p in free]
+
+    def predict(self, point: Point, experiment: int) -> FloatArray:
+        return self._machine.predict(self.own(point), experiment)
+
+    def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
+                 until: float = np.inf) -> list[list[FloatArray | None]]:
+        return self._machine.simulate([self.own(point) for point in points], only, until)
+
+    def low_fidelity(self) -> Machine:
+        other = copy(self)
+        other._machine = self._machine.low_fidelity()
+        return other
+
+    def elsewhere(self) -> dict[str, float]:
+        """Return a point a standard deviation away along each direction, to one side or other."""
+        signs = np.random.default_rng(0).choice([-1.0, 1.0], len(self._free))
+        return dict(zip(self._free, signs.tolist(), strict=True))
+
+    def own(self, point: Point) -> dict[str, float]:
+        """Return a point in the machine's own numbers, each within its bounds."""
+        along = np.array([point.get(name, 0.0) for name in self._free])
+        values = self._centre + self._directions @ along
+        return {**{name: value for name, value in point.items() if name not in self._free},
+                **{p.name: float(min(max(value, p.low), p.high))
+                   for p, value in zip(self._known, values, strict=True)}}
