@@ -19,7 +19,8 @@ PATIENCE_S = 200.0
 PARENT = """
 import sys
 from antenna_drive.subcommand import run_command
-run_command(['trial', '--cases', '2000', '--seed', '1', '--jobs', '1', '--out', sys.argv[1]], program='lab')
+run_command(['trial', '--cases', '2000', '--seed', '1', '--jobs', '1', '--out', sys.argv[1]],
+            program='lab')
 """
 
 
