@@ -15,8 +15,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
 
-from antenna_drive.emulator.batch import CHANNELS
 from antenna_drive.emulator.unit import FloatArray
+from antenna_drive.readings import SIGNALS
 from antenna_drive.recording.recording import unit_of
 from antenna_drive.twin.baseline import (
     Baseline, BLOCK_S, block_scores, CUT, DRIFT_S, interpolated, LEAST_SAMPLES, motion_of,
@@ -52,7 +52,7 @@ class Track:
     Attributes
     ----------
     time : of the twin, ascending, shape (n,) [s]
-    course : the twin's readings, shape (n, 6), in the order of `CHANNELS`
+    course : the twin's readings, shape (n, 6), in the order of `SIGNALS`
     washed : the same with the encoder behind its high-pass
     command : axis rate command, shape (n,) [rad/s]
     spacing : of the samples of the command that the twin was driven with [s]
@@ -107,7 +107,7 @@ def lag_of(track: Track, name: str) -> float:
     The lag of the greatest correlation of both, refined by a parabola; 0 where nothing moves.
     """
     times, values = track.samples[name]
-    column = track.course[:, CHANNELS.index(name)]
+    column = track.course[:, SIGNALS.index(name)]
     if times.size < 3 * LEAST_SAMPLES or np.ptp(column) == 0.0 or np.ptp(values) == 0.0:
         return 0.0
     lags = np.arange(-_MOST_LAG_S, _MOST_LAG_S + 0.5 * _LAG_STEP_S, _LAG_STEP_S)
@@ -150,7 +150,7 @@ def _all_prepared(track: Track, table: FloatArray, edges: FloatArray, lags: Mapp
 def _prepared(track: Track, name: str, table: FloatArray, edges: FloatArray,
               lag: FloatArray) -> _Prepared | None:
     """Return one signal beside the twin, with its lag in each block; None if it has too little."""
-    column = CHANNELS.index(name)
+    column = SIGNALS.index(name)
     times, values = track.samples[name]
     times = times - np.interp(times, edges + 0.5 * BLOCK_S, lag)
     inside = (times >= track.time[0]) & (times <= track.time[-1])
