@@ -16,12 +16,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from antenna_drive.diagnosis import gust
-from antenna_drive.diagnosis.field_test import BIAS, CURRENT_1, ENCODER
 from antenna_drive.diagnosis.modifiers import (
     add, AntennaParameter, Digit, DigitTurn, Modifier, ReadingGain, ReadingZero, scale, set_to,
 )
 from antenna_drive.diagnosis.wave_shape import WaveShape
 from antenna_drive.diagnosis.waves import wave
+from antenna_drive.readings import NAMED
 from simgap.machine.contract import Effect, Form
 
 # The motors of an effect, for one motor or both.
@@ -280,13 +280,12 @@ def _sensor_effects(into: _Catalogue, encoder_digit: float) -> None:
                  'reading varies with the angle of the rotor, more at higher rate',
                  wave('1', 0.3, 2e-4, WaveShape('ripple', (f'{motor}.tachometer',), motor),
                       MOTOR_ORDERS, healthy=1e-3))
-        channel = CURRENT_1 + m - 1
         into.add(current, 'gain', 'shunt or amplifier of the ammeter', 'reading scaled',
                  _form(_number('change', '1', -0.5, 0.5, 1e-3,
-                               ReadingGain(channel, (f'{motor}.ammeter.gain',)))))
+                               ReadingGain(current, (NAMED[current].gain,)))))
         into.add(current, 'offset', 'drift of the ammeter', 'reading shifted',
                  _form(_number('offset', 'A', -1.0, 1.0, 1e-3,
-                               ReadingZero(channel, (f'{motor}.ammeter.offset',)),
+                               ReadingZero(current, (f'{motor}.ammeter.offset',)),
                                healthy=0.02)))
     into.add('encoder', 'quantisation', 'bits of the encoder are lost', 'steps in the angle',
              _quantisation(encoder_digit))
@@ -297,10 +296,10 @@ def _sensor_effects(into: _Catalogue, encoder_digit: float) -> None:
     into.add('encoder', 'offset', 'the encoder was mounted or zeroed otherwise',
              'the angle shifted',
              _form(_number('offset', 'rad', -0.1, 0.1, 1e-6,
-                           ReadingZero(ENCODER, ('plant.encoder.offset',)), healthy=2e-5)))
+                           ReadingZero('encoder', ('plant.encoder.offset',)), healthy=2e-5)))
     into.add('bias_voltage', 'gain', 'divider of the voltmeter', 'reading scaled',
              _form(_number('change', '1', -0.5, 0.5, 1e-3, ReadingGain(
-                 BIAS, ('torque_share.circuit.voltmeter_gain',)))))
+                 'bias_voltage', (NAMED['bias_voltage'].gain,)))))
 
 
 def _quantisation(digit: float) -> Form:

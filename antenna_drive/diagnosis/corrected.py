@@ -15,7 +15,6 @@ from typing import Any
 
 from antenna_drive.diagnosis.catalogue import EXTRA_MODE
 from antenna_drive.diagnosis.excitation import Bias
-from antenna_drive.diagnosis.field_test import CHANNELS
 from antenna_drive.diagnosis.modifiers import (
     AntennaParameter, ChannelDelay, ClockRate, ClockShift, ReadingGain, ReadingModifier,
     ReadingZero, RunModifier, RunSetup, SCALE,
@@ -185,7 +184,7 @@ def _error_of_the_recorder(modifier: Any) -> str:
     """Return the name of a recorder's error; empty if it is none."""
     for kind, name in ((ReadingGain, 'gain'), (ReadingZero, 'zero'), (ChannelDelay, 'delay')):
         if isinstance(modifier, kind):
-            return f'{name}:{tuple(CHANNELS.values())[modifier.channel]}'
+            return f'{name}:{modifier.reading}'
     if isinstance(modifier, ClockShift):
         return 'clock'
     return 'clock_rate' if isinstance(modifier, ClockRate) else ''

@@ -18,19 +18,19 @@ from typing import Any
 
 from antenna_drive.diagnosis.circuits import constants
 from antenna_drive.diagnosis.excitation import Longest, schedule
-from antenna_drive.diagnosis.field_recording import (
-    CURRENT_1, CURRENT_2, FieldRecording, Note,
-)
+from antenna_drive.diagnosis.field_recording import FieldRecording, Note
 from antenna_drive.diagnosis.sheet_settings import as_the_sheet_says
 from antenna_drive.diagnosis.windows import first_window
 from antenna_drive.emulator import batch
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed, Drive, TorqueShare
+from antenna_drive.readings import AT
 from antenna_drive.recording.sheet import CircuitBias, FixedBias, FixedStepBias
 import numpy as np
 from scipy.signal import lfilter
 from simgap.machine.contract import FloatArray
 
+_CURRENTS = ('current_1', 'current_2')
 CIRCUITS = ('new', 'old')
 STARTS = ('steady', 'zero')
 # A source's voltage is constant within this scatter, and steps by more than that [V].
@@ -105,7 +105,7 @@ def _with_sources(recordings: list[FieldRecording], drive: Drive,
     """Return recordings whose sheets name the source of the bias, if its voltage was recorded."""
     found, constant = list(recordings), []
     for k, recording in enumerate(recordings):
-        channel = recording.readings.get('torque_share/bias_voltage')
+        channel = recording.readings.get('bias_voltage')
         if channel is None or len(channel) < 2:
             continue
         seen = _source(channel.time_s, channel.values)
@@ -191,8 +191,7 @@ def _saturated(recording: FieldRecording, drive: Drive) -> float | None:
 
 
 def _can_be_fed(recording: FieldRecording) -> bool:
-    return {'motor_1/ammeter', 'motor_2/ammeter',
-            'torque_share/bias_voltage'} <= recording.readings.keys()
+    return {*_CURRENTS, 'bias_voltage'} <= recording.readings.keys()
 
 
 def _source(time: FloatArray, voltage: FloatArray) -> CircuitBias | FixedBias | FixedStepBias:
@@ -355,8 +354,7 @@ def _fed(recording: FieldRecording) -> tuple[FloatArray, FloatArray]:
     """Return bias voltage [V] and sum of the currents [article A] on an even grid from zero."""
     time = np.arange(0.0, min(recording.end, recording.onset + _FED_S), 1.0 / _FED_HZ)
     voltage, one, two = (np.interp(time, channel.time_s, channel.values) for channel in (
-        recording.readings[name] for name in (
-            'torque_share/bias_voltage', 'motor_1/ammeter', 'motor_2/ammeter')))
+        recording.readings[name] for name in ('bias_voltage', *_CURRENTS)))
     return voltage, one + two
 
 
@@ -392,7 +390,7 @@ def _with_filter_1(recordings: list[FieldRecording], drive: Drive,
                    note: Note) -> list[FieldRecording]:
     """Return recordings whose sheets give Filter 1."""
     compared = [recording for recording in recordings
-                if {'motor_1/ammeter', 'motor_2/ammeter'} & recording.readings.keys()]
+                if recording.readings.keys() & set(_CURRENTS)]
     if not compared:
         return recordings
     misfits = {name: _NOISE_A + float(np.mean([
@@ -439,6 +437,7 @@ def _misfit_of_currents(recording: FieldRecording, drive: Drive) -> float:
     plan = schedule(recording.command_between(first.begin, first.compared, float(time[-1])),
                     bias.later(first.begin), time - first.begin, Longest(_STEP_S))
     off = recording.measured(time)[0] - batch.run(record_of(drive), plan)[:, :, 0]
-    if np.isfinite(off[:, [CURRENT_1, CURRENT_2]]).any(axis=0).all():
-        return float(np.nanmean(np.abs(off[:, CURRENT_1] - off[:, CURRENT_2])))
-    return float(np.nanmean(np.abs(off[:, [CURRENT_1, CURRENT_2]])))
+    off = off[:, [AT[name] for name in _CURRENTS]]
+    if np.isfinite(off).any(axis=0).all():
+        off = np.diff(off, axis=1)
+    return float(np.nanmean(np.abs(off)))

@@ -14,9 +14,9 @@ from functools import cache
 from typing import Any
 
 from antenna_drive.diagnosis.excitation import Bias
-from antenna_drive.diagnosis.field_test import CHANNELS
 from antenna_drive.diagnosis.wave_shape import WaveShape
 from antenna_drive.parameters.records import place_of
+from antenna_drive.readings import AT, READINGS
 import numpy as np
 from simgap.machine.contract import FloatArray, Parameter
 
@@ -79,7 +79,7 @@ class SensorReadings:
 
     Attributes
     ----------
-    gain, zero, late : of every channel; the last is by how much earlier it is read [s]; shape (6,)
+    gain, zero, late : of every reading; the last is by how much earlier it is read [s]; shape (c,)
     clock_rate : share by which the recorder's clock is slow
     digit : of the encoder [rad]; 0 for none
     turn : share of a digit by which the encoder's rounding is off its middle
@@ -87,9 +87,9 @@ class SensorReadings:
 
     """
 
-    gain: FloatArray = field(default_factory=lambda: np.ones(len(CHANNELS)))
-    zero: FloatArray = field(default_factory=lambda: np.zeros(len(CHANNELS)))
-    late: FloatArray = field(default_factory=lambda: np.zeros(len(CHANNELS)))
+    gain: FloatArray = field(default_factory=lambda: np.ones(len(READINGS)))
+    zero: FloatArray = field(default_factory=lambda: np.zeros(len(READINGS)))
+    late: FloatArray = field(default_factory=lambda: np.zeros(len(READINGS)))
     clock_rate: float = 0.0
     digit: float = 0.0
     turn: float = 0.0
@@ -171,29 +171,29 @@ class SupplyGain(RunModifier):
 
 @dataclass(frozen=True)
 class ReadingGain(ReadingModifier):
-    """Scales the reading of a channel."""
+    """Scales a reading."""
 
-    channel: int
+    reading: str
     fields: tuple[str, ...] = ()
 
     def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.gain[self.channel] += value
+        readings.gain[AT[self.reading]] += value
 
 
 @dataclass(frozen=True)
 class ReadingZero(ReadingModifier):
-    """Shifts the reading of a channel."""
+    """Shifts a reading."""
 
-    channel: int
+    reading: str
     fields: tuple[str, ...] = ()
 
     def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.zero[self.channel] += value
+        readings.zero[AT[self.reading]] += value
 
 
 @dataclass(frozen=True)
 class ClockShift(ReadingModifier):
-    """Reads every channel later."""
+    """Takes every reading later."""
 
     def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
         readings.late -= value
@@ -201,12 +201,12 @@ class ClockShift(ReadingModifier):
 
 @dataclass(frozen=True)
 class ChannelDelay(ReadingModifier):
-    """Reads one channel earlier than its time stamps say."""
+    """Takes one reading earlier than its time stamps say."""
 
-    channel: int
+    reading: str
 
     def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.late[self.channel] += value
+        readings.late[AT[self.reading]] += value
 
 
 @dataclass(frozen=True)

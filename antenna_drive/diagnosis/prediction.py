@@ -10,23 +10,22 @@ import math
 from typing import Any
 
 from antenna_drive.diagnosis.excitation import Bias, CommandedRate, Longest, schedule
-from antenna_drive.diagnosis.field_recording import CHANNELS, FieldRecording, Note, UNITS
+from antenna_drive.diagnosis.field_recording import FieldRecording, Note
 from antenna_drive.diagnosis.machine import LONGEST_STEP, SHORTEST_STEP, WAVE_STEP
 from antenna_drive.diagnosis.sheet_settings import as_the_sheet_says
 from antenna_drive.diagnosis.waves import fastest_wave
 from antenna_drive.emulator import batch
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import Drive
+from antenna_drive.readings import AT, RATE_COMMAND, READINGS, SIGNALS
 from antenna_drive.recording.recording import Recording
 import numpy as np
 from simgap.errors import UserError
 from simgap.machine.contract import FloatArray
 
-RATE_COMMAND = 'test_signal/rate_command'
-
 
 def _none() -> FloatArray:
-    return np.zeros(len(CHANNELS))
+    return np.zeros(len(READINGS))
 
 
 @dataclass
@@ -36,8 +35,8 @@ class RecorderErrors:
 
     Attributes
     ----------
-    gain, zero : of each channel, shape (6,); what they add to 1, and to the reading in its unit
-    delay : by how much earlier each channel is read than its time stamps say, shape (6,) [s]
+    gain, zero : of each reading, shape (c,); what they add to 1, and to the reading in its unit
+    delay : by how much earlier each is read than its time stamps say, shape (c,) [s]
     clock : by how much later all channels are read [s]
     clock_rate : share by which the recorder's clock is slow
 
@@ -60,7 +59,6 @@ class RecorderErrors:
 
         """
         found = cls()
-        channels = tuple(CHANNELS.values())
         for entry in entries:
             try:
                 name, value = str(entry['name']), float(entry['value'])
@@ -68,13 +66,13 @@ class RecorderErrors:
                 raise UserError(f'recorder: {entry!r} given, allowed is name and value'
                                 ) from error
             kind, _, channel = name.partition(':')
-            if kind in ('gain', 'zero', 'delay') and channel in channels:
-                getattr(found, kind)[channels.index(channel)] += value
+            if kind in ('gain', 'zero', 'delay') and channel in AT:
+                getattr(found, kind)[AT[channel]] += value
             elif kind in ('clock', 'clock_rate') and not channel:
                 setattr(found, kind, getattr(found, kind) + value)
             else:
                 raise UserError(f'recorder: {name}: no such error; allowed are gain, zero and '
-                                f'delay of {", ".join(channels)} (such as gain:tach_1), clock '
+                                f'delay of {", ".join(AT)} (such as gain:tach_1), clock '
                                 'and clock_rate')
             if not math.isfinite(value):
                 raise UserError(f'recorder: {name}: {value} given, allowed is a number')
@@ -108,7 +106,7 @@ class Prediction:
     Attributes
     ----------
     time : of the samples, as recorded, shape (n,) [s]
-    measured, predicted : shape (n, 6); NaN where nothing was measured
+    measured, predicted : shape (n, c); NaN where nothing was measured
 
     """
 
@@ -119,17 +117,16 @@ class Prediction:
     def rms(self) -> dict[str, tuple[float, str]]:
         """Return the rms of measured minus predicted of each signal, with its unit."""
         found = {}
-        for c, (channel, unit) in enumerate(zip(CHANNELS.values(), UNITS, strict=True)):
-            error = self.measured[:, c] - self.predicted[:, c]
+        for reading, error in zip(READINGS, (self.measured - self.predicted).T, strict=True):
             if np.isfinite(error).any():
-                found[channel] = (float(np.sqrt(np.nanmean(error ** 2))), unit)
+                found[reading.name] = (float(np.sqrt(np.nanmean(error ** 2))), reading.unit)
         return found
 
     def as_recording(self, of: Recording) -> Recording:
         """Return the prediction as a recording with the signals of the one that it is of."""
         command = of[RATE_COMMAND]
         signals = {RATE_COMMAND: np.interp(self.time, command.time_s, command.values)}
-        for c, name in enumerate(CHANNELS):
+        for c, name in enumerate(SIGNALS):
             if np.isfinite(self.measured[:, c]).any():
                 signals[name] = self.predicted[:, c]
         return Recording.from_arrays(self.time, signals)
@@ -168,9 +165,9 @@ def predict(name: str, recording: Recording, drive: Drive, recorder: RecorderErr
 
 
 def _readings(test: _WholeTest, recorder: RecorderErrors) -> FloatArray:
-    """Return what the recorder says of the drive in a test, shape (n, 6)."""
+    """Return what the recorder says of the drive in a test, shape (n, c)."""
     late = recorder.delay - recorder.clock
-    found = np.empty((test.time.size, len(CHANNELS)))
+    found = np.empty((test.time.size, len(READINGS)))
     clock = test.time + recorder.clock_rate * (test.time - test.time[0])
     for shift in np.unique(late):
         # a few samples at the start may be from before it
