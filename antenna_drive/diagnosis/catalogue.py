@@ -17,7 +17,7 @@ from dataclasses import replace
 
 from antenna_drive.diagnosis import gust
 from antenna_drive.diagnosis.modifiers import (
-    add, AntennaParameter, Digit, DigitTurn, Modifier, ReadingGain, ReadingZero, scale, set_to,
+    add, AntennaParameter, Digit, DigitTurn, Modifier, RecorderError, scale, set_to,
 )
 from antenna_drive.diagnosis.wave_shape import WaveShape
 from antenna_drive.diagnosis.waves import wave
@@ -282,10 +282,10 @@ def _sensor_effects(into: _Catalogue, encoder_digit: float) -> None:
                       MOTOR_ORDERS, healthy=1e-3))
         into.add(current, 'gain', 'shunt or amplifier of the ammeter', 'reading scaled',
                  _form(_number('change', '1', -0.5, 0.5, 1e-3,
-                               ReadingGain(current, (NAMED[current].gain,)))))
+                               RecorderError('gain', current, (NAMED[current].gain,)))))
         into.add(current, 'offset', 'drift of the ammeter', 'reading shifted',
                  _form(_number('offset', 'A', -1.0, 1.0, 1e-3,
-                               ReadingZero(current, (f'{motor}.ammeter.offset',)),
+                               RecorderError('zero', current, (f'{motor}.ammeter.offset',)),
                                healthy=0.02)))
     into.add('encoder', 'quantisation', 'bits of the encoder are lost', 'steps in the angle',
              _quantisation(encoder_digit))
@@ -296,10 +296,11 @@ def _sensor_effects(into: _Catalogue, encoder_digit: float) -> None:
     into.add('encoder', 'offset', 'the encoder was mounted or zeroed otherwise',
              'the angle shifted',
              _form(_number('offset', 'rad', -0.1, 0.1, 1e-6,
-                           ReadingZero('encoder', ('plant.encoder.offset',)), healthy=2e-5)))
+                           RecorderError('zero', 'encoder', ('plant.encoder.offset',)),
+                           healthy=2e-5)))
     into.add('bias_voltage', 'gain', 'divider of the voltmeter', 'reading scaled',
-             _form(_number('change', '1', -0.5, 0.5, 1e-3, ReadingGain(
-                 'bias_voltage', (NAMED['bias_voltage'].gain,)))))
+             _form(_number('change', '1', -0.5, 0.5, 1e-3, RecorderError(
+                 'gain', 'bias_voltage', (NAMED['bias_voltage'].gain,)))))
 
 
 def _quantisation(digit: float) -> Form:

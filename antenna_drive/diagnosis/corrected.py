@@ -16,8 +16,7 @@ from typing import Any
 from antenna_drive.diagnosis.catalogue import EXTRA_MODE
 from antenna_drive.diagnosis.excitation import Bias
 from antenna_drive.diagnosis.modifiers import (
-    AntennaParameter, ChannelDelay, ClockRate, ClockShift, ReadingGain, ReadingModifier,
-    ReadingZero, RunModifier, RunSetup, SCALE,
+    AntennaParameter, ReadingModifier, RecorderError, RunModifier, RunSetup, SCALE,
 )
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.records import place_of, record_of
@@ -139,7 +138,7 @@ def _written(drive: Drive, fitted: Sequence[tuple[AntennaParameter, float]],
     missing = []
     for item, value in fitted:
         modifier = item.modifier
-        name = _error_of_the_recorder(modifier)
+        name = modifier.name if isinstance(modifier, RecorderError) else ''
         if item.label is not None:
             missing.append(item)  # a configuration has one number for all tests
         elif item.experiment is None and isinstance(modifier, RunModifier):
@@ -178,16 +177,6 @@ def _numbers(drive: Drive, numbers: FloatArray,
             yield path, tuple(numbers[first:first + count].tolist())
         elif entry.choices is None and not entry.whole:
             yield path, float(numbers[place_of(kind, path)])
-
-
-def _error_of_the_recorder(modifier: Any) -> str:
-    """Return the name of a recorder's error; empty if it is none."""
-    for kind, name in ((ReadingGain, 'gain'), (ReadingZero, 'zero'), (ChannelDelay, 'delay')):
-        if isinstance(modifier, kind):
-            return f'{name}:{modifier.reading}'
-    if isinstance(modifier, ClockShift):
-        return 'clock'
-    return 'clock_rate' if isinstance(modifier, ClockRate) else ''
 
 
 def _told(name: str, effect: str | None) -> str:

@@ -79,7 +79,9 @@ class SensorReadings:
 
     Attributes
     ----------
-    gain, zero, late : of every reading; the last is by how much earlier it is read [s]; shape (c,)
+    gain, zero, delay : of every reading; the last is by how much earlier it is read than its time
+        stamps say [s]; shape (c,)
+    clock : by how much later all readings are taken [s]
     clock_rate : share by which the recorder's clock is slow
     digit : of the encoder [rad]; 0 for none
     turn : share of a digit by which the encoder's rounding is off its middle
@@ -89,11 +91,17 @@ class SensorReadings:
 
     gain: FloatArray = field(default_factory=lambda: np.ones(len(READINGS)))
     zero: FloatArray = field(default_factory=lambda: np.zeros(len(READINGS)))
-    late: FloatArray = field(default_factory=lambda: np.zeros(len(READINGS)))
+    delay: FloatArray = field(default_factory=lambda: np.zeros(len(READINGS)))
+    clock: float = 0.0
     clock_rate: float = 0.0
     digit: float = 0.0
     turn: float = 0.0
     waves: dict[WaveShape, list[float]] = field(default_factory=dict)
+
+    @property
+    def late(self) -> FloatArray:
+        """Return by how much earlier each reading is taken in all [s], shape (c,)."""
+        return self.delay - self.clock
 
 
 class Modifier(ABC):
@@ -170,51 +178,23 @@ class SupplyGain(RunModifier):
 
 
 @dataclass(frozen=True)
-class ReadingGain(ReadingModifier):
-    """Scales a reading."""
+class RecorderError(ReadingModifier):
+    """Adds to gain, zero or delay of a reading, or to the recorder's clock or clock_rate."""
 
-    reading: str
+    kind: str
+    reading: str = ''
     fields: tuple[str, ...] = ()
 
-    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.gain[AT[self.reading]] += value
-
-
-@dataclass(frozen=True)
-class ReadingZero(ReadingModifier):
-    """Shifts a reading."""
-
-    reading: str
-    fields: tuple[str, ...] = ()
+    @property
+    def name(self) -> str:
+        """Return its name in a verdict."""
+        return f'{self.kind}:{self.reading}' if self.reading else self.kind
 
     def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.zero[AT[self.reading]] += value
-
-
-@dataclass(frozen=True)
-class ClockShift(ReadingModifier):
-    """Takes every reading later."""
-
-    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.late -= value
-
-
-@dataclass(frozen=True)
-class ChannelDelay(ReadingModifier):
-    """Takes one reading earlier than its time stamps say."""
-
-    reading: str
-
-    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.late[AT[self.reading]] += value
-
-
-@dataclass(frozen=True)
-class ClockRate(ReadingModifier):
-    """Lets the recorder's clock run slow by a share of the time."""
-
-    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.clock_rate += value
+        if self.reading:
+            getattr(readings, self.kind)[AT[self.reading]] += value
+        else:
+            setattr(readings, self.kind, getattr(readings, self.kind) + value)
 
 
 @dataclass(frozen=True)

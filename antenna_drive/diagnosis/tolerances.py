@@ -10,8 +10,8 @@ import math
 
 from antenna_drive.diagnosis.field_test import FieldTest
 from antenna_drive.diagnosis.modifiers import (
-    add, AntennaParameter, ChannelDelay, ClockRate, ClockShift, Modifier, ReadingGain, ReadingZero,
-    scale, SupplyGain, UnrecordedJump, UnrecordedMean,
+    add, AntennaParameter, Modifier, RecorderError, scale, SupplyGain, UnrecordedJump,
+    UnrecordedMean,
 )
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
 from antenna_drive.readings import Reading, READINGS
@@ -109,10 +109,11 @@ def _of_zeros_and_recorders(tests: Sequence[FieldTest]) -> Iterator[AntennaParam
         name = reading.name
         if given.recorder_gain and not reading.sensor.is_counter:
             yield _within(f'gain:{name}', '1', given.recorder_gain,
-                          ReadingGain(name, (reading.gain,) if reading.gain else ()))
+                          RecorderError('gain', name, (reading.gain,) if reading.gain else ()))
         if given.channel_delay_samples:
             seconds = given.channel_delay_samples * period
-            yield replace(_within(f'delay:{name}', 's', seconds, ChannelDelay(name)), low=0.0)
+            yield replace(_within(f'delay:{name}', 's', seconds, RecorderError('delay', name)),
+                          low=0.0)
 
 
 def starting_places(k: int, test: FieldTest) -> tuple[AntennaParameter, ...]:
@@ -127,7 +128,7 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
     if test.record['torque_share']['circuit']['bias_source'][0] == 1:
         yield _within(f'supply:{test.name}', '1', tolerance, SupplyGain(), k)
     yield AntennaParameter(f'clock:{test.name}', 's', -0.01, 0.01, 1e-4, 1e-3, experiment=k,
-                           modifier=ClockShift())
+                           modifier=RecorderError('clock'))
 
     if isinstance(test.command, RecordedCommand):
         command = test.command
@@ -146,12 +147,13 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
 
     given = allowed([test])
     if given.clock_ppm:
-        yield _within(f'clock_rate:{test.name}', '1', 1e-6 * given.clock_ppm, ClockRate(), k)
+        yield _within(f'clock_rate:{test.name}', '1', 1e-6 * given.clock_ppm,
+                      RecorderError('clock_rate'), k)
 
     def zero(reading: Reading, half_width: float, step: float, sigma: float) -> AntennaParameter:
         return AntennaParameter(
             f'zero:{reading.name}:{test.name}', reading.unit, -half_width, half_width, step, sigma,
-            experiment=k, modifier=ReadingZero(reading.name))
+            experiment=k, modifier=RecorderError('zero', reading.name))
 
     # an encoder counts on from an angle that is not known where the start is not
     wide = 1.0 if test.known_start else 50.0

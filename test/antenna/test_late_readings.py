@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from antenna_drive.diagnosis.late_readings import dense, parts_of, read_at
 from antenna_drive.diagnosis.machine import AntennaMachine, LOW_FIDELITY_STEP
-from antenna_drive.diagnosis.prediction import predict, RecorderErrors
+from antenna_drive.diagnosis.prediction import predict, recorder_errors
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
 from antenna_drive.parameters import load
 from antenna_drive.parameters.sets import changed
@@ -104,7 +104,7 @@ def test_a_ripple_faster_than_the_samples_is_read_late_without_loss(late_s: floa
         'ripple_second': 0.03, 'ripple_third': 0.01, 'ripple_third_phase': 2.0}.items()})
     recording = field_run(drive, 6.0, every=10, **FAST_TRIANGLE)
     errors = [{'name': 'delay:tach_1', 'value': late_s}]
-    exact = predict('rec', recording, drive, RecorderErrors.of(errors)).predicted
+    exact = predict('rec', recording, drive, recorder_errors(errors)).predicted
     found = AntennaMachine({'rec': recording}, drive).predict({'delay:tach_1': late_s}, 0)
     rate = exact[:, AT['tach_2']]
     assert np.abs(np.diff(exact[:, AT['tach_1']])).max() > 0.1 * np.abs(rate).max()
