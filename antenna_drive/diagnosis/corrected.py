@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from antenna_drive.diagnosis.catalogue import EXTRA_MODE
+from antenna_drive.diagnosis.circuits import value_of
 from antenna_drive.diagnosis.excitation import Bias
 from antenna_drive.diagnosis.modifiers import (
     AntennaParameter, ReadingModifier, RecorderError, RunModifier, RunSetup, SCALE,
@@ -91,7 +92,7 @@ def correct(drive: Drive, records: Sequence[np.ndarray[Any, np.dtype[Any]]],
         alone, _, _ = _written(given, [
             (p, value) for p, value in fitted if owner.get(p.name) == effect])
         for path, value in alone.items():
-            if value != _value(given, path):
+            if value != value_of(given, path):
                 why[path] = _EFFECT + effect
     reference = {path: value for path, _, value in values(load())}
     lines: dict[str, list[tuple[str, str, Any]]] = {}
@@ -121,13 +122,6 @@ def _as_all_tests_have_it(drive: Drive,
     return changed(drive, changes)
 
 
-def _value(drive: Drive, path: str) -> Any:
-    place: Any = drive
-    for step in path.split('.'):
-        place = getattr(place, step)
-    return place
-
-
 def _written(drive: Drive, fitted: Sequence[tuple[AntennaParameter, float]],
              ) -> tuple[dict[str, Any], tuple[dict[str, Any], ...], list[AntennaParameter]]:
     """Return the changed numbers by dotted name, the recorder's errors, and what has no place."""
@@ -152,7 +146,7 @@ def _written(drive: Drive, fitted: Sequence[tuple[AntennaParameter, float]],
             missing.append(item)
     run.write_waves()
     pot = place_of(kind, _POT)
-    before = float(_value(drive, _POT))
+    before = float(value_of(drive, _POT))
     if run.numbers[pot] != before:
         # the pot is set for each test, and its sheet says how
         for path in _LIKE_THE_POT:

@@ -198,27 +198,18 @@ class RecorderError(ReadingModifier):
 
 
 @dataclass(frozen=True)
-class UnrecordedJump(RunModifier):
+class Unrecorded(RunModifier):
     """
-    Lets a jump of the command come later.
+    What a recorded command does not show: `late_jumps` or `hole_means` of a `RunSetup`.
 
     Between the samples of a recorded command nobody knows when it jumped.
     """
 
+    what: str
     number: int
 
     def apply(self, run: RunSetup, value: float) -> None:
-        run.late_jumps[self.number] = value
-
-
-@dataclass(frozen=True)
-class UnrecordedMean(RunModifier):
-    """Lets the command have another mean in a hole of the recording."""
-
-    number: int
-
-    def apply(self, run: RunSetup, value: float) -> None:
-        run.hole_means[self.number] = value
+        getattr(run, self.what)[self.number] = value
 
 
 @dataclass(frozen=True)

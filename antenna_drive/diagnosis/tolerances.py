@@ -10,8 +10,7 @@ import math
 
 from antenna_drive.diagnosis.field_test import FieldTest
 from antenna_drive.diagnosis.modifiers import (
-    add, AntennaParameter, Modifier, RecorderError, scale, SupplyGain, UnrecordedJump,
-    UnrecordedMean,
+    add, AntennaParameter, Modifier, RecorderError, scale, SupplyGain, Unrecorded,
 )
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
 from antenna_drive.readings import Reading, READINGS
@@ -139,11 +138,12 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
             name = f'jump:{test.name}:{begin:.3f}'
             earlier, later = command.slack[i].tolist()
             half = 0.5 * (later - earlier)
-            yield replace(_within(name, 's', half, UnrecordedJump(i), k), low=earlier, high=later)
+            yield replace(_within(name, 's', half, Unrecorded('late_jumps', i), k), low=earlier,
+                          high=later)
 
         for i, (begin, _) in enumerate(command.holes):
             yield _within(f'hole:{test.name}:{begin:.3f}', 'rad/s',
-                          2.0 * float(command.uncertainty[i]), UnrecordedMean(i), k)
+                          2.0 * float(command.uncertainty[i]), Unrecorded('hole_means', i), k)
 
     given = allowed([test])
     if given.clock_ppm:
