@@ -18,7 +18,7 @@ from functools import partial
 
 from antenna_drive.diagnosis import gust
 from antenna_drive.diagnosis.modifiers import (
-    add, AntennaParameter, Digit, DigitTurn, Modifier, RecorderError, scale, set_to,
+    add, AntennaParameter, Modifier, RecorderError, Rounding, scale, set_to,
 )
 from antenna_drive.diagnosis.wave_shape import WaveShape
 from antenna_drive.diagnosis.waves import wave
@@ -312,10 +312,11 @@ def _quantisation(digit: float) -> Form:
 
     There is such a digit or there is none: the difference quotient reaches from one to the other.
     """
+    digits = Rounding('digit', ('plant.encoder.step',))
     if not digit:
-        return _one('step', 'rad', 0.0, 1e-2, 1e-5, Digit())
-    turn = AntennaParameter('turn', '1', -1.0, 1.0, 0.02, is_shape=True, modifier=DigitTurn())
-    return _form(_number('step', 'rad', 0.0, digit, digit, Digit()), turn, name=DIGITS_SEEN)
+        return _one('step', 'rad', 0.0, 1e-2, 1e-5, digits)
+    turn = AntennaParameter('turn', '1', -1.0, 1.0, 0.02, is_shape=True, modifier=Rounding('turn'))
+    return _form(_number('step', 'rad', 0.0, digit, digit, digits), turn, name=DIGITS_SEEN)
 
 
 def catalogue(durations_s: Sequence[float] = (), encoder_digit: float = 0.0) -> dict[str, Effect]:

@@ -213,22 +213,15 @@ class Unrecorded(RunModifier):
 
 
 @dataclass(frozen=True)
-class Digit(ReadingModifier):
-    """Rounds the encoder's reading to a digit."""
+class Rounding(ReadingModifier):
+    """Sets the `digit` of the encoder, or the `turn` by which its rounding is off."""
 
-    fields = ('plant.encoder.step',)
+    what: str
+    fields: tuple[str, ...] = ()
     how = SET
 
     def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.digit = value
-
-
-@dataclass(frozen=True)
-class DigitTurn(ReadingModifier):
-    """Shifts where the encoder rounds, by a share of its digit."""
-
-    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.turn = value
+        setattr(readings, self.what, value)
 
 
 @dataclass(frozen=True)

@@ -245,20 +245,9 @@ class Recording:
                                 channel.values[first:last])
         return replace(self, channels=cut)
 
-    def shift(self, offset_s: float, names: Sequence[str] | None = None) -> Recording:
-        """
-        Return the recording with `offset_s` added to the time stamps of `names`, or of all.
-
-        Raises
-        ------
-        RecordingError : there is no such signal
-
-        """
-        return self.shift_ns(nanoseconds(offset_s), names)
-
     def shift_ns(self, offset_ns: int, names: Sequence[str] | None = None) -> Recording:
         """
-        Do as `shift`, by whole nanoseconds: exact where stamps are too long for a double.
+        Return the recording with `offset_ns` added to the time stamps of `names`, or of all.
 
         Raises
         ------

@@ -138,10 +138,10 @@ def test_between_is_half_open_and_keeps_time_stamps() -> None:
 
 
 def test_shift_moves_the_signals_named() -> None:
-    moved = ramp(10, 1).shift(0.25, [CURRENT])
+    moved = ramp(10, 1).shift_ns(250_000_000, [CURRENT])
     assert moved[CURRENT].time_ns[0] == 250_000_000
     assert moved[COMMAND].time_ns[0] == 0
-    assert ramp(10, 1).shift(0.25).shift(-0.25) == ramp(10, 1)
+    assert ramp(10, 1).shift_ns(250_000_000).shift_ns(-250_000_000) == ramp(10, 1)
 
 
 def repeated(count: int) -> Recording:
@@ -217,14 +217,14 @@ def test_alignment_states_its_method_and_the_widest_gap() -> None:
 
 
 def test_resampling_covers_the_common_time_and_says_how() -> None:
-    recording = ramp(100, 1).shift(0.105, [CURRENT]).resample(20.0, 'hold')
+    recording = ramp(100, 1).shift_ns(105_000_000, [CURRENT]).resample(20.0, 'hold')
     stamps = recording[CURRENT].time_ns
     assert stamps[0] == 105_000_000
     assert np.all(np.diff(stamps) == 50_000_000)
     assert stamps[-1] <= 990_000_000 < stamps[-1] + 50_000_000
     assert 'last sample before' in recording.notes['resampled']
     with pytest.raises(RecordingError, match='no common time'):
-        ramp(100, 1).shift(5.0, [CURRENT]).resample(20.0)
+        ramp(100, 1).shift_ns(5_000_000_000, [CURRENT]).resample(20.0)
     with pytest.raises(RecordingError, match='not above 0'):
         ramp(100, 1).resample(0.0)
 
