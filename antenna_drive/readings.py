@@ -30,6 +30,12 @@ class SheetNumber(NamedTuple):
     usual: float
 
 
+def not_negative(key: str, usual: float, unit: str, description: str,
+                 high: float = math.inf) -> SheetNumber:
+    """Return a number of a test sheet from 0 to `high`."""
+    return SheetNumber(key, Entry(unit, 0.0, high, description), usual)
+
+
 class Errors(NamedTuple):
     """
     What a sensor does to a true value; numbers, or arrays of the shape of the true values.
@@ -95,10 +101,6 @@ class Reading:
     instead: str = ''
 
 
-def _given(key: str, usual: float, unit: str, description: str) -> SheetNumber:
-    return SheetNumber(key, Entry(unit, 0.0, description=description), usual)
-
-
 def _noisy(true: Any, noise: float, step: float) -> Errors:
     return Errors(noise, step, math.hypot(noise, step / math.sqrt(12.0)))
 
@@ -114,19 +116,19 @@ def _counted(true: Any, bits: float) -> Errors:
 
 
 AMMETER = Sensor(_noisy, (
-    _given('current_noise_A', 0.01, 'A', 'noise of each current'),
-    _given('current_step_A', 0.01, 'A', 'resolution of each current')),
-    zero=_given('current_zero_A', 0.02, 'A', 'zero of each recorded current'))
+    not_negative('current_noise_A', 0.01, 'A', 'noise of each current'),
+    not_negative('current_step_A', 0.01, 'A', 'resolution of each current')),
+    zero=not_negative('current_zero_A', 0.02, 'A', 'zero of each recorded current'))
 TACHOMETER = Sensor(_noisier_with_rate, (
-    _given('tach_noise_rad_s', 0.0035, 'rad/s', 'noise of each tachometer'),
-    SheetNumber('tach_noise_relative', Entry('1', 0.0, 1.0, 'noise per rate'), 0.0015),
-    _given('tach_step_rad_s', 0.002, 'rad/s', 'resolution of each tachometer')))
+    not_negative('tach_noise_rad_s', 0.0035, 'rad/s', 'noise of each tachometer'),
+    not_negative('tach_noise_relative', 0.0015, '1', 'noise per rate', 1.0),
+    not_negative('tach_step_rad_s', 0.002, 'rad/s', 'resolution of each tachometer')))
 ENCODER = Sensor(_counted, (SheetNumber('encoder_bits', Entry(
     '1', 1, 64, 'bits per turn of the encoder', whole=True), 21),), is_counter=True)
 VOLTMETER = Sensor(_noisy, (
-    _given('bias_noise_V', 0.01, 'V', 'noise of the bias voltage'),
-    _given('bias_step_V', 0.01, 'V', 'resolution of the bias voltage')),
-    zero=_given('bias_zero_V', 0.03, 'V', 'zero of the recorded bias voltage'))
+    not_negative('bias_noise_V', 0.01, 'V', 'noise of the bias voltage'),
+    not_negative('bias_step_V', 0.01, 'V', 'resolution of the bias voltage')),
+    zero=not_negative('bias_zero_V', 0.03, 'V', 'zero of the recorded bias voltage'))
 
 READINGS = (
     Reading('current_1', 'motor_1/ammeter', 'current_1_A', 'A', 'ammeter 1', AMMETER,

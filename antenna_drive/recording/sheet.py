@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, ClassVar, get_args, get_type_hints
 
 from antenna_drive.parameters.sets import KNOTS_LIMIT, SINES_LIMIT
-from antenna_drive.readings import SENSORS, SheetNumber
+from antenna_drive.readings import not_negative, SENSORS, SheetNumber
 from simgap.errors import one_line
 from simgap.inputs.labels import parse_labels, plain_value
 from simgap.inputs.plain_yaml import read_yaml
@@ -145,16 +145,13 @@ class Sensors(_numbers_of(  # type: ignore[misc]
 # What instruments of the kind have when somebody looks after them: tachometers and servo
 # amplifiers of a drive, transducers and the logger of a test.
 _TOLERANCES = (
-    SheetNumber('tach_zero_rad_s', Entry(
-        'rad/s', 0.0, description='zero of each tachometer, in the loop'), 0.01),
-    SheetNumber('amplifier_zero_V', Entry(
-        'V', 0.0, description='zero of each amplifier, in the loop'), 1e-3),
-    SheetNumber('recorder_gain', Entry('1', 0.0, 0.5, 'gain of each recorded channel'), 0.01),
+    not_negative('tach_zero_rad_s', 0.01, 'rad/s', 'zero of each tachometer, in the loop'),
+    not_negative('amplifier_zero_V', 1e-3, 'V', 'zero of each amplifier, in the loop'),
+    not_negative('recorder_gain', 0.01, '1', 'gain of each recorded channel', 0.5),
     *(sensor.zero for sensor in SENSORS if sensor.zero),
-    SheetNumber('channel_delay_samples', Entry(
-        '1', 0.0, 10.0, 'constant delay of each recorded channel, in samples'), 1.0),
-    SheetNumber('clock_ppm', Entry(
-        '1', 0.0, 1e4, "rate of the recorder's clock, in millionths"), 100.0),
+    not_negative('channel_delay_samples', 1.0, '1',
+                 'constant delay of each recorded channel, in samples', 10.0),
+    not_negative('clock_ppm', 100.0, '1', "rate of the recorder's clock, in millionths", 1e4),
 )
 
 

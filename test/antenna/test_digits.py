@@ -8,17 +8,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 import math
 
-from antenna_drive.readings import AT, SIGNALS
-from simgap.machine.contract import FloatArray
-
 from antenna_drive.diagnosis.excitation import Bias, Longest, schedule, SheetCommand
 from antenna_drive.diagnosis.machine import AntennaMachine
 from antenna_drive.diagnosis.planned_tests import planned
 from antenna_drive.diagnosis.sensors import digit_of
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.sets import Drive
+from antenna_drive.readings import AT, SIGNALS
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import Square, TestSheet
+from simgap.machine.contract import FloatArray
+
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np

@@ -13,14 +13,11 @@ from typing import Any
 from antenna_drive.cli import main
 from antenna_drive.diagnosis import investigation
 from antenna_drive.diagnosis.drive_limits import DriveLimits
-from antenna_drive.diagnosis.investigation import (
-    Investigation, InvestigationPlan, lines, sensed,
-)
+from antenna_drive.diagnosis.investigation import Investigation, InvestigationPlan, lines, sensed
 from antenna_drive.diagnosis.planned_tests import BUILT_IN
 from antenna_drive.diagnosis.sensors import SensorModel
-from antenna_drive.readings import RATE_COMMAND, SIGNALS
-from simgap.report.render import render
 from antenna_drive.parameters.loading import load
+from antenna_drive.readings import RATE_COMMAND, SIGNALS
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import load_sheet, Sensors, TestSheet
 import numpy as np
@@ -28,6 +25,7 @@ import pytest
 from simgap.errors import UserError
 from simgap.next_test.design import Judged, Proposal, TestSpace
 from simgap.next_test.rivals import Findings, Rival
+from simgap.report.render import render
 
 DRIVE = load()
 LIMITS = DriveLimits.of_drive(DRIVE)
