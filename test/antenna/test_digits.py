@@ -17,12 +17,11 @@ from antenna_drive.parameters.sets import Drive
 from antenna_drive.readings import AT, SIGNALS
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import Square, TestSheet
-from simgap.machine.contract import FloatArray
-
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
+from simgap.machine.contract import FloatArray
 
 WAVEFORM = Square(0.05, 3.0, 0.25)
 SHEET = TestSheet(waveform=WAVEFORM, parameter_tolerance=0.02)
