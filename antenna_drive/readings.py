@@ -62,6 +62,7 @@ class Sensor:
     ----------
     errors : returns the errors at true values, given `numbers`
     numbers : what a test sheet may say of it
+    least, most : no residual counts as quieter, and no value beyond is a reading, in its unit
     zero : what a test sheet may say of the recorder's zero; None: two standard deviations of noise
     is_counter : it counts digits from an unknown angle; a residual at rest is a share of a digit
 
@@ -69,6 +70,8 @@ class Sensor:
 
     errors: Callable[..., Errors]
     numbers: tuple[SheetNumber, ...]
+    least: float
+    most: float
     zero: SheetNumber | None = None
     is_counter: bool = False
 
@@ -117,17 +120,18 @@ def _counted(true: Any, bits: float) -> Errors:
 
 AMMETER = Sensor(_noisy, (
     not_negative('current_noise_A', 0.01, 'A', 'noise of each current'),
-    not_negative('current_step_A', 0.01, 'A', 'resolution of each current')),
+    not_negative('current_step_A', 0.01, 'A', 'resolution of each current')), 0.003, 1e3,
     zero=not_negative('current_zero_A', 0.02, 'A', 'zero of each recorded current'))
 TACHOMETER = Sensor(_noisier_with_rate, (
     not_negative('tach_noise_rad_s', 0.0035, 'rad/s', 'noise of each tachometer'),
     not_negative('tach_noise_relative', 0.0015, '1', 'noise per rate', 1.0),
-    not_negative('tach_step_rad_s', 0.002, 'rad/s', 'resolution of each tachometer')))
+    not_negative('tach_step_rad_s', 0.002, 'rad/s', 'resolution of each tachometer')), 0.001, 1e4)
+# the quietest residual is two digits
 ENCODER = Sensor(_counted, (SheetNumber('encoder_bits', Entry(
-    '1', 1, 64, 'bits per turn of the encoder', whole=True), 21),), is_counter=True)
+    '1', 1, 64, 'bits per turn of the encoder', whole=True), 21),), 6e-6, 1e2, is_counter=True)
 VOLTMETER = Sensor(_noisy, (
     not_negative('bias_noise_V', 0.01, 'V', 'noise of the bias voltage'),
-    not_negative('bias_step_V', 0.01, 'V', 'resolution of the bias voltage')),
+    not_negative('bias_step_V', 0.01, 'V', 'resolution of the bias voltage')), 0.003, 1e3,
     zero=not_negative('bias_zero_V', 0.03, 'V', 'zero of the recorded bias voltage'))
 
 READINGS = (

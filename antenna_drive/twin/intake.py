@@ -15,16 +15,15 @@ from collections import Counter
 import math
 
 from antenna_drive.emulator.unit import FloatArray
-from antenna_drive.readings import RATE_COMMAND, SIGNALS
+from antenna_drive.readings import RATE_COMMAND, READINGS
 from antenna_drive.recording.recording import Recording, unit_of
 from antenna_drive.recording.sheet import TestSheet
 import numpy as np
 from numpy.typing import NDArray
 from simgap.logs.channel import Channel, make_channel, NANOSECONDS
 
-# No drive of this kind shows more, by unit.
-RANGES = {'A': 1e3, 'rad/s': 1e4, 'rad': 1e2, 'V': 1e3}
-_COMMAND_RANGE = 0.1  # [rad/s]
+# No drive of this kind shows more, in the unit of each signal.
+_MOST = {RATE_COMMAND: 0.1, **{reading.signal: reading.sensor.most for reading in READINGS}}
 # A stamp that is earlier than the one before by less is a message that came late [s].
 LATE_S = 1.0
 # Without a command for longer than this, nobody knows what the drive did [s].
@@ -60,7 +59,7 @@ class Intake:
         Parameters
         ----------
         name
-            'unit/signal': the rate command, or one of `SIGNALS`
+            'unit/signal': the rate command, or one of the readings
         stamp_ns
             of any clock, the same for all signals [ns]
         value
@@ -173,10 +172,9 @@ def _fault(name: str, value: float) -> str:
         return 'not a number'
     if math.isinf(value):
         return 'infinite'
-    allowed = _COMMAND_RANGE if name == RATE_COMMAND else RANGES.get(unit_of(name) or '', math.inf)
-    return '' if abs(value) <= allowed else 'out of range'
+    return '' if abs(value) <= _MOST.get(name, math.inf) else 'out of range'
 
 
 def known(name: str) -> bool:
     """Return whether a twin has a use for a signal."""
-    return name == RATE_COMMAND or name in SIGNALS
+    return name in _MOST

@@ -16,8 +16,7 @@ from dataclasses import dataclass, replace
 import math
 
 from antenna_drive.emulator.unit import FloatArray
-from antenna_drive.readings import SIGNALS
-from antenna_drive.recording.recording import unit_of
+from antenna_drive.readings import READINGS, SIGNALS
 from antenna_drive.twin.baseline import (
     Baseline, BLOCK_S, block_scores, CUT, DRIFT_S, interpolated, LEAST_SAMPLES, motion_of,
     regressors, residual_of, SCORES, shift_of, SignalBaseline, SignalBlock, SLOPES, standardised,
@@ -29,9 +28,6 @@ from scipy.stats import chi2
 
 # A ridge that keeps coefficients of columns that are alike from growing, as a share of a sample.
 _RIDGE = 1e-3
-# What the sensors of such a drive tell, by unit: a residual is never taken for quieter. Of angles
-# it is two digits of an encoder with 21 bits.
-_LEAST = {'A': 0.003, 'rad/s': 0.001, 'rad': 6e-6, 'V': 0.003}
 # A score that moves by less than this share of the residual's size is no gap, however steady it
 # was in the quiet record; and the quiet record's worst block is no gap either.
 _LEAST_DEVIATION, _WORST = 0.1, 3.0
@@ -176,7 +172,7 @@ def _fitted_to(item: _Prepared, shifts: Sequence[float]) -> SignalBaseline:
     rows = np.concatenate([part.rows for part in item.parts])
     centre, scale = rows.mean(axis=0), rows.std(axis=0)
     scale = np.where(_moves(rows, scale), scale, 0.0)
-    least = _LEAST[unit_of(item.name) or '']
+    least = READINGS[SIGNALS.index(item.name)].sensor.least
     own = standardised(rows, centre, scale)
     coefficients = _fitted(own, residual, least)
     sigma = _robust(residual - own @ coefficients, least)

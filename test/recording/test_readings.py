@@ -20,7 +20,7 @@ HOUSE = TABLE.parent
 GYROSCOPE = """
     Reading('gyro', 'plant/axis_rate', 'axis_rate_rad_s', 'rad/s', 'gyroscope', Sensor(
         lambda true, noise: Errors(noise, 0.0, 2.0 * noise),
-        (SheetNumber('gyro_noise_rad_s', Entry('rad/s', 0.0), 1.0),))),
+        (SheetNumber('gyro_noise_rad_s', Entry('rad/s', 0.0), 1.0),), 1e-7, 0.1)),
 )
 
 NAMED"""
