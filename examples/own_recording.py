@@ -16,7 +16,8 @@ import sys
 from antenna_drive.emulator.run import simulate
 from antenna_drive.parameters import load
 from antenna_drive.parameters.sets import changed
-from antenna_drive.recording.csv_format import FIELD_COLUMNS, write_csv
+from antenna_drive.readings import FIELD_COLUMNS
+from antenna_drive.recording.csv_format import write_csv
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.recording import Recording
 import numpy as np

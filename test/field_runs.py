@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from antenna_drive.diagnosis.field_recording import CHANNELS, RATE_COMMAND
 from antenna_drive.emulator.run import MACRO_STEP, simulate
 from antenna_drive.parameters.sets import changed, Drive
+from antenna_drive.readings import RATE_COMMAND, SIGNALS
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import TestSheet
 import numpy as np
@@ -25,6 +25,6 @@ def field_run(drive: Drive, duration: float, sheet: TestSheet | None = None, eve
     run = simulate(drive, duration, MACRO_STEP, changes, every)
     random = np.random.default_rng(0)
     signals = {RATE_COMMAND: run[RATE_COMMAND]}
-    for name, level in zip(CHANNELS, NOISE, strict=True):
+    for name, level in zip(SIGNALS, NOISE, strict=True):
         signals[name] = run[name] + noise * level * random.normal(size=run.time.size)
     return Recording.from_arrays(run.time, signals, sheet=sheet or TestSheet())

@@ -11,8 +11,8 @@ import resource
 from typing import Any
 
 from antenna_drive.parameters.sets import Drive
+from antenna_drive.readings import RATE_COMMAND
 from antenna_drive.recording.recording import Recording
-from antenna_drive.twin.intake import COMMAND
 
 
 def square(number: int) -> int:
@@ -50,6 +50,6 @@ def large(megabytes: int) -> tuple[bytes, int, float]:
 
 def lengths_found(recordings: Mapping[str, Recording], drive: Drive) -> dict[str, Any]:
     """Stand in for a diagnosis: what has arrived is in the names of the effects."""
-    answers = [f'{name}, {len(found[COMMAND])} samples' for name, found in recordings.items()]
+    answers = [f'{name}, {len(found[RATE_COMMAND])} samples' for name, found in recordings.items()]
     return {'which': [{'effects': answers, 'probability': 1.0}], 'confusable': [],
             'planning': {'circuit': drive.torque_share.circuit.saturation_high}}

@@ -3,10 +3,10 @@
 """
 Turn a recording into CSV, exact to the last bit of every number.
 
-One column for each signal, named 'unit/signal [unit]'; with --field the eight columns of a field
-test instead (time_s, rate_command_rad_s, current_1_A ...). A cell is empty where a signal has no
-sample. Beside OUT.csv come OUT.yaml, the test sheet, and OUT.meta.json, the configuration in
-force and the live changes; `antenna-drive import` reads all three back.
+One column for each signal, named 'unit/signal [unit]'; with --field the columns of a field test
+instead, which docs/recording.md lists. A cell is empty where a signal has no sample. Beside
+OUT.csv come OUT.yaml, the test sheet, and OUT.meta.json, the configuration in force and the live
+changes; `antenna-drive import` reads all three back.
 
   antenna-drive export run/ run.csv
   antenna-drive export run/ field.csv --field --from 5 --to 25

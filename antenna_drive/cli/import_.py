@@ -3,9 +3,8 @@
 """
 Turn a file from the field into a bag that every ROS 2 tool, plotter and command here opens.
 
-A file with the columns of a field test (time_s, rate_command_rad_s, current_1_A, current_2_A,
-tach_rate_1_rad_s, tach_rate_2_rad_s, encoder_rad, bias_voltage_V) or of `antenna-drive export`
-needs no map. Any other is described by a map, in YAML:
+A file with the columns of a field test, which docs/recording.md lists, or of `antenna-drive
+export` needs no map. Any other is described by a map, in YAML:
 
   time: {column: "Time (ms)", unit: ms}          # s, ms, us, ns, iso8601
   delimiter: ";"

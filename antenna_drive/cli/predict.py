@@ -36,7 +36,7 @@ from simgap.command.output import add_json_option, STANDARD_OUTPUT, write_json
 from simgap.errors import UserError
 
 if TYPE_CHECKING:
-    from antenna_drive.diagnosis.prediction import RecorderErrors
+    from antenna_drive.diagnosis.modifiers import SensorReadings
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -59,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Predict, write what was asked for; 1 if the prediction is worse than --against."""
     # the compiled physics takes a while to load: not before it is needed
-    from antenna_drive.diagnosis.prediction import predict, RecorderErrors
+    from antenna_drive.diagnosis.prediction import predict
     from antenna_drive.parameters.loading import load
     from antenna_drive.recording.csv_format import write_csv
 
@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.out.suffix != '.csv':
             raise UserError(f'--out {arguments.out}: allowed is a name that ends with .csv')
         refuse_existing(arguments.out)
-    recorder = _recorder(arguments.recorder) if arguments.recorder else RecorderErrors()
+    recorder = _recorder(arguments.recorder) if arguments.recorder else None
     drive = load(*arguments.config)
     other = load(*arguments.against) if arguments.against else None
     with warnings_in_one_line():
@@ -106,8 +106,8 @@ def _mean_ratio(signals: dict[str, dict[str, Any]]) -> float:
                         for item in signals.values()) / len(signals))
 
 
-def _recorder(path: Path) -> RecorderErrors:
-    from antenna_drive.diagnosis.prediction import RecorderErrors
+def _recorder(path: Path) -> SensorReadings:
+    from antenna_drive.diagnosis.prediction import recorder_errors
     try:
         content = json.loads(path.read_text(encoding='utf-8'))
     except (ValueError, RecursionError) as error:
@@ -116,6 +116,6 @@ def _recorder(path: Path) -> RecorderErrors:
     if not isinstance(entries, list):
         raise UserError(f'{path}: recorder: is missing; give the JSON of antenna-drive diagnose')
     try:
-        return RecorderErrors.of(entries)
+        return recorder_errors(entries)
     except UserError as error:
         raise UserError(f'{path}: {error}') from None

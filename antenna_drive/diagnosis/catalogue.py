@@ -14,14 +14,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 from antenna_drive.diagnosis import gust
-from antenna_drive.diagnosis.field_test import BIAS, CURRENT_1, ENCODER
 from antenna_drive.diagnosis.modifiers import (
-    add, AntennaParameter, Digit, DigitTurn, Modifier, ReadingGain, ReadingZero, scale, set_to,
+    add, AntennaParameter, Modifier, RecorderError, Rounding, scale, set_to,
 )
 from antenna_drive.diagnosis.wave_shape import WaveShape
 from antenna_drive.diagnosis.waves import wave
+from antenna_drive.readings import NAMED
 from simgap.machine.contract import Effect, Form
 
 # The motors of an effect, for one motor or both.
@@ -70,23 +71,28 @@ def _number(name: str, unit: str, low: float, high: float, step: float, modifier
                             modifier=modifier, tolerance=healthy)
 
 
+def _one(name: str, unit: str, low: float, high: float, step: float, modifier: Modifier,
+         healthy: float = 0.0, form: str = '') -> Form:
+    return _form(_number(name, unit, low, high, step, modifier, healthy=healthy), name=form)
+
+
+def _fields(owners: Sequence[str], name: str) -> list[str]:
+    return [f'{owner}.{name}' for owner in owners]
+
+
 def _stribeck(unit_rates: Iterable[float], torque: tuple[float, float], rate: tuple[float, float],
               owners: Sequence[str], healthy: float) -> tuple[Form, ...]:
     """Return forms of Stribeck friction that begin at several rates [rad/s]."""
-    def at(name: str) -> list[str]:
-        return [f'{owner}.stribeck_{name}' for owner in owners]
-
+    at = partial(_fields, owners)
     return tuple(_form(
-        _number('torque', 'N m', 0.0, *torque, add(*at('torque')), healthy=healthy),
-        _number('rate', 'rad/s', *rate, 0.02 * start, set_to(*at('rate')), start=start),
-        _number('shape', '1', 0.3, 2.5, 0.05, set_to(*at('shape')), start=1.0),
+        _number('torque', 'N m', 0.0, *torque, add(*at('stribeck_torque')), healthy=healthy),
+        _number('rate', 'rad/s', *rate, 0.02 * start, set_to(*at('stribeck_rate')), start=start),
+        _number('shape', '1', 0.3, 2.5, 0.05, set_to(*at('stribeck_shape')), start=1.0),
         name=f'from {start:g} rad/s') for start in unit_rates)
 
 
-def _motor_effects(into: _Catalogue, component: str, motors: tuple[str, ...]) -> None:
-    def at(name: str) -> list[str]:
-        return [f'{motor}.{name}' for motor in motors]
-
+def _friction_effects(into: _Catalogue, component: str, motors: tuple[str, ...]) -> None:
+    at = partial(_fields, motors)
     into.add(component, 'viscous_friction',
              'lubricant or seals drag the more, the faster the motor turns',
              'current grows with the rate, in both directions',
@@ -101,17 +107,21 @@ def _motor_effects(into: _Catalogue, component: str, motors: tuple[str, ...]) ->
              simpler='coulomb_friction')
     into.add(component, 'coulomb_friction', 'bearings or brake rub harder or less than assumed',
              'current offset that changes sign with the direction',
-             _form(_number('torque', 'A', -0.069, 3.0, 0.01, add(*at('motor.coulomb_torque')),
-                           healthy=2e-3)))
+             _one('torque', 'A', -0.069, 3.0, 0.01, add(*at('motor.coulomb_torque')),
+                  healthy=2e-3))
     into.add(component, 'friction_asymmetry', 'a seal or brush rubs more in one direction',
              'current level differs between the directions',
-             _form(_number('share', '1', -8.0, 8.0, 0.05, add(*at('motor.friction_asymmetry')),
-                           healthy=0.05)))
+             _one('share', '1', -8.0, 8.0, 0.05, add(*at('motor.friction_asymmetry')),
+                  healthy=0.05))
     into.add(component, 'load_dependent_friction',
              'tooth and bearing friction grow with the transmitted torque',
              'current grows by a share of the gear torque, against the direction of motion',
-             _form(_number('share', '1', 0.0, 0.6, 5e-3,
-                           add(*at('motor.load_dependent_friction')), healthy=5e-3)))
+             _one('share', '1', 0.0, 0.6, 5e-3, add(*at('motor.load_dependent_friction')),
+                  healthy=5e-3))
+
+
+def _motor_effects(into: _Catalogue, component: str, motors: tuple[str, ...]) -> None:
+    at = partial(_fields, motors)
     into.add(component, 'torque_ripple', 'slots and poles of the motor modulate its torque',
              'rate and current vary with the angle of the rotor',
              wave('N m', 10.0, 0.02, WaveShape('torque_ripple', tuple(at('motor')), motors[0]),
@@ -119,8 +129,8 @@ def _motor_effects(into: _Catalogue, component: str, motors: tuple[str, ...]) ->
     # nobody knows whether the amplifier was trimmed to the motor as it is or as it should be
     into.add(component, 'torque_constant', 'weak or hot magnets, a wrong winding',
              'more or less current for the same motion',
-             *(_form(_number(name, '1', -0.6, 0.6, 5e-3,
-                             scale(*at('motor.torque_constant'), *other)), name=words)
+             *(_one(name, '1', -0.6, 0.6, 5e-3, scale(*at('motor.torque_constant'), *other),
+                    form=words)
                for name, words, other in (
                    ('change', 'torque and back-EMF', at('armature.back_emf_share')),
                    ('trimmed_change', 'torque and back-EMF, the limiter trimmed to it',
@@ -128,29 +138,26 @@ def _motor_effects(into: _Catalogue, component: str, motors: tuple[str, ...]) ->
                    ('torque_change', 'torque alone', []))))
     into.add(component, 'armature_resistance', 'hot or worn winding, brushes or cable',
              'current follows its demand with another gain and lag',
-             _form(_number('change', 'ohm', -0.4, 3.0, 4e-3,
-                           add(*at('armature.resistance_change'))), name='of the winding'),
-             _form(_number('trimmed_change', '1', -0.8, 3.0, 5e-3,
-                           scale(*at('armature.resistance')), healthy=0.02),
-                   name='of the winding, the amplifier trimmed to it'))
+             _one('change', 'ohm', -0.4, 3.0, 4e-3, add(*at('armature.resistance_change')),
+                  form='of the winding'),
+             _one('trimmed_change', '1', -0.8, 3.0, 5e-3, scale(*at('armature.resistance')),
+                  healthy=0.02, form='of the winding, the amplifier trimmed to it'))
     into.add(component, 'amplifier_gain', 'amplifier 1 set or drifted to another gain',
              'stiffer or softer rate loop: currents at reversals',
-             _form(_number('change', '1', -0.8, 1.5, 5e-3, scale(*at('amplifier.rate_gain')))))
+             _one('change', '1', -0.8, 1.5, 5e-3, scale(*at('amplifier.rate_gain'))))
     into.add(component, 'amplifier_offset', 'drift of the operational amplifier',
              'a constant rate error, and currents that wind up against each other',
-             _form(_number('offset', 'V', -0.5, 0.5, 5e-4, add(*at('amplifier.offset')))))
+             _one('offset', 'V', -0.5, 0.5, 5e-4, add(*at('amplifier.offset'))))
     into.add(component, 'amplifier_dead_zone',
              'crossover distortion, or a comparator in front of amplifier 1',
              'no answer to small rate errors or demands, hunting at low rates',
-             _form(_number('half_width', 'V', 0.0, 0.5, 1e-3, add(*at('amplifier.dead_zone')),
-                           healthy=1e-3),
-                   name='in front of amplifier 1'),
-             _form(_number('crossover', 'A', 0.0, 2.0, 5e-3, add(*at('amplifier.crossover')),
-                           healthy=0.01),
-                   name='crossover of amplifier 2'))
+             _one('half_width', 'V', 0.0, 0.5, 1e-3, add(*at('amplifier.dead_zone')), healthy=1e-3,
+                  form='in front of amplifier 1'),
+             _one('crossover', 'A', 0.0, 2.0, 5e-3, add(*at('amplifier.crossover')), healthy=0.01,
+                  form='crossover of amplifier 2'))
     into.add(component, 'current_limit', 'limiter set lower or higher than assumed',
              'current clipped at another level while it saturates',
-             _form(_number('change', '1', -0.9, 0.5, 5e-3, scale(*at('motor.current_limit')))))
+             _one('change', '1', -0.9, 0.5, 5e-3, scale(*at('motor.current_limit'))))
 
 
 def _gearbox_effects(into: _Catalogue, m: int) -> None:
@@ -158,10 +165,10 @@ def _gearbox_effects(into: _Catalogue, m: int) -> None:
     gearbox = f'{motor}.gearbox'
     into.add(component, 'gap', 'worn teeth, or shims set wrong',
              'time to cross the gap at a reversal',
-             _form(_number('change', '1', -0.9, 4.0, 5e-3, scale(f'{gearbox}.half_gap'))))
+             _one('change', '1', -0.9, 4.0, 5e-3, scale(f'{gearbox}.half_gap')))
     into.add(component, 'stiffness', 'loose housing, cracked shaft or other teeth',
              'frequency of the oscillation after a contact',
-             _form(_number('change', '1', -0.8, 4.0, 5e-3, scale(f'{gearbox}.stiffness'))))
+             _one('change', '1', -0.8, 4.0, 5e-3, scale(f'{gearbox}.stiffness')))
     into.add(component, 'hysteresis', 'friction within the gear train as it winds up',
              'torque lags behind the wind-up at each change of direction',
              _form(_number('torque', 'N m', 0.0, 10.0, 0.02, add(f'{gearbox}.hysteresis'),
@@ -184,7 +191,7 @@ def _share_effects(into: _Catalogue) -> None:
     circuit, filter_1 = f'{component}.circuit', f'{component}.filter_1'
 
     def relative(name: str, low: float, high: float, *fields: str, form: str = '') -> Form:
-        return _form(_number(name, '1', low, high, 5e-3, scale(*fields)), name=form)
+        return _one(name, '1', low, high, 5e-3, scale(*fields), form=form)
 
     into.add(component, 'bias_pot', 'the pot is set otherwise than written down',
              'bias voltage and difference of the currents scaled',
@@ -213,7 +220,7 @@ def _axis_effects(into: _Catalogue) -> None:
     into.add(component, 'coulomb_friction',
              'bearings, seals or cable wrap rub harder or less than assumed',
              'both currents change with the direction',
-             _form(_number('change', '1', -0.9, 3.0, 5e-3, scale(f'{axis}.coulomb_torque'))))
+             _one('change', '1', -0.9, 3.0, 5e-3, scale(f'{axis}.coulomb_torque')))
     into.add(component, 'viscous_friction', 'cold grease', 'both currents grow with the rate',
              _form(_number('torque_per_rate', 'N m s/rad', 0.0, 1e9, 1e5,
                            add(f'{axis}.viscous_friction'), healthy=2e5),
@@ -229,20 +236,19 @@ def _axis_effects(into: _Catalogue) -> None:
                   healthy=0.01))
     into.add(component, 'gravity_imbalance', 'counterweight too light or too heavy',
              'both currents shifted, by the cosine of the elevation',
-             _form(_number('torque', 'N m', -1e6, 1e6, 500.0, add(f'{axis}.gravity_torque'),
-                           healthy=1e3)))
+             _one('torque', 'N m', -1e6, 1e6, 500.0, add(f'{axis}.gravity_torque'), healthy=1e3))
     into.add(component, 'wind_steady', 'a steady wind on the dish', 'both currents shifted',
-             _form(_number('torque', 'N m', -1e6, 1e6, 500.0,
-                           add(f'{axis}.steady_wind_torque'), healthy=1e3)))
+             _one('torque', 'N m', -1e6, 1e6, 500.0, add(f'{axis}.steady_wind_torque'),
+                  healthy=1e3))
     into.add(component, 'inertia', 'other counterweight, subreflector or instruments',
              'currents at every change of rate, and the frequencies of the modes',
-             _form(_number('change', '1', -0.6, 2.0, 5e-3, scale(f'{axis}.inertia_hub'))))
+             _one('change', '1', -0.6, 2.0, 5e-3, scale(f'{axis}.inertia_hub')))
 
     def of_modes(name: str, low: float, high: float, step: float, field: str) -> list[Form]:
         fields = [f'{axis}.{field}.{j}' for j in range(3)]
-        return [*(_form(_number(f'{name}_{j + 1}', '1', low, high, step, scale(fields[j])),
-                        name=f'mode {j + 1}') for j in range(3)),
-                _form(_number(name, '1', low, high, step, scale(*fields)), name='all modes')]
+        return [*(_one(f'{name}_{j + 1}', '1', low, high, step, scale(fields[j]),
+                       form=f'mode {j + 1}') for j in range(3)),
+                _one(name, '1', low, high, step, scale(*fields), form='all modes')]
 
     into.add(component, 'mode_frequency', 'a structural member is stiffer or softer',
              'oscillation after a reversal at another frequency',
@@ -261,8 +267,8 @@ def _axis_effects(into: _Catalogue) -> None:
                      name=f'{hertz:.2g} Hz') for hertz in EXTRA_MODES))
     into.add(component, 'bull_gear_backlash', 'worn bull gear: both pinions have more play',
              'longer crossing of both gaps at a reversal',
-             _form(_number('half_gap', 'rad', -0.1, 0.6, 1e-3, add(
-                 'motor_1.gearbox.half_gap', 'motor_2.gearbox.half_gap'), healthy=3e-3)))
+             _one('half_gap', 'rad', -0.1, 0.6, 1e-3,
+                  add('motor_1.gearbox.half_gap', 'motor_2.gearbox.half_gap'), healthy=3e-3))
 
 
 def _sensor_effects(into: _Catalogue, encoder_digit: float) -> None:
@@ -270,24 +276,21 @@ def _sensor_effects(into: _Catalogue, encoder_digit: float) -> None:
         tach, current, motor = f'tach_{m}', f'current_{m}', f'motor_{m}'
         into.add(tach, 'gain', 'the tachometer gives more or less volts per rate',
                  'this motor runs slower or faster than its partner, currents wind up',
-                 _form(_number('change', '1', -0.3, 0.3, 5e-4, add(f'{motor}.tachometer.gain'),
-                               healthy=3e-3)))
+                 _one('change', '1', -0.3, 0.3, 5e-4, add(f'{motor}.tachometer.gain'),
+                      healthy=3e-3))
         into.add(tach, 'offset', 'drift of the tachometer or its amplifier',
                  'a constant rate error, currents wind up against each other',
-                 _form(_number('offset', 'rad/s', -5.0, 5.0, 0.02,
-                               add(f'{motor}.tachometer.offset'))))
+                 _one('offset', 'rad/s', -5.0, 5.0, 0.02, add(f'{motor}.tachometer.offset')))
         into.add(tach, 'ripple', 'commutator or coupling of the tachometer',
                  'reading varies with the angle of the rotor, more at higher rate',
                  wave('1', 0.3, 2e-4, WaveShape('ripple', (f'{motor}.tachometer',), motor),
                       MOTOR_ORDERS, healthy=1e-3))
-        channel = CURRENT_1 + m - 1
         into.add(current, 'gain', 'shunt or amplifier of the ammeter', 'reading scaled',
-                 _form(_number('change', '1', -0.5, 0.5, 1e-3,
-                               ReadingGain(channel, (f'{motor}.ammeter.gain',)))))
+                 _one('change', '1', -0.5, 0.5, 1e-3,
+                      RecorderError('gain', current, (NAMED[current].gain,))))
         into.add(current, 'offset', 'drift of the ammeter', 'reading shifted',
-                 _form(_number('offset', 'A', -1.0, 1.0, 1e-3,
-                               ReadingZero(channel, (f'{motor}.ammeter.offset',)),
-                               healthy=0.02)))
+                 _one('offset', 'A', -1.0, 1.0, 1e-3,
+                      RecorderError('zero', current, (f'{motor}.ammeter.offset',)), healthy=0.02))
     into.add('encoder', 'quantisation', 'bits of the encoder are lost', 'steps in the angle',
              _quantisation(encoder_digit))
     into.add('encoder', 'cyclic_error', 'eccentric scale or uneven interpolation',
@@ -296,11 +299,11 @@ def _sensor_effects(into: _Catalogue, encoder_digit: float) -> None:
                   _ENCODER_ORDERS, on_readings=True, healthy=2e-6), simpler='offset')
     into.add('encoder', 'offset', 'the encoder was mounted or zeroed otherwise',
              'the angle shifted',
-             _form(_number('offset', 'rad', -0.1, 0.1, 1e-6,
-                           ReadingZero(ENCODER, ('plant.encoder.offset',)), healthy=2e-5)))
+             _one('offset', 'rad', -0.1, 0.1, 1e-6,
+                  RecorderError('zero', 'encoder', ('plant.encoder.offset',)), healthy=2e-5))
     into.add('bias_voltage', 'gain', 'divider of the voltmeter', 'reading scaled',
-             _form(_number('change', '1', -0.5, 0.5, 1e-3, ReadingGain(
-                 BIAS, ('torque_share.circuit.voltmeter_gain',)))))
+             _one('change', '1', -0.5, 0.5, 1e-3,
+                  RecorderError('gain', 'bias_voltage', (NAMED['bias_voltage'].gain,))))
 
 
 def _quantisation(digit: float) -> Form:
@@ -309,10 +312,11 @@ def _quantisation(digit: float) -> Form:
 
     There is such a digit or there is none: the difference quotient reaches from one to the other.
     """
+    digits = Rounding('digit', ('plant.encoder.step',))
     if not digit:
-        return _form(_number('step', 'rad', 0.0, 1e-2, 1e-5, Digit()))
-    turn = AntennaParameter('turn', '1', -1.0, 1.0, 0.02, is_shape=True, modifier=DigitTurn())
-    return _form(_number('step', 'rad', 0.0, digit, digit, Digit()), turn, name=DIGITS_SEEN)
+        return _one('step', 'rad', 0.0, 1e-2, 1e-5, digits)
+    turn = AntennaParameter('turn', '1', -1.0, 1.0, 0.02, is_shape=True, modifier=Rounding('turn'))
+    return _form(_number('step', 'rad', 0.0, digit, digit, digits), turn, name=DIGITS_SEEN)
 
 
 def catalogue(durations_s: Sequence[float] = (), encoder_digit: float = 0.0) -> dict[str, Effect]:
@@ -329,6 +333,7 @@ def catalogue(durations_s: Sequence[float] = (), encoder_digit: float = 0.0) -> 
     """
     into = _Catalogue()
     for component, motors in MOTORS.items():
+        _friction_effects(into, component, motors)
         _motor_effects(into, component, motors)
     for m in (1, 2):
         _gearbox_effects(into, m)
@@ -339,9 +344,9 @@ def catalogue(durations_s: Sequence[float] = (), encoder_digit: float = 0.0) -> 
              'both currents vary with time, by no angle or rate', gust.gust_form(durations_s))
     into.add('loop', 'delay', 'a computer or a network in the command or in the rate loop',
              'everything comes late, or the rate loop rings',
-             _form(_number('time', 's', 0.0, 0.2, 5e-4, add('test_signal.delay'), healthy=5e-4),
-                   name='of the command'),
-             _form(_number('error_time', 's', 0.0, 0.05, 2e-4, add(
-                 'motor_1.amplifier.delay', 'motor_2.amplifier.delay'), healthy=2e-4),
-                 name='of the rate error'))
+             _one('time', 's', 0.0, 0.2, 5e-4, add('test_signal.delay'), healthy=5e-4,
+                  form='of the command'),
+             _one('error_time', 's', 0.0, 0.05, 2e-4,
+                  add('motor_1.amplifier.delay', 'motor_2.amplifier.delay'), healthy=2e-4,
+                  form='of the rate error'))
     return dict(into)

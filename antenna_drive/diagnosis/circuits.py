@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, reduce
 import math
 from typing import Any
 
@@ -41,7 +41,9 @@ def _logarithm(ratio: float) -> float:
 
 def _numbers(drive: Drive, entry: str) -> dict[str, float]:
     part, keys = CIRCUITS[entry]
-    place: Any = drive
-    for step in part.split('.'):
-        place = getattr(place, step)
-    return {f'{part}.{key}': float(getattr(place, key)) for key in keys}
+    return {path: float(value_of(drive, path)) for path in (f'{part}.{key}' for key in keys)}
+
+
+def value_of(drive: Drive, path: str) -> Any:
+    """Return what a configuration says of a dotted name."""
+    return reduce(getattr, path.split('.'), drive)

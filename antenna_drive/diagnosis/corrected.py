@@ -14,11 +14,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from antenna_drive.diagnosis.catalogue import EXTRA_MODE
+from antenna_drive.diagnosis.circuits import value_of
 from antenna_drive.diagnosis.excitation import Bias
-from antenna_drive.diagnosis.field_test import CHANNELS
 from antenna_drive.diagnosis.modifiers import (
-    AntennaParameter, ChannelDelay, ClockRate, ClockShift, ReadingGain, ReadingModifier,
-    ReadingZero, RunModifier, RunSetup, SCALE,
+    AntennaParameter, ReadingModifier, RecorderError, RunModifier, RunSetup, SCALE,
 )
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.records import place_of, record_of
@@ -93,7 +92,7 @@ def correct(drive: Drive, records: Sequence[np.ndarray[Any, np.dtype[Any]]],
         alone, _, _ = _written(given, [
             (p, value) for p, value in fitted if owner.get(p.name) == effect])
         for path, value in alone.items():
-            if value != _value(given, path):
+            if value != value_of(given, path):
                 why[path] = _EFFECT + effect
     reference = {path: value for path, _, value in values(load())}
     lines: dict[str, list[tuple[str, str, Any]]] = {}
@@ -123,13 +122,6 @@ def _as_all_tests_have_it(drive: Drive,
     return changed(drive, changes)
 
 
-def _value(drive: Drive, path: str) -> Any:
-    place: Any = drive
-    for step in path.split('.'):
-        place = getattr(place, step)
-    return place
-
-
 def _written(drive: Drive, fitted: Sequence[tuple[AntennaParameter, float]],
              ) -> tuple[dict[str, Any], tuple[dict[str, Any], ...], list[AntennaParameter]]:
     """Return the changed numbers by dotted name, the recorder's errors, and what has no place."""
@@ -140,7 +132,7 @@ def _written(drive: Drive, fitted: Sequence[tuple[AntennaParameter, float]],
     missing = []
     for item, value in fitted:
         modifier = item.modifier
-        name = _error_of_the_recorder(modifier)
+        name = modifier.name if isinstance(modifier, RecorderError) else ''
         if item.label is not None:
             missing.append(item)  # a configuration has one number for all tests
         elif item.experiment is None and isinstance(modifier, RunModifier):
@@ -154,7 +146,7 @@ def _written(drive: Drive, fitted: Sequence[tuple[AntennaParameter, float]],
             missing.append(item)
     run.write_waves()
     pot = place_of(kind, _POT)
-    before = float(_value(drive, _POT))
+    before = float(value_of(drive, _POT))
     if run.numbers[pot] != before:
         # the pot is set for each test, and its sheet says how
         for path in _LIKE_THE_POT:
@@ -179,16 +171,6 @@ def _numbers(drive: Drive, numbers: FloatArray,
             yield path, tuple(numbers[first:first + count].tolist())
         elif entry.choices is None and not entry.whole:
             yield path, float(numbers[place_of(kind, path)])
-
-
-def _error_of_the_recorder(modifier: Any) -> str:
-    """Return the name of a recorder's error; empty if it is none."""
-    for kind, name in ((ReadingGain, 'gain'), (ReadingZero, 'zero'), (ChannelDelay, 'delay')):
-        if isinstance(modifier, kind):
-            return f'{name}:{tuple(CHANNELS.values())[modifier.channel]}'
-    if isinstance(modifier, ClockShift):
-        return 'clock'
-    return 'clock_rate' if isinstance(modifier, ClockRate) else ''
 
 
 def _told(name: str, effect: str | None) -> str:

@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass, field, fields, replace
 import math
 from pathlib import Path
 
+from antenna_drive.emulator.wiring import MOTORS
 from antenna_drive.parameters.sets import Drive
 import numpy as np
 from simgap.inputs.plain_yaml import read_yaml
@@ -22,9 +23,8 @@ from simgap.inputs.schema import Entry, mapping_of, ParameterError
 from simgap.machine.contract import FloatArray
 
 # What must be known of a simulated test.
-CHANNELS = ('plant/axis_rate', 'plant/axis_angle', 'motor_1/current', 'motor_2/current',
-            'motor_1/gear_torque', 'motor_2/gear_torque', 'motor_1/tach_rate',
-            'motor_2/tach_rate')
+CHANNELS = ('plant/axis_rate', 'plant/axis_angle', *(
+    f'{motor}/{signal}' for signal in ('current', 'gear_torque', 'tach_rate') for motor in MOTORS))
 # The drive's own limiters, and the tolerance and the margin beyond them.
 BEYOND = 1.2
 # Shares of the greatest rate and current that a test keeps, the time above that current, and the
@@ -108,19 +108,21 @@ class DriveLimits:
             the configuration
 
         """
-        value, slope = out[:, :, 0], out[:, :, 1]
+        value, slope = (dict(zip(CHANNELS, out[:, :, k].T, strict=True)) for k in (0, 1))
         armature, ratio = drive.motor_1.armature, drive.motor_1.gear_ratio
-        current = value[:, 2:4]
+        current = _of_motors(value, 'current')
         voltage = (armature.physical_amperes_per_article_ampere * (
-            armature.inductance * slope[:, 2:4] + armature.resistance * current)
-            + armature.back_emf_constant * value[:, 6:8])
+            armature.inductance * _of_motors(slope, 'current') + armature.resistance * current)
+            + armature.back_emf_constant * _of_motors(value, 'tach_rate'))
+        angle = value['plant/axis_angle']
         hot = np.gradient(time) @ (np.abs(current) > self.hot_current_A)
         reached = {
-            'rate_deg_s': math.degrees(_greatest(value[:, 0])),
-            'acceleration_deg_s2': math.degrees(_greatest(slope[:, 0])),
-            'travel_deg': math.degrees(_greatest(value[:, 1] - value[:, 1].min())),
+            'rate_deg_s': math.degrees(_greatest(value['plant/axis_rate'])),
+            'acceleration_deg_s2': math.degrees(_greatest(slope['plant/axis_rate'])),
+            'travel_deg': math.degrees(_greatest(angle - angle.min())),
             'current_A': _greatest(current), 'voltage_V': _greatest(voltage),
-            'axis_torque_N_m': ratio * _greatest(value[:, 4] + value[:, 5]),
+            'axis_torque_N_m': ratio * _greatest(
+                _of_motors(value, 'gear_torque').sum(axis=1)),
             'hot_s': _greatest(hot)}
         return {name: amount / getattr(self, name) for name, amount in reached.items()}
 
@@ -139,6 +141,11 @@ def read_limits(path: Path, drive: Drive) -> DriveLimits:
         return DriveLimits.of_drive(drive).changed(mapping_of('', {} if tree is None else tree))
     except ParameterError as error:
         raise ParameterError(f'{path}: {error}') from None
+
+
+def _of_motors(values: Mapping[str, FloatArray], signal: str) -> FloatArray:
+    """Return a signal of both motors, shape (n, 2)."""
+    return np.stack([values[f'{motor}/{signal}'] for motor in MOTORS], axis=1)
 
 
 def _greatest(values: FloatArray) -> float:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from antenna_drive.diagnosis.excitation import CommandedRate, SheetCommand
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
 from antenna_drive.diagnosis.samples import spikes
+from antenna_drive.readings import AT, NAMED, RATE_COMMAND, RATE_COMMAND_COLUMN, Reading, READINGS
 from antenna_drive.recording import sheet as sheets
 from antenna_drive.recording.recording import Recording
 import numpy as np
@@ -17,18 +18,8 @@ from simgap.errors import UserError
 from simgap.logs.channel import Channel, NANOSECONDS
 from simgap.machine.contract import FloatArray
 
-CHANNELS = {
-    'motor_1/ammeter': 'current_1', 'motor_2/ammeter': 'current_2',
-    'motor_1/tach_rate': 'tach_1', 'motor_2/tach_rate': 'tach_2',
-    'plant/encoder': 'encoder', 'torque_share/bias_voltage': 'bias_voltage',
-}
-UNITS = ('A', 'A', 'rad/s', 'rad/s', 'rad', 'V')
-CURRENT_1, CURRENT_2, TACH_1, TACH_2, ENCODER, BIAS = range(6)
-RATE_COMMAND = 'test_signal/rate_command'
 # A recording with this key in its notes is planned: its readings are not measured.
 PLANNED = 'planned'
-# Other names under which a recording may hold a reading.
-_ALIASES = {'motor_1/ammeter': ('motor_1/current',), 'motor_2/ammeter': ('motor_2/current',)}
 # Samples are thinned to about this rate [Hz]. Single samples are taken: a mean of several would
 # blur edges and hide a ripple.
 SAMPLE_RATE = 70.0
@@ -59,7 +50,7 @@ class FieldRecording:
     sheet : what the tester knows
     command : axis rate command
     rates : its samples
-    readings : those of CHANNELS that were recorded, without spikes
+    readings : those that were recorded, by their short names, without spikes
     time : of the samples of the reading with most of them, spikes included, shape (n,) [s]
     is_planned : the readings are not measured
 
@@ -94,19 +85,19 @@ class FieldRecording:
         """
         if RATE_COMMAND not in recording or len(recording[RATE_COMMAND]) < _FEWEST:
             raise UserError(f'{name}: no rate command is recorded; {RATE_COMMAND} '
-                            '(rate_command_rad_s in a CSV) is needed')
-        if all(_channel(recording, channel) is None for channel in CHANNELS):
+                            f'({RATE_COMMAND_COLUMN} in a CSV) is needed')
+        if all(_channel(recording, reading) is None for reading in READINGS):
             raise UserError(f'{name}: there is no reading beside the rate command, '
                             'at least one current is needed')
         recording = _from_its_start(name, recording, note)
         command = _command(name, recording.sheet.waveform, recording[RATE_COMMAND], note)
         readings = {}
-        for channel_name in CHANNELS:
-            channel = _channel(recording, channel_name)
+        for reading in READINGS:
+            channel = _channel(recording, reading)
             if channel is None:
-                note(f'{name}: {channel_name} was not recorded')
+                note(f'{name}: {reading.signal} was not recorded')
             else:
-                readings[channel_name] = channel
+                readings[reading.name] = channel
         time = max((c.time_s for c in readings.values()), key=len)
         time = time[time >= 0.0]
         if time.size < _FEWEST:
@@ -157,12 +148,10 @@ class FieldRecording:
         return np.asarray(time[::every])
 
     def measured(self, time: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the readings and their slopes at times, shape (n, 6); NaN where there is none."""
-        measured, slope = np.full((2, time.size, len(CHANNELS)), np.nan)
-        for c, channel_name in enumerate(CHANNELS):
-            channel = self.readings.get(channel_name)
-            if channel is None:
-                continue
+        """Return the readings and their slopes at times, shape (n, c); NaN where there is none."""
+        measured, slope = np.full((2, time.size, len(READINGS)), np.nan)
+        for name, channel in self.readings.items():
+            c = AT[name]
             times = channel.time_s
             # two samples beyond either end give the slopes there
             first, last = np.searchsorted(times, [time[0], time[-1]])
@@ -206,10 +195,10 @@ def _is(command: SheetCommand, given: Channel) -> bool:
     return bool(np.mean(wrong) < 0.02)
 
 
-def _channel(recording: Recording, name: str) -> Channel | None:
-    for alias in (name, *_ALIASES.get(name, ())):
-        if alias in recording and len(recording[alias]):
-            return recording[alias]
+def _channel(recording: Recording, reading: Reading) -> Channel | None:
+    for signal in (reading.signal, reading.instead):
+        if signal in recording and len(recording[signal]):
+            return recording[signal]
     return None
 
 
@@ -224,13 +213,13 @@ def _note_missing_rows(name: str, time: FloatArray, note: Note) -> None:
 def _without_spikes(name: str, readings: dict[str, Channel], note: Note) -> dict[str, Channel]:
     """Return the channels without spikes, which would pass for motion."""
     clean, counts = {}, []
-    for channel_name, channel in readings.items():
+    for reading, channel in readings.items():
         wrong = spikes(channel.values)
         if wrong.any():
             channel = replace(channel, time_ns=channel.time_ns[~wrong],
                               values=channel.values[~wrong])
-            counts.append(f'{channel_name} {np.count_nonzero(wrong)}')
-        clean[channel_name] = channel
+            counts.append(f'{NAMED[reading].signal} {np.count_nonzero(wrong)}')
+        clean[reading] = channel
     if counts:
         note(f'{name}: spikes of one sample were left out: {", ".join(counts)}')
     return clean

@@ -13,9 +13,7 @@ from typing import Any
 from antenna_drive.diagnosis.excitation import (
     Bias, CommandedRate, Longest, schedule, SheetCommand,
 )
-from antenna_drive.diagnosis.field_recording import (
-    BIAS, CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldRecording, Note, TACH_1, TACH_2, UNITS,
-)
+from antenna_drive.diagnosis.field_recording import FieldRecording, Note
 from antenna_drive.diagnosis.inference import completed
 from antenna_drive.diagnosis.late_readings import dense, parts_of
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
@@ -27,13 +25,12 @@ from antenna_drive.diagnosis.windows import Window, windows
 from antenna_drive.emulator import batch
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed, Drive
+from antenna_drive.readings import AT, of, TACHOMETER
 from antenna_drive.recording import sheet as sheets
 from antenna_drive.recording.recording import Recording
 import numpy as np
 from simgap.machine.contract import FloatArray
 
-__all__ = ('BIAS', 'CHANNELS', 'CURRENT_1', 'CURRENT_2', 'ENCODER', 'TACH_1', 'TACH_2', 'UNITS',
-           'FieldTest', 'prepared')
 # This many recordings tell different things: one window of each is enough. Of fewer, two are
 # taken.
 _MANY = 3
@@ -61,8 +58,8 @@ class FieldTest:
     command : axis rate command
     bias : source of bias voltage, where the share circuit is not connected
     time : of the samples that are compared, shape (n,) [s]
-    measured : readings, shape (n, 6), NaN where there is none
-    slope : their slopes over time as recorded, shape (n, 6), NaN where there is none
+    measured : readings, shape (n, c), NaN where there is none
+    slope : their slopes over time as recorded, shape (n, c), NaN where there is none
     sensors : what they add
     jitter : of the time stamps [s]
     period : between two recorded samples [s]
@@ -173,14 +170,15 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
         for begin, end in command.holes + window.begin:
             measured[(time > begin) & (time < end + _FORGOTTEN_S)] = np.nan
     rest = time < recording.onset
-    for tach in (TACH_1, TACH_2):
-        measured[rest, tach] = np.where(
-            slips(measured[rest, tach], sensors.tach_noise), np.nan, measured[rest, tach])
+    for tachometer in of(TACHOMETER):
+        c = AT[tachometer.name]
+        measured[rest, c] = np.where(slips(
+            measured[rest, c], sensors.errors(tachometer).scatter), np.nan, measured[rest, c])
     if window.begin > 0.0:
         drive = changed(drive, {'torque_share.circuit.start': 'steady'})
     angle = 0.0 if window.known_start else _angle(recording, window.begin)
     if not window.known_start:
-        measured[:, ENCODER] -= angle
+        measured[:, AT['encoder']] -= angle
         drive = changed(drive, {
             'plant.axis.start_elevation': drive.plant.axis.start_elevation + angle})
     if not math.isinf(window.end):
@@ -192,17 +190,17 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
         recording.period, recording.sheet, window.known_start, angle,
         dict(recording.sheet.labels or ()))
     if not window.known_start:
-        off = measured[:, ENCODER] - test.simulated(_STEP_S)[:, ENCODER]
+        off = (measured - test.simulated(_STEP_S))[:, AT['encoder']]
         if np.isfinite(off).any():
             more = float(np.nanmedian(off))
-            measured[:, ENCODER] -= more
+            measured[:, AT['encoder']] -= more
             return replace(test, start_angle=angle + more)
     return test
 
 
 def _angle(recording: FieldRecording, at: float) -> float:
     """Return the angle of the axis since the start of a recording [rad]."""
-    encoder = recording.readings.get('plant/encoder')
+    encoder = recording.readings.get('encoder')
     if encoder is not None:
         near = slice(*np.searchsorted(encoder.time_s, [at - _ANGLE_S, at + _ANGLE_S]))
         if encoder.values[near].size:

@@ -23,9 +23,9 @@ from typing import Any
 from antenna_drive.diagnosis.allowed_tests import AntennaTests
 from antenna_drive.diagnosis.diagnose import diagnose_recordings
 from antenna_drive.diagnosis.drive_limits import DriveLimits
-from antenna_drive.diagnosis.field_recording import CHANNELS, RATE_COMMAND
 from antenna_drive.diagnosis.sensors import SensorModel
 from antenna_drive.parameters.sets import Drive
+from antenna_drive.readings import RATE_COMMAND, SIGNALS
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import dump_sheet, parse_sheet, TestSheet
@@ -261,11 +261,11 @@ def sensed(recording: Recording, sensors: SensorModel, seed: Sequence[int]) -> R
     command = recording[RATE_COMMAND]
     every = slice(None, None, max(1, round(1.0 / _RATE_HZ / float(
         np.median(np.diff(command.time_s))))))
-    clean = np.column_stack([recording[name].values for name in CHANNELS])[every]
+    clean = np.column_stack([recording[name].values for name in SIGNALS])[every]
     readings = sensors.read(clean, np.random.default_rng(seed))
     return Recording.from_arrays(
         command.time_s[every], {RATE_COMMAND: command.values[every], **dict(zip(
-            CHANNELS, readings.T, strict=True))}, sheet=recording.sheet)
+            SIGNALS, readings.T, strict=True))}, sheet=recording.sheet)
 
 
 def _chapter(number: int, proposal: Mapping[str, Any],

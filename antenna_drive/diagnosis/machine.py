@@ -20,17 +20,16 @@ from antenna_drive.diagnosis.catalogue import catalogue, EXTRA_MODE
 from antenna_drive.diagnosis.diagram import DIAGRAM
 from antenna_drive.diagnosis.disturbances import DISTURBANCES, DriveDisturbance
 from antenna_drive.diagnosis.excitation import Longest
-from antenna_drive.diagnosis.field_test import (
-    CHANNELS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, prepared, TACH_1, TACH_2, UNITS,
-)
-from antenna_drive.diagnosis.late_readings import read_at, RipplingTachometer
+from antenna_drive.diagnosis.field_test import prepared
+from antenna_drive.diagnosis.late_readings import RipplingTachometer
 from antenna_drive.diagnosis.modifiers import KnownModifiers, RunSetup, SensorReadings
+from antenna_drive.diagnosis.outputs import coarser_digit, Outputs, readings_of
 from antenna_drive.diagnosis.plans import disturbed, Plans
-from antenna_drive.diagnosis.sensors import digit_of
 from antenna_drive.diagnosis.tolerances import nuisances
 from antenna_drive.diagnosis.waves import fastest_wave, is_there
 from antenna_drive.emulator import batch
 from antenna_drive.parameters.sets import Drive
+from antenna_drive.readings import AT, NAMED, READINGS, SIGNALS
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import CircuitBias, sheet_tree, TestSheet
 import numpy as np
@@ -48,8 +47,6 @@ LOW_FIDELITY_STEP = 5.6e-3
 # step [s].
 WAVE_STEP = 0.9
 SHORTEST_STEP = 7e-4
-# An encoder's digit differs from the sheet's if it is larger by this factor.
-COARSER = 1.3
 # Hysteresis settles too fast for long steps.
 _STIFF = ('hysteresis', 'hysteresis_share')
 # Runs that are kept.
@@ -63,22 +60,6 @@ class _Job:
     experiment: int
     items: tuple[tuple[str, float], ...]
     until: float
-
-
-@dataclass(frozen=True)
-class _Outputs:
-    """
-    What a run gives at the output times.
-
-    Attributes
-    ----------
-    values : and slopes of n channels, shape (times, n, 2)
-    rippling : tachometers with a ripple, by their channel
-
-    """
-
-    values: FloatArray
-    rippling: Mapping[int, RipplingTachometer]
 
 
 class AntennaMachine(Machine):
@@ -112,7 +93,7 @@ class AntennaMachine(Machine):
                  tolerance: float = 0.02) -> None:
         """Prepare the tests and take the sensors' noise from a first run."""
         self._executor = ThreadPoolExecutor(threads)
-        self._runs: OrderedDict[_Job, _Outputs] = OrderedDict()
+        self._runs: OrderedDict[_Job, Outputs] = OrderedDict()
         self._plans = Plans()
         self._lock = Lock()
         self._longest_step = LONGEST_STEP
@@ -129,7 +110,7 @@ class AntennaMachine(Machine):
             notes.append(f'no sheet gives parameter_tolerance: {tolerance:g} assumed')
         self.notes = notes
         self.tolerance = max(given, default=tolerance)
-        self._digit = _coarser_digit(self._tests)
+        self._digit = coarser_digit(self._tests)
         tolerances = nuisances(self._tests, self.tolerance)
         effects = catalogue([float(test.time[-1]) for test in self._tests], self._digit)
         modifiers = KnownModifiers()
@@ -154,9 +135,10 @@ class AntennaMachine(Machine):
             # the machine may move faster than the model without effects: the readings tell
             slope = np.fmax(np.abs(out[:, :, 1]), np.abs(test.slope))
             noise = test.sensors.noise(out[:, :, 0], slope, test.jitter)
-            found.append(Experiment(test.name, test.time, tuple(CHANNELS.values()), UNITS,
-                                    test.measured, noise, quantised=('encoder',),
-                                    labels=test.labels))
+            found.append(Experiment(
+                test.name, test.time, tuple(AT), tuple(reading.unit for reading in READINGS),
+                test.measured, noise, labels=test.labels,
+                quantised=tuple(r.name for r in READINGS if r.sensor.is_counter)))
         return tuple(found)
 
     # -- variants of the machine ---------------------------------------------------------------
@@ -200,13 +182,14 @@ class AntennaMachine(Machine):
         recorded = self.experiments[experiment]
         predicted = self.predict({}, experiment)
 
-        def signal(c: int) -> FloatArray:
+        def signal(name: str) -> FloatArray:
+            c = AT[name]
             measured = recorded.measured[:, c]
             return np.where(np.isfinite(measured), measured, predicted[:, c])
 
         limit = float(self._tests[experiment].record['motor_1']['motor']['current_limit'][0])
-        return Motion(recorded.time, rate=0.5 * (signal(TACH_1) + signal(TACH_2)),
-                      load=signal(CURRENT_1) + signal(CURRENT_2), angle=signal(ENCODER),
+        return Motion(recorded.time, rate=0.5 * (signal('tach_1') + signal('tach_2')),
+                      load=signal('current_1') + signal('current_2'), angle=signal('encoder'),
                       load_limit=2.0 * limit)
 
     # -- running -------------------------------------------------------------------------------
@@ -227,7 +210,7 @@ class AntennaMachine(Machine):
             for k in range(len(self._tests)) if one is None else (one,):
                 uses.setdefault(self._job(k, point, until), []).append(i)
 
-        def read(job: _Job) -> _Outputs | None:
+        def read(job: _Job) -> Outputs | None:
             """Read what needs a run, and return the run if it is a new one."""
             known = self._runs.get(job)
             out = self._run(job) if known is None else known
@@ -282,7 +265,7 @@ class AntennaMachine(Machine):
         return self._tests[experiment].output_times, self._run(job, channels=channels).values
 
     def _run(self, job: _Job, disturbance: tuple[DriveDisturbance, Course] | None = None,
-             channels: tuple[str, ...] = batch.CHANNELS) -> _Outputs:
+             channels: tuple[str, ...] = SIGNALS) -> Outputs:
         test = self._tests[job.experiment]
         kind = test.record.dtype
         run = RunSetup(test.record.view(np.float64).copy(), kind, float(test.time[-1]), test.bias,
@@ -305,9 +288,9 @@ class AntennaMachine(Machine):
                                  Longest(longest, SHORTEST_STEP, WAVE_STEP, cycles))
         if disturbance is not None:
             plan = disturbed(plan, run, *disturbance)
-        rippling = {channels.index(f'{motor}/tach_rate'): motor
-                    for motor in ('motor_1', 'motor_2') if f'{motor}/tach_rate' in channels
-                    and is_there(record[motor]['tachometer'], 'ripple')}
+        rippling = {f'tach_{m}': f'motor_{m}' for m in (1, 2)
+                    if NAMED[f'tach_{m}'].signal in channels
+                    and is_there(record[f'motor_{m}']['tachometer'], 'ripple')}
         wanted = (*channels, *(f'{motor}/angle' for motor in rippling.values()))
         time = test.output_times
         samples = int(np.count_nonzero(time - time[0] < job.until))
@@ -318,39 +301,19 @@ class AntennaMachine(Machine):
             out = np.full((time.size, len(wanted), 2), np.nan)
             out[:samples] = batch.run(record, batch.Schedule(
                 plan.steps[:steps], plan.keep[:steps + 1]), channels=wanted)
-        return _Outputs(out[:, :len(channels)], {
-            channel: RipplingTachometer(out[:, row, 0], record[motor]['tachometer'])
-            for row, (channel, motor) in enumerate(rippling.items(), len(channels))})
+        return Outputs(out[:, :len(channels)], {
+            name: RipplingTachometer(out[:, row, 0], record[motor]['tachometer'])
+            for row, (name, motor) in enumerate(rippling.items(), len(channels))})
 
-    def _read(self, k: int, out: _Outputs, point: Point) -> FloatArray:
+    def _read(self, k: int, out: Outputs, point: Point) -> FloatArray:
         """Return the readings of a run, with the errors of sensors that nothing feeds back."""
-        time = self._tests[k].time
-        readings = SensorReadings()
+        errors = SensorReadings()
         for name, value in point.items():
             modifier, test = self._reading_modifiers.get(name, (None, None))
             if modifier is not None and test in (None, k) and value:
-                modifier.apply_to_readings(readings, value)
-        digit = readings.digit
-        wanted = time + readings.clock_rate * (time - time[0])
-        times = self._tests[k].output_times
-        values = read_at(times, out.values, wanted, readings.late)
-        for channel, tachometer in out.rippling.items():
-            values[:, channel] = tachometer.read_at(
-                times, out.values[:, channel], wanted, float(readings.late[channel]))
-        values *= readings.gain
-        turned = self._tests[k].start_angle
-        for shape, parts in readings.waves.items():
-            values[:, ENCODER] += shape.along(values[:, ENCODER] + turned, parts)
-        values += readings.zero
-        if digit > 0.0 and self._digit:
-            # whatever lies within the digit that was read would have been read
-            shift = readings.turn * digit
-            read = self.experiments[k].measured[:, ENCODER] + shift
-            off = np.nan_to_num(values[:, ENCODER] - read)
-            values[:, ENCODER] -= np.clip(off, -0.5 * digit, 0.5 * digit) + shift
-        elif digit > 0.0:
-            values[:, ENCODER] = digit * np.floor(values[:, ENCODER] / digit + 0.5)
-        return values
+                modifier.apply_to_readings(errors, value)
+        digits = self.experiments[k].measured[:, AT['encoder']] if self._digit else None
+        return readings_of(self._tests[k], out, errors, digits)
 
 
 def _in_common(sheets: Iterable[TestSheet]) -> TestSheet:
@@ -359,12 +322,3 @@ def _in_common(sheets: Iterable[TestSheet]) -> TestSheet:
     bias = next((sheet.bias for sheet in (first, *others)
                  if isinstance(sheet.bias, CircuitBias)), first.bias)
     return replace(first, waveform=None, bias=bias, start='rest')
-
-
-def _coarser_digit(tests: Sequence[FieldTest]) -> float:
-    """Return the encoder's digit if it is coarser than its sheet says, else 0 [rad]."""
-    digits = [digit_of(test.measured[:, ENCODER]) for test in tests]
-    known = max(test.sensors.encoder_step for test in tests)
-    seen = [digit for digit in digits if digit > 0.0]
-    digit = min(seen, default=0.0)
-    return digit if len(seen) == len(tests) and digit > COARSER * known else 0.0

@@ -15,9 +15,9 @@ from functools import cache
 from typing import Any
 
 from antenna_drive.diagnosis.excitation import Bias
-from antenna_drive.diagnosis.field_test import CHANNELS
 from antenna_drive.diagnosis.wave_shape import WaveShape
 from antenna_drive.parameters.records import place_of
+from antenna_drive.readings import AT, READINGS
 import numpy as np
 from simgap.machine.contract import FloatArray, Parameter
 
@@ -80,7 +80,9 @@ class SensorReadings:
 
     Attributes
     ----------
-    gain, zero, late : of every channel; the last is by how much earlier it is read [s]; shape (6,)
+    gain, zero, delay : of every reading; the last is by how much earlier it is read than its time
+        stamps say [s]; shape (c,)
+    clock : by how much later all readings are taken [s]
     clock_rate : share by which the recorder's clock is slow
     digit : of the encoder [rad]; 0 for none
     turn : share of a digit by which the encoder's rounding is off its middle
@@ -88,13 +90,19 @@ class SensorReadings:
 
     """
 
-    gain: FloatArray = field(default_factory=lambda: np.ones(len(CHANNELS)))
-    zero: FloatArray = field(default_factory=lambda: np.zeros(len(CHANNELS)))
-    late: FloatArray = field(default_factory=lambda: np.zeros(len(CHANNELS)))
+    gain: FloatArray = field(default_factory=lambda: np.ones(len(READINGS)))
+    zero: FloatArray = field(default_factory=lambda: np.zeros(len(READINGS)))
+    delay: FloatArray = field(default_factory=lambda: np.zeros(len(READINGS)))
+    clock: float = 0.0
     clock_rate: float = 0.0
     digit: float = 0.0
     turn: float = 0.0
     waves: dict[WaveShape, list[float]] = field(default_factory=dict)
+
+    @property
+    def late(self) -> FloatArray:
+        """Return by how much earlier each reading is taken in all [s], shape (c,)."""
+        return self.delay - self.clock
 
 
 class Modifier(ABC):
@@ -171,94 +179,50 @@ class SupplyGain(RunModifier):
 
 
 @dataclass(frozen=True)
-class ReadingGain(ReadingModifier):
-    """Scales the reading of a channel."""
+class RecorderError(ReadingModifier):
+    """Adds to gain, zero or delay of a reading, or to the recorder's clock or clock_rate."""
 
-    channel: int
+    kind: str
+    reading: str = ''
     fields: tuple[str, ...] = ()
 
+    @property
+    def name(self) -> str:
+        """Return its name in a verdict."""
+        return f'{self.kind}:{self.reading}' if self.reading else self.kind
+
     def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.gain[self.channel] += value
+        if self.reading:
+            getattr(readings, self.kind)[AT[self.reading]] += value
+        else:
+            setattr(readings, self.kind, getattr(readings, self.kind) + value)
 
 
 @dataclass(frozen=True)
-class ReadingZero(ReadingModifier):
-    """Shifts the reading of a channel."""
-
-    channel: int
-    fields: tuple[str, ...] = ()
-
-    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.zero[self.channel] += value
-
-
-@dataclass(frozen=True)
-class ClockShift(ReadingModifier):
-    """Reads every channel later."""
-
-    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.late -= value
-
-
-@dataclass(frozen=True)
-class ChannelDelay(ReadingModifier):
-    """Reads one channel earlier than its time stamps say."""
-
-    channel: int
-
-    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.late[self.channel] += value
-
-
-@dataclass(frozen=True)
-class ClockRate(ReadingModifier):
-    """Lets the recorder's clock run slow by a share of the time."""
-
-    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.clock_rate += value
-
-
-@dataclass(frozen=True)
-class UnrecordedJump(RunModifier):
+class Unrecorded(RunModifier):
     """
-    Lets a jump of the command come later.
+    What a recorded command does not show: `late_jumps` or `hole_means` of a `RunSetup`.
 
     Between the samples of a recorded command nobody knows when it jumped.
     """
 
+    what: str
     number: int
 
     def apply(self, run: RunSetup, value: float) -> None:
-        run.late_jumps[self.number] = value
+        getattr(run, self.what)[self.number] = value
 
 
 @dataclass(frozen=True)
-class UnrecordedMean(RunModifier):
-    """Lets the command have another mean in a hole of the recording."""
+class Rounding(ReadingModifier):
+    """Sets the `digit` of the encoder, or the `turn` by which its rounding is off."""
 
-    number: int
-
-    def apply(self, run: RunSetup, value: float) -> None:
-        run.hole_means[self.number] = value
-
-
-@dataclass(frozen=True)
-class Digit(ReadingModifier):
-    """Rounds the encoder's reading to a digit."""
-
-    fields = ('plant.encoder.step',)
+    what: str
+    fields: tuple[str, ...] = ()
     how = SET
 
     def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.digit = value
-
-
-@dataclass(frozen=True)
-class DigitTurn(ReadingModifier):
-    """Shifts where the encoder rounds, by a share of its digit."""
-
-    def apply_to_readings(self, readings: SensorReadings, value: float) -> None:
-        readings.turn = value
+        setattr(readings, self.what, value)
 
 
 @dataclass(frozen=True)

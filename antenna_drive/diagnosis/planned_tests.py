@@ -8,9 +8,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from antenna_drive.diagnosis.excitation import SheetCommand
-from antenna_drive.diagnosis.field_recording import CHANNELS, PLANNED
+from antenna_drive.diagnosis.field_recording import PLANNED
 from antenna_drive.diagnosis.machine import AntennaMachine
 from antenna_drive.parameters.sets import Drive
+from antenna_drive.readings import RATE_COMMAND, SIGNALS
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import CircuitBias, parse_sheet, Square, TestSheet
 import numpy as np
@@ -39,8 +40,7 @@ def planned(sheet: TestSheet, duration: float, rate: float) -> Recording:
     """Return a planned test as a recording: its command, and readings of zero."""
     time = np.arange(int(duration * rate) + 1) / rate
     command = SheetCommand(sheet.waveform or Square(0.05, 6.3, 0.25))
-    signals = {'test_signal/rate_command': command(time)}
-    signals.update({name: np.zeros(time.size) for name in CHANNELS})
+    signals = {RATE_COMMAND: command(time), **{name: np.zeros(time.size) for name in SIGNALS}}
     return Recording.from_arrays(time, signals, sheet=sheet, notes={PLANNED: True})
 
 

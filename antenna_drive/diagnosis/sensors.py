@@ -4,11 +4,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-import math
 
 from antenna_drive.diagnosis.excitation import CommandedRate
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
+from antenna_drive.readings import Errors, Reading, READINGS, SENSORS
 from antenna_drive.recording import sheet as sheets
 import numpy as np
 from simgap.machine.contract import FloatArray
@@ -21,52 +22,40 @@ _WHOLE = 0.05
 
 @dataclass(frozen=True)
 class SensorModel:
-    """Standard deviations and resolutions; typical ones where the sheet gives none."""
+    """The sensors of a test: `known` holds the numbers of its sheet, or usual ones, by key."""
 
-    current_noise: float = 0.01
-    current_step: float = 0.01
-    tach_noise: float = 0.0035
-    tach_relative: float = 0.0015
-    tach_step: float = 0.002
-    encoder_step: float = 2.0 * math.pi / 2 ** 21
-    bias_noise: float = 0.01
-    bias_step: float = 0.01
+    known: Mapping[str, float]
 
     @classmethod
     def of(cls, given: sheets.Sensors | None) -> SensorModel:
         """Take the values of the sheet."""
-        if given is None:
-            return cls()
-        known = {'current_noise': given.current_noise_A, 'current_step': given.current_step_A,
-                 'tach_noise': given.tach_noise_rad_s, 'tach_relative': given.tach_noise_relative,
-                 'tach_step': given.tach_step_rad_s, 'bias_noise': given.bias_noise_V,
-                 'bias_step': given.bias_step_V}
-        if given.encoder_bits is not None:
-            known['encoder_step'] = 2.0 * math.pi / 2 ** given.encoder_bits
-        return cls(**{name: value for name, value in known.items() if value is not None})
+        known = {}
+        for number in (number for sensor in SENSORS for number in sensor.numbers):
+            value = getattr(given, number.key, None)
+            known[number.key] = number.usual if value is None else value
+        return cls(known)
+
+    def errors(self, reading: Reading, true: FloatArray | float = 0.0) -> Errors:
+        """Return what the sensor of a reading does to true values."""
+        return reading.sensor.errors(
+            true, *(self.known[number.key] for number in reading.sensor.numbers))
 
     def noise(self, clean: FloatArray, slope: FloatArray, jitter: float) -> FloatArray:
-        """Return the standard deviation of each reading; arrays of shape (n, 6)."""
+        """Return the standard deviation of each reading; arrays of shape (n, c)."""
         noise = np.empty_like(clean)
-        noise[:, :2] = math.hypot(self.current_noise, self.current_step / math.sqrt(12.0))
-        noise[:, 2:4] = np.sqrt(self.tach_noise ** 2 + self.tach_step ** 2 / 12.0
-                                + (self.tach_relative * clean[:, 2:4]) ** 2)
-        noise[:, 4] = 0.5 * self.encoder_step  # within a digit the residual is not white
-        noise[:, 5] = math.hypot(self.bias_noise, self.bias_step / math.sqrt(12.0))
+        for c, reading in enumerate(READINGS):
+            noise[:, c] = self.errors(reading, clean[:, c]).deviation
         return np.asarray(np.sqrt(noise ** 2 + (slope * jitter) ** 2))
 
     def read(self, clean: FloatArray, random: np.random.Generator) -> FloatArray:
-        """Return what the sensors would read of true signals, shape (n, 6)."""
-        levels = np.empty_like(clean)
-        levels[:, :2] = self.current_noise
-        levels[:, 2:4] = np.hypot(self.tach_noise, self.tach_relative * clean[:, 2:4])
-        levels[:, 4] = 0.0
-        levels[:, 5] = self.bias_noise
-        digits = np.array([self.current_step, self.current_step, self.tach_step, self.tach_step,
-                           self.encoder_step, self.bias_step])
-        noisy = clean + levels * random.normal(size=clean.shape)
-        rounded = digits * np.round(noisy / np.where(digits > 0.0, digits, 1.0))
-        return np.asarray(np.where(digits > 0.0, rounded, noisy))
+        """Return what the sensors would read of true signals, shape (n, c)."""
+        found, noise = clean.copy(), random.normal(size=clean.shape)
+        for c, reading in enumerate(READINGS):
+            errors = self.errors(reading, clean[:, c])
+            found[:, c] += errors.scatter * noise[:, c]
+            if errors.digit > 0.0:
+                found[:, c] = errors.digit * np.round(found[:, c] / errors.digit)
+        return found
 
 
 def jitter_of(command: CommandedRate, time: FloatArray, values: FloatArray) -> float:

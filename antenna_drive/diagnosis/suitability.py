@@ -8,6 +8,7 @@ import math
 
 from antenna_drive.diagnosis.field_recording import FieldRecording, Note
 from antenna_drive.parameters.sets import Drive
+from antenna_drive.readings import NAMED, of, RATE_COMMAND_COLUMN, TACHOMETER
 import numpy as np
 from simgap.errors import UserError
 from simgap.machine.contract import FloatArray
@@ -27,8 +28,10 @@ _BEYOND_CURRENT, _BEYOND_BIAS = 2.0, 3.0
 _USUAL = ((180.0 / math.pi, 'degrees for radians'), (math.pi / 180.0, 'radians for degrees'),
           (1e3, 'thousandths for units'), (1e-3, 'units for thousandths'))
 _NEAR = 0.2
-_COLUMN = {'command': 'rate_command_rad_s', 'tachometers': 'tach_rate_1_rad_s, tach_rate_2_rad_s',
-           'encoder': 'encoder_rad'}
+_COLUMN = {'command': RATE_COMMAND_COLUMN,
+           'tachometers': ', '.join(reading.column for reading in of(TACHOMETER)),
+           'encoder': NAMED['encoder'].column}
+_AMPERES = 'give article amperes, one of which is about six real ones'
 
 
 def check(recording: FieldRecording, drive: Drive, note: Note) -> None:
@@ -70,18 +73,15 @@ def check(recording: FieldRecording, drive: Drive, note: Note) -> None:
 
 def _check_sizes(recording: FieldRecording, drive: Drive) -> None:
     share = drive.torque_share.circuit
-    for name, column, limit, beyond, remedy in (
-            ('motor_1/ammeter', 'current_1_A', drive.motor_1.motor.current_limit,
-             _BEYOND_CURRENT, 'give article amperes, one of which is about six real ones'),
-            ('motor_2/ammeter', 'current_2_A', drive.motor_2.motor.current_limit,
-             _BEYOND_CURRENT, 'give article amperes, one of which is about six real ones'),
-            ('torque_share/bias_voltage', 'bias_voltage_V', share.saturation_high,
-             _BEYOND_BIAS, 'give volts')):
+    for name, limit, beyond, remedy in (
+            ('current_1', drive.motor_1.motor.current_limit, _BEYOND_CURRENT, _AMPERES),
+            ('current_2', drive.motor_2.motor.current_limit, _BEYOND_CURRENT, _AMPERES),
+            ('bias_voltage', share.saturation_high, _BEYOND_BIAS, 'give volts')):
         if name in recording.readings:
             reached = float(np.quantile(np.abs(recording.readings[name].values), 0.99))
             if reached > beyond * limit:
-                raise UserError(f'{recording.name}: {column} reaches {reached:.4g}, the limit of '
-                                f'this drive is {limit:.4g}: {remedy}')
+                raise UserError(f'{recording.name}: {NAMED[name].column} reaches {reached:.4g}, '
+                                f'the limit of this drive is {limit:.4g}: {remedy}')
 
 
 def _rates(recording: FieldRecording, drive: Drive) -> dict[str, FloatArray]:
@@ -90,12 +90,11 @@ def _rates(recording: FieldRecording, drive: Drive) -> dict[str, FloatArray]:
     found = {'command': _means(recording.rates.time_s, recording.rates.values, edges)}
     tachometers = [
         _means(channel.time_s, channel.values, edges) / ratio for name, ratio in (
-            ('motor_1/tach_rate', drive.motor_1.gear_ratio),
-            ('motor_2/tach_rate', drive.motor_2.gear_ratio))
+            ('tach_1', drive.motor_1.gear_ratio), ('tach_2', drive.motor_2.gear_ratio))
         if (channel := recording.readings.get(name)) is not None]
     if tachometers:
         found['tachometers'] = np.mean(tachometers, axis=0)
-    encoder = recording.readings.get('plant/encoder')
+    encoder = recording.readings.get('encoder')
     if encoder is not None:
         found['encoder'] = np.diff(np.interp(edges, encoder.time_s, encoder.values)) / _MEAN_S
     return found

@@ -8,15 +8,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
 import math
 
-from antenna_drive.diagnosis.field_test import (
-    BIAS, CURRENT_1, CURRENT_2, ENCODER, FieldTest, TACH_1, TACH_2,
-)
+from antenna_drive.diagnosis.field_test import FieldTest
 from antenna_drive.diagnosis.modifiers import (
-    add, AntennaParameter, ChannelDelay, ClockRate, ClockShift, Modifier, ReadingGain, ReadingZero,
-    scale, SupplyGain, UnrecordedJump, UnrecordedMean,
+    add, AntennaParameter, Modifier, RecorderError, scale, SupplyGain, Unrecorded,
 )
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
-from antenna_drive.recording.sheet import Tolerances
+from antenna_drive.readings import Reading, READINGS
+from antenna_drive.recording.sheet import Tolerances, USUAL
 
 # The numbers that the configuration knows only within the tolerance of the test sheet.
 TOLERANT_MOTOR = (
@@ -39,18 +37,8 @@ TOLERANT_DRIVE = (
         'mode_inertias', 'mode_frequencies', 'mode_damping_ratios') for j in range(3)),
 )
 
-
-# What instruments of the kind have when somebody looks after them: tachometers and servo
-# amplifiers of a drive, transducers and the logger of a test.
-USUAL = Tolerances(tach_zero_rad_s=0.01, amplifier_zero_V=1e-3, recorder_gain=0.01,
-                   current_zero_A=0.02, bias_zero_V=0.03, channel_delay_samples=1.0,
-                   clock_ppm=100.0)
 # A jump of the command is felt for about this time [s].
 _FELT_S = 5.0
-# The recorded channels with the number of the configuration that is their recorder's gain.
-_RECORDED = (('current_1', 'motor_1.ammeter.gain'), ('current_2', 'motor_2.ammeter.gain'),
-             ('tach_1', ''), ('tach_2', ''), ('encoder', ''),
-             ('bias_voltage', 'torque_share.circuit.voltmeter_gain'))
 
 
 def nuisances(tests: Sequence[FieldTest], tolerance: float) -> tuple[AntennaParameter, ...]:
@@ -116,13 +104,15 @@ def _of_zeros_and_recorders(tests: Sequence[FieldTest]) -> Iterator[AntennaParam
                 (given.amplifier_zero_V, 'V', f'{motor}.amplifier.offset')):
             if size:
                 yield _within(f'offset:{path}', unit, size, add(path))
-    for channel, (name, field) in enumerate(_RECORDED):
-        if given.recorder_gain and channel != ENCODER:
+    for reading in READINGS:
+        name = reading.name
+        if given.recorder_gain and not reading.sensor.is_counter:
             yield _within(f'gain:{name}', '1', given.recorder_gain,
-                          ReadingGain(channel, (field,) if field else ()))
+                          RecorderError('gain', name, (reading.gain,) if reading.gain else ()))
         if given.channel_delay_samples:
             seconds = given.channel_delay_samples * period
-            yield replace(_within(f'delay:{name}', 's', seconds, ChannelDelay(channel)), low=0.0)
+            yield replace(_within(f'delay:{name}', 's', seconds, RecorderError('delay', name)),
+                          low=0.0)
 
 
 def starting_places(k: int, test: FieldTest) -> tuple[AntennaParameter, ...]:
@@ -137,7 +127,7 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
     if test.record['torque_share']['circuit']['bias_source'][0] == 1:
         yield _within(f'supply:{test.name}', '1', tolerance, SupplyGain(), k)
     yield AntennaParameter(f'clock:{test.name}', 's', -0.01, 0.01, 1e-4, 1e-3, experiment=k,
-                           modifier=ClockShift())
+                           modifier=RecorderError('clock'))
 
     if isinstance(test.command, RecordedCommand):
         command = test.command
@@ -148,30 +138,31 @@ def _of_a_test(k: int, test: FieldTest, tolerance: float) -> Iterator[AntennaPar
             name = f'jump:{test.name}:{begin:.3f}'
             earlier, later = command.slack[i].tolist()
             half = 0.5 * (later - earlier)
-            yield replace(_within(name, 's', half, UnrecordedJump(i), k), low=earlier, high=later)
+            yield replace(_within(name, 's', half, Unrecorded('late_jumps', i), k), low=earlier,
+                          high=later)
 
         for i, (begin, _) in enumerate(command.holes):
             yield _within(f'hole:{test.name}:{begin:.3f}', 'rad/s',
-                          2.0 * float(command.uncertainty[i]), UnrecordedMean(i), k)
+                          2.0 * float(command.uncertainty[i]), Unrecorded('hole_means', i), k)
 
     given = allowed([test])
     if given.clock_ppm:
-        yield _within(f'clock_rate:{test.name}', '1', 1e-6 * given.clock_ppm, ClockRate(), k)
+        yield _within(f'clock_rate:{test.name}', '1', 1e-6 * given.clock_ppm,
+                      RecorderError('clock_rate'), k)
 
-    def zero(channel: int, name: str, unit: str, half_width: float, step: float,
-             sigma: float) -> AntennaParameter:
-        return AntennaParameter(f'zero:{name}:{test.name}', unit, -half_width, half_width, step,
-                                sigma, experiment=k, modifier=ReadingZero(channel))
+    def zero(reading: Reading, half_width: float, step: float, sigma: float) -> AntennaParameter:
+        return AntennaParameter(
+            f'zero:{reading.name}:{test.name}', reading.unit, -half_width, half_width, step, sigma,
+            experiment=k, modifier=RecorderError('zero', reading.name))
 
     # an encoder counts on from an angle that is not known where the start is not
     wide = 1.0 if test.known_start else 50.0
-    yield zero(ENCODER, 'encoder', 'rad', 4e-5 * wide, 2e-6, 1e-5 * wide)
-    sensors = test.sensors
-    for channel, name, unit, size in (
-            (CURRENT_1, 'current_1', 'A', given.current_zero_A),
-            (CURRENT_2, 'current_2', 'A', given.current_zero_A),
-            (TACH_1, 'tach_1', 'rad/s', 2.0 * sensors.tach_noise),
-            (TACH_2, 'tach_2', 'rad/s', 2.0 * sensors.tach_noise),
-            (BIAS, 'bias_voltage', 'V', given.bias_zero_V)):
+    for reading in READINGS:
+        if reading.sensor.is_counter:
+            yield zero(reading, 4e-5 * wide, 2e-6, 1e-5 * wide)
+    for reading in READINGS:
+        allowance = reading.sensor.zero
+        size = (getattr(given, allowance.key) if allowance
+                else 2.0 * float(test.sensors.errors(reading).scatter))
         if size:
-            yield zero(channel, name, unit, size, 0.3 * size, size / math.sqrt(3.0))
+            yield zero(reading, size, 0.3 * size, size / math.sqrt(3.0))

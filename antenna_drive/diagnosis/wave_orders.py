@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from antenna_drive.diagnosis.field_test import CURRENT_1, CURRENT_2, ENCODER, TACH_1
 from antenna_drive.diagnosis.waves import Wave
+from antenna_drive.readings import AT
 import numpy as np
 from scipy.ndimage import median_filter
 from simgap.machine.contract import Experiment, FloatArray
@@ -65,19 +65,19 @@ def _scores(form: Wave, experiment: Experiment, residual: FloatArray,
     time = experiment.time
     score = np.zeros(orders.size)
     if form.shape.angle == 'axis':
-        angle = np.nan_to_num(experiment.measured[:, ENCODER])
+        angle = np.nan_to_num(experiment.measured[:, AT['encoder']])
         if form.shape.stem == 'cyclic_error':
-            return _power(clean[:, ENCODER], angle, orders)
+            return _power(clean[:, AT['encoder']], angle, orders)
         rate = np.gradient(angle, time)
         moving = np.abs(rate) > 0.1 * np.abs(rate).max()
-        return _power((clean[:, CURRENT_1] + clean[:, CURRENT_2]) * np.sign(rate) * moving,
-                      angle, orders)
+        load = clean[:, AT['current_1']] + clean[:, AT['current_2']]
+        return _power(load * np.sign(rate) * moving, angle, orders)
     windows = (time / _WINDOW_S).astype(int)
     for path in form.shape.paths:
-        m = int(path.partition('.')[0][-1]) - 1
-        rate = np.nan_to_num(experiment.measured[:, TACH_1 + m])
+        m = path.partition('.')[0][-1]
+        rate = np.nan_to_num(experiment.measured[:, AT[f'tach_{m}']])
         angle = np.r_[0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time))]
-        for channel in (CURRENT_1 + m, TACH_1 + m):
+        for channel in (AT[f'current_{m}'], AT[f'tach_{m}']):
             for w in range(windows[-1] + 1):
                 inside = windows == w
                 if np.count_nonzero(inside) >= 10:

@@ -23,6 +23,7 @@ from antenna_drive.diagnosis.sensors import SensorModel
 from antenna_drive.emulator import batch
 from antenna_drive.parameters.records import place_of, record_of
 from antenna_drive.parameters.sets import Drive
+from antenna_drive.readings import READINGS
 import numpy as np
 
 Record = np.ndarray[Any, np.dtype[Any]]
@@ -55,6 +56,8 @@ _UNKNOWN_COST, _COST_PER_S = 0.5, 0.015
 _STEP_S, _SAMPLE_S = 5.3e-3, 0.04
 # Responses beyond this many standard deviations tell no more.
 _MOST = 30.0
+# The reading of a counter is an integral: its response shows in the tachometers.
+_COMPARED = [not reading.sensor.is_counter for reading in READINGS]
 # Effects that a window should tell, at sizes that matter to a crew: numbers of the configuration
 # and the factors to their values.
 _EFFECTS = (
@@ -158,8 +161,7 @@ class _Telling:
         for effect in _EFFECTS:
             moved = batch.run(_scaled(record_of(drive), effect), plan)
             response = (moved[:, :, 0] - plain[:, :, 0]) / noise
-            # the encoder's reading is an integral: its response shows in the tachometers
-            response = np.clip(np.delete(response, 4, axis=1), -_MOST, _MOST)
+            response = np.clip(np.compress(_COMPARED, response, axis=1), -_MOST, _MOST)
             energy.append(np.sum(np.nan_to_num(response) ** 2, axis=1))
         self._until = np.vstack([np.zeros(len(_EFFECTS)), np.cumsum(np.array(energy).T, axis=0)])
 

@@ -21,13 +21,9 @@ from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.emulator.wiring import DRIVE, Wiring
 from antenna_drive.physics.compiling import generated
 from antenna_drive.physics.integrator import located_runge_kutta, work_space
+from antenna_drive.readings import SIGNALS
 import numpy as np
 from numpy.typing import NDArray
-
-CHANNELS = (
-    'motor_1/ammeter', 'motor_2/ammeter', 'motor_1/tach_rate', 'motor_2/tach_rate',
-    'plant/encoder', 'torque_share/bias_voltage',
-)
 
 # Columns of the table of steps.
 LENGTH, COMMAND, SLOPE, CURVE, TORQUE, TORQUE_SLOPE, FIXED_BIAS, CHANGE = range(8)
@@ -127,7 +123,7 @@ class Schedule:
 
 
 def run(record: np.ndarray[Any, np.dtype[Any]], schedule: Schedule, wiring: Wiring = DRIVE,
-        channels: tuple[str, ...] = CHANNELS) -> FloatArray:
+        channels: tuple[str, ...] = SIGNALS) -> FloatArray:
     """
     Run one variant of the drive through a test.
 
@@ -140,7 +136,7 @@ def run(record: np.ndarray[Any, np.dtype[Any]], schedule: Schedule, wiring: Wiri
     wiring
         which units there are and what feeds them
     channels
-        the outputs to be read, and states of units
+        the outputs to be read, and states of units; by default the readings of a field test
 
     Returns
     -------

@@ -10,9 +10,10 @@ import time
 
 from antenna_drive.lockstep.entry import ros_node, stopped_by_signals
 from antenna_drive.lockstep.ros_parameters import Overrides
+from antenna_drive.readings import RATE_COMMAND
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.recording import Recording
-from antenna_drive.twin.intake import COMMAND, known
+from antenna_drive.twin.intake import known
 import numpy as np
 from rclpy.duration import Duration
 from rclpy.node import Node
@@ -63,7 +64,7 @@ def run(path: str, arguments: Sequence[str]) -> int:
 
 def _play(node: Node, recording: Recording, real: str, pace: float, stop: Event) -> None:
     names = [name for name in recording.channels if known(name)]
-    names.sort(key=lambda name: name != COMMAND)
+    names.sort(key=lambda name: name != RATE_COMMAND)
     single = [node.create_publisher(Float64, f'{real}/{name}', _QOS) for name in names]
     rows = node.create_publisher(Float64MultiArray, f'{real}/row', _QOS)
     node.get_logger().info(f'{real}/row: time, ' + ', '.join(names))

@@ -16,7 +16,6 @@ import time
 from typing import Any
 
 from antenna_drive.diagnosis.tuned import loaded, tuned
-from antenna_drive.emulator.batch import CHANNELS
 from antenna_drive.lockstep.diagnostics import diagnostics
 from antenna_drive.lockstep.entry import ros_node, stopped_by_signals
 from antenna_drive.lockstep.getting_ready import told_while_compiling
@@ -24,11 +23,11 @@ from antenna_drive.lockstep.ros_parameters import Overrides
 from antenna_drive.lockstep.run_services import STATE_QOS
 from antenna_drive.lockstep.serving import Serving
 from antenna_drive.parameters.loading import load
+from antenna_drive.readings import RATE_COMMAND, SIGNALS
 from antenna_drive.recording.sheet import load_sheet, TestSheet
 from antenna_drive.twin import watch
 from antenna_drive.twin.baseline import Baseline
 from antenna_drive.twin.growing import GrowingVerdict
-from antenna_drive.twin.intake import COMMAND
 from antenna_drive.twin.proposing import NextTest
 from antenna_drive.twin.regular_stamps import RegularSamples
 from antenna_drive.twin.topics import load_topics, own_topics, Topic, TopicMap
@@ -150,11 +149,11 @@ class _TwinNode:
             self._node.create_subscription(
                 Float64MultiArray if topic.vector else Float64, topic.name,
                 self._listener(topic), _FROM_REAL)
-        names = {signal for topic in topics.topics for signal in topic.signals} - {COMMAND}
+        names = {signal for topic in topics.topics for signal in topic.signals} - {RATE_COMMAND}
         self._publishers = {
             signal: [self._node.create_publisher(Float64, f'{name}/{middle}{signal}', _OUT)
                      for middle in ('', 'residual/')]
-            for signal in CHANNELS if signal in names}
+            for signal in SIGNALS if signal in names}
         self._diagnostics = self._node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._verdict = self._node.create_publisher(String, f'{name}/verdict', STATE_QOS)
         self._next_test = self._node.create_publisher(String, f'{name}/next_test', STATE_QOS)
@@ -247,7 +246,7 @@ class _TwinNode:
         if not self._tests.empty():
             self._tests.get()
             growing.complete(intake.recording(sheet, self._since))
-            self._since = intake.newest().get(COMMAND)
+            self._since = intake.newest().get(RATE_COMMAND)
         if growing.take():
             said = growing.message()
             self._verdict.publish(String(data=json.dumps(said)))
@@ -322,7 +321,7 @@ def _told(twin: Twin) -> tuple[str, list[tuple[str, str]]]:
                 if gaps else 'gap, closing'), values
     return {
         watch.OK: 'ok: the drive and its twin agree',
-        watch.WAITING: f'waiting for {COMMAND}',
+        watch.WAITING: f'waiting for {RATE_COMMAND}',
         watch.SETTLING: 'settling: an unknown start is being forgotten',
         watch.LEARNING: 'learning the quiet record: the drive has to be healthy',
         watch.STALE: 'stale input: the drive sends nothing; going on when it does',

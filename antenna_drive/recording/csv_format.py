@@ -22,6 +22,7 @@ import re
 from typing import Any, IO
 import warnings
 
+from antenna_drive.readings import FIELD_COLUMNS, RATE_COMMAND, RATE_COMMAND_COLUMN
 from antenna_drive.recording.atomic import new_file, refuse_existing
 from antenna_drive.recording.recording import Change, Recording, unit_of
 from antenna_drive.recording.sheet import dump_sheet, load_sheet, TestSheet
@@ -39,18 +40,6 @@ from simgap.logs.text import (
 )
 
 TIME = 'time_s'
-RATE_COMMAND = 'rate_command_rad_s'
-# The columns of a field test, and the signals that they are: the readings of the sensors.
-FIELD_COLUMNS = {
-    RATE_COMMAND: 'test_signal/rate_command',
-    'current_1_A': 'motor_1/ammeter',
-    'current_2_A': 'motor_2/ammeter',
-    'tach_rate_1_rad_s': 'motor_1/tach_rate',
-    'tach_rate_2_rad_s': 'motor_2/tach_rate',
-    'encoder_rad': 'plant/encoder',
-    'bias_voltage_V': 'torque_share/bias_voltage',
-}
-
 _OWN_COLUMN = re.compile(r'(\S+) \[([^\[\]]*)\]', re.ASCII)
 _BLOCK = 65536  # rows written at a time
 
@@ -83,15 +72,15 @@ def read_csv(path: str | Path) -> Recording:
     with open_text(path) as stream:
         table = rows(path, stream)
         line, header = next(table, (1, []))
-        names = _header(path, line, header)
-        columns = [(array('q'), array('d')) for _ in names]
+        units = _header(path, line, header)
+        columns = [(array('q'), array('d')) for _ in units]
         room = SAMPLES.value()
-        time_column = names.index(TIME)
+        time_column = list(units).index(TIME)
         previous, count, in_order = -2**63, 0, True
         for line, row in table:
-            if len(row) != len(names):
+            if len(row) != len(units):
                 raise RecordingError(f'{path}: line {line}: {len(row)} cells, but the header has '
-                                     f'{len(names)}')
+                                     f'{len(units)}')
             cell = Cell(path, line, TIME)
             stamp = parse_nanoseconds(row[time_column].strip(), cell)
             in_order &= stamp > previous
@@ -109,11 +98,9 @@ def read_csv(path: str | Path) -> Recording:
                                  for stamps, values in columns)
     if not in_order:
         ordered = sorted_rows(path, TIME, *_times_and_lines(path, time_column), ordered)
-    channels = {}
-    for i, (name, (stamps_ns, numbers)) in enumerate(zip(names, ordered, strict=True)):
-        if i != time_column:
-            unit = unit_of(name) if header[i].strip() in FIELD_COLUMNS else _unit(header[i])
-            channels[name] = make_channel(name, unit, stamps_ns, numbers)
+    channels = {name: make_channel(name, unit, stamps_ns, numbers)
+                for (name, unit), (stamps_ns, numbers) in zip(units.items(), ordered, strict=True)
+                if name != TIME}
     sheet_path = path.with_suffix('.yaml')
     sheet = load_sheet(sheet_path) if sheet_path.is_file() else TestSheet()
     return replace(_with_meta(path, Recording(channels), count), sheet=sheet)
@@ -131,8 +118,9 @@ def _times_and_lines(path: Path, time_column: int) -> tuple[IntArray, IntArray]:
     return stamps, lines
 
 
-def _header(path: Path, line: int, header: list[str]) -> list[str]:
-    names: list[str] = []
+def _header(path: Path, line: int, header: list[str]) -> dict[str, str]:
+    """Return the unit of each column, by the name of its signal."""
+    units: dict[str, str] = {}
     if len(header) > SIGNALS.value():
         raise RecordingError(f'{path}: line {line}: {SIGNALS.exceeded()}')
     for number, column in enumerate(header, 1):
@@ -140,11 +128,12 @@ def _header(path: Path, line: int, header: list[str]) -> list[str]:
         cell = Cell(path, line, str(number))
         own = _OWN_COLUMN.fullmatch(column)
         if column == TIME:
-            name = TIME
+            name, unit = TIME, 's'
         elif column in FIELD_COLUMNS:
             name = FIELD_COLUMNS[column]
+            unit = unit_of(name)
         elif own:
-            name = own.group(1)
+            name, unit = own.groups()
             try:
                 check_name(name)
             except RecordingError as error:
@@ -155,20 +144,15 @@ def _header(path: Path, line: int, header: list[str]) -> list[str]:
                 f'no such column {one_line(repr(column), 40)}{nearest(column, known)} Allowed are '
                 f"{', '.join(known)} and 'unit/signal [unit]'; antenna-drive import --map reads "
                 'other columns')
-        if name in names:
+        if name in units:
             raise cell.refuse(f'{one_line(column, 60)} is given twice')
-        names.append(name)
-    if TIME not in names:
+        units[name] = unit
+    if TIME not in units:
         raise RecordingError(f'{path}: line {line}: there is no column {TIME}')
     field = any(column.strip() in FIELD_COLUMNS for column in header)
-    if field and FIELD_COLUMNS[RATE_COMMAND] not in names:
-        raise RecordingError(f'{path}: line {line}: there is no column {RATE_COMMAND}')
-    return names
-
-
-def _unit(column: str) -> str:
-    own = _OWN_COLUMN.fullmatch(column.strip())
-    return own.group(2) if own else ''
+    if field and RATE_COMMAND not in units:
+        raise RecordingError(f'{path}: line {line}: there is no column {RATE_COMMAND_COLUMN}')
+    return units
 
 
 def meta_path(path: Path) -> Path:
@@ -250,9 +234,9 @@ def write_csv(recording: Recording, path: str | Path, *, field: bool = False,
     if field:
         chosen = {column: name for column, name in FIELD_COLUMNS.items()
                   if name in recording and (names is None or name in names)}
-        if RATE_COMMAND not in chosen:
-            raise RecordingError(f'{FIELD_COLUMNS[RATE_COMMAND]}: no such signal in this '
-                                 'recording; a field test needs it')
+        if RATE_COMMAND_COLUMN not in chosen:
+            raise RecordingError(f'{RATE_COMMAND}: no such signal in this recording; a field test '
+                                 'needs it')
     else:
         chosen = {f'{name} [{recording[name].unit}]': name
                   for name in (recording.names if names is None else names)}

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from antenna_drive.readings import NAMED
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import Sensors
 import numpy as np
@@ -107,7 +108,7 @@ def statistics(recording: Recording) -> Statistics:
     """Return the figures of a recording."""
     sensors = recording.sheet.sensors or Sensors()
     bias = None
-    channel = _channel(recording, 'torque_share/bias_voltage')
+    channel = _channel(recording, NAMED['bias_voltage'].signal)
     if channel:
         zero = _limit(sensors.bias_noise_V, sensors.bias_step_V)
         bias = BiasStatistics(float(channel.values.min()), float(channel.values.max()),
@@ -116,14 +117,14 @@ def statistics(recording: Recording) -> Statistics:
     axis = _channel(recording, 'plant/axis_rate')
     return Statistics(
         recording.start_ns / NANOSECONDS, recording.end_ns / NANOSECONDS, bias,
-        {motor: _motor(recording, motor, still) for motor in MOTORS},
+        {motor: _motor(recording, motor, m, still) for m, motor in enumerate(MOTORS, 1)},
         share_of_time(axis, axis.values == 0.0) if axis else None)
 
 
-def _motor(recording: Recording, motor: str, still: float) -> MotorStatistics:
+def _motor(recording: Recording, motor: str, m: int, still: float) -> MotorStatistics:
     figures: dict[str, Any] = {}
-    current = (_channel(recording, f'{motor}/current')
-               or _channel(recording, f'{motor}/ammeter'))
+    ammeter = NAMED[f'current_{m}']
+    current = _channel(recording, ammeter.instead) or _channel(recording, ammeter.signal)
     if current:
         peak = int(np.argmax(np.abs(current.values)))
         width = np.append(np.diff(current.time_ns), 0.0) if len(current) > 1 else np.ones(1)
@@ -131,7 +132,7 @@ def _motor(recording: Recording, motor: str, still: float) -> MotorStatistics:
             current_peak_A=float(current.values[peak]),
             current_peak_s=int(current.time_ns[peak]) / NANOSECONDS,
             current_rms_A=float(np.sqrt((width * current.values**2).sum() / width.sum())))
-    rate = _channel(recording, f'{motor}/tach_rate')
+    rate = _channel(recording, NAMED[f'tach_{m}'].signal)
     if rate:
         figures.update(stick=share_of_time(rate, np.abs(rate.values) <= still), still_rad_s=still)
     torque = _channel(recording, f'{motor}/gear_torque')

@@ -7,7 +7,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from antenna_drive.emulator.wiring import signal_names
-from antenna_drive.recording.csv_format import FIELD_COLUMNS
+from antenna_drive.readings import FIELD_COLUMNS
 from antenna_drive.recording.recording import Recording, unit_of
 from antenna_drive.recording.sheet import load_sheet, TestSheet
 from simgap.logs import column_map

@@ -13,6 +13,9 @@ from fnmatch import fnmatchcase
 import math
 from typing import NamedTuple
 
+from antenna_drive.readings import (
+    AMMETER, ENCODER, of, RATE_COMMAND, Sensor, TACHOMETER, VOLTMETER,
+)
 from antenna_drive.recording.recording import Recording
 from simgap.logs.channel import RecordingError
 
@@ -29,15 +32,18 @@ class Panel(NamedTuple):
     names: tuple[str, ...]
 
 
+def _read_by(sensor: Sensor) -> tuple[str, ...]:
+    return tuple(reading.signal for reading in of(sensor))
+
+
 PANELS = (
-    Panel('Axis rate', 'deg/s', _DEGREES, ('test_signal/rate_command', 'plant/axis_rate')),
+    Panel('Axis rate', 'deg/s', _DEGREES, (RATE_COMMAND, 'plant/axis_rate')),
     Panel('Motor current', _CURRENT, 1.0, ('motor_1/current', 'motor_2/current')),
-    Panel('Ammeter', _CURRENT, 1.0, ('motor_1/ammeter', 'motor_2/ammeter')),
-    Panel('Motor rate', 'deg/s', _DEGREES,
-          ('motor_1/tach_rate', 'motor_2/tach_rate', 'plant/pinion_rate')),
-    Panel('Torque bias', 'V', 1.0, ('torque_share/bias_voltage', 'torque_share/counter_torque')),
+    Panel('Ammeter', _CURRENT, 1.0, _read_by(AMMETER)),
+    Panel('Motor rate', 'deg/s', _DEGREES, (*_read_by(TACHOMETER), 'plant/pinion_rate')),
+    Panel('Torque bias', 'V', 1.0, (*_read_by(VOLTMETER), 'torque_share/counter_torque')),
     Panel('Gear torque', 'N m', 1.0, ('motor_1/gear_torque', 'motor_2/gear_torque')),
-    Panel('Axis angle', 'deg', _DEGREES, ('plant/encoder', 'plant/axis_angle')),
+    Panel('Axis angle', 'deg', _DEGREES, (*_read_by(ENCODER), 'plant/axis_angle')),
     Panel('Pointing error', 'mdeg', 1000.0 * _DEGREES,
           ('plant/pointing_error_elevation', 'plant/pointing_error_cross_elevation')),
     Panel('External torque', 'kN m', 1e-3, ('test_signal/external_torque',)),
@@ -102,11 +108,12 @@ def panels_of(recording: Recording, patterns: Sequence[str] | None = None) -> tu
 
 
 def _idle(recording: Recording, name: str) -> bool:
-    unit, _, signal = name.partition('/')
+    signal = name.partition('/')[2]
     if signal == 'external_torque':
         return not recording[name].values.any()
-    if signal == 'ammeter':
-        return recording.channels.get(f'{unit}/current') == recording[name]
+    for ammeter in of(AMMETER):
+        if name == ammeter.signal:
+            return recording.channels.get(ammeter.instead) == recording[name]
     return signal == 'missed_impulse'
 
 

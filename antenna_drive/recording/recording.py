@@ -173,35 +173,6 @@ class Recording:
             channels[name] = make_channel(name, unit, stamps, values)
         return cls(channels, **known)
 
-    @classmethod
-    def concatenate(cls, parts: Sequence[Recording], period_s: float) -> Recording:
-        """
-        Lay recordings one after the other, part i at i * period_s: the repeats of an excitation.
-
-        The first part's configuration, sheet and notes are kept; live changes are dropped,
-        because their steps would no longer count from the start.
-
-        Raises
-        ------
-        RecordingError : no part, or a part reaches outside [0, period_s)
-
-        """
-        if not parts:
-            raise RecordingError('nothing to concatenate')
-        period_ns = nanoseconds(period_s)
-        for i, part in enumerate(parts):
-            if any(len(c) and (c.time_ns[0] < 0 or c.time_ns[-1] >= period_ns)
-                   for c in part.channels.values()):
-                raise RecordingError(f'part {i} reaches outside its period of {period_s:g} s')
-        joined = {}
-        for name in parts[0].channels:
-            pieces = [(i, part[name]) for i, part in enumerate(parts)]
-            joined[name] = Channel(
-                pieces[0][1].unit,
-                np.concatenate([c.time_ns + i * period_ns for i, c in pieces]),
-                np.concatenate([c.values for _, c in pieces]))
-        return replace(parts[0], channels=joined, changes=())
-
     # -- looking at it ------------------------------------------------------------------------
 
     def __getitem__(self, name: str) -> Channel:
@@ -274,20 +245,9 @@ class Recording:
                                 channel.values[first:last])
         return replace(self, channels=cut)
 
-    def shift(self, offset_s: float, names: Sequence[str] | None = None) -> Recording:
-        """
-        Return the recording with `offset_s` added to the time stamps of `names`, or of all.
-
-        Raises
-        ------
-        RecordingError : there is no such signal
-
-        """
-        return self.shift_ns(nanoseconds(offset_s), names)
-
     def shift_ns(self, offset_ns: int, names: Sequence[str] | None = None) -> Recording:
         """
-        Do as `shift`, by whole nanoseconds: exact where stamps are too long for a double.
+        Return the recording with `offset_ns` added to the time stamps of `names`, or of all.
 
         Raises
         ------
@@ -329,10 +289,6 @@ class Recording:
         count = max(0, (self.end_ns + longest - start_ns) // period_ns)
         begins = [start_ns + i * period_ns for i in range(count)]
         return tuple(self._cut(begin, begin + period_ns).shift_ns(-begin) for begin in begins)
-
-    def repeat(self, count: int, period_s: float) -> Recording:
-        """Return this one period `count` times over, see `concatenate`."""
-        return Recording.concatenate([self] * count, period_s)
 
     # -- onto other time stamps ---------------------------------------------------------------
 

@@ -10,13 +10,15 @@ names the file, the key and what is allowed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, is_dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field, fields, is_dataclass, make_dataclass
 from itertools import pairwise
 import math
 from pathlib import Path
 from typing import Any, ClassVar, get_args, get_type_hints
 
 from antenna_drive.parameters.sets import KNOTS_LIMIT, SINES_LIMIT
+from antenna_drive.readings import not_negative, SENSORS, SheetNumber
 from simgap.errors import one_line
 from simgap.inputs.labels import parse_labels, plain_value
 from simgap.inputs.plain_yaml import read_yaml
@@ -128,22 +130,32 @@ class Knots:
 Waveform = Square | Triangle | Multisine | Chirp | Knots
 
 
-@dataclass(frozen=True)
-class Sensors:
+def _numbers_of(numbers: Iterable[SheetNumber]) -> Any:
+    """Return a class with an entry for each number."""
+    return make_dataclass('_Numbers', [
+        (number.key, float | None, field(default=None, metadata={'entry': number.entry}))
+        for number in numbers], frozen=True)
+
+
+class Sensors(_numbers_of(  # type: ignore[misc]
+        number for sensor in SENSORS for number in sensor.numbers)):
     """How good the sensors are: noise is one standard deviation, step one digit."""
 
-    current_noise_A: float | None = _entry('A', 'noise of each current', 0.0)
-    current_step_A: float | None = _entry('A', 'resolution of each current', 0.0)
-    tach_noise_rad_s: float | None = _entry('rad/s', 'noise of each tachometer', 0.0)
-    tach_noise_relative: float | None = _entry('1', 'noise per rate', 0.0, 1.0)
-    tach_step_rad_s: float | None = _entry('rad/s', 'resolution of each tachometer', 0.0)
-    encoder_bits: int | None = _entry('1', 'bits per turn of the encoder', 1, 64, whole=True)
-    bias_noise_V: float | None = _entry('V', 'noise of the bias voltage', 0.0)
-    bias_step_V: float | None = _entry('V', 'resolution of the bias voltage', 0.0)
+
+# What instruments of the kind have when somebody looks after them: tachometers and servo
+# amplifiers of a drive, transducers and the logger of a test.
+_TOLERANCES = (
+    not_negative('tach_zero_rad_s', 0.01, 'rad/s', 'zero of each tachometer, in the loop'),
+    not_negative('amplifier_zero_V', 1e-3, 'V', 'zero of each amplifier, in the loop'),
+    not_negative('recorder_gain', 0.01, '1', 'gain of each recorded channel', 0.5),
+    *(sensor.zero for sensor in SENSORS if sensor.zero),
+    not_negative('channel_delay_samples', 1.0, '1',
+                 'constant delay of each recorded channel, in samples', 10.0),
+    not_negative('clock_ppm', 100.0, '1', "rate of the recorder's clock, in millionths", 1e4),
+)
 
 
-@dataclass(frozen=True)
-class Tolerances:
+class Tolerances(_numbers_of(_TOLERANCES)):  # type: ignore[misc]
     """
     How far a healthy machine and its recorder may be from what is written down.
 
@@ -151,14 +163,8 @@ class Tolerances:
     two standard deviations of their noise.
     """
 
-    tach_zero_rad_s: float | None = _entry('rad/s', 'zero of each tachometer, in the loop', 0.0)
-    amplifier_zero_V: float | None = _entry('V', 'zero of each amplifier, in the loop', 0.0)
-    recorder_gain: float | None = _entry('1', 'gain of each recorded channel', 0.0, 0.5)
-    current_zero_A: float | None = _entry('A', 'zero of each recorded current', 0.0)
-    bias_zero_V: float | None = _entry('V', 'zero of the recorded bias voltage', 0.0)
-    channel_delay_samples: float | None = _entry(
-        '1', 'constant delay of each recorded channel, in samples', 0.0, 10.0)
-    clock_ppm: float | None = _entry('1', "rate of the recorder's clock, in millionths", 0.0, 1e4)
+
+USUAL = Tolerances(**{number.key: number.usual for number in _TOLERANCES})
 
 
 @dataclass(frozen=True)

@@ -29,8 +29,8 @@ from dataclasses import dataclass, replace
 import math
 from typing import Any
 
-from antenna_drive.emulator.batch import CHANNELS
 from antenna_drive.emulator.unit import FloatArray
+from antenna_drive.readings import AT, READINGS
 import numpy as np
 from scipy.signal import lfilter
 
@@ -45,10 +45,9 @@ _STANDS = 0.3
 # The encoder counts on with every error of a rate: it is compared behind a high-pass of this
 # time [s].
 WASH_OUT_S = 3.0
-ENCODER = CHANNELS.index('plant/encoder')
-_RATE = CHANNELS.index('motor_1/tach_rate')
+ENCODER, _RATE = AT['encoder'], AT['tach_1']
 # Columns of the regressors: the first slope, and the direction.
-SLOPES, WAY = 1 + len(CHANNELS), 1 + 2 * len(CHANNELS)
+SLOPES, WAY = 1 + len(READINGS), 1 + 2 * len(READINGS)
 # Residuals beyond so many robust standard deviations are cut: one spike is no gap.
 CUT = 8.0
 # Motion that leaves the quiet record by more than this factor is not judged.
@@ -210,7 +209,7 @@ class SignalBlock:
 
     Attributes
     ----------
-    column : of the signal in `CHANNELS`
+    column : of the signal among the readings
     residual : measured minus twin, shape (n,)
     rows : regressors at the same times, shape (n, 16)
 

@@ -16,8 +16,8 @@ from concurrent.futures import Executor, Future
 from typing import Any
 
 from antenna_drive.parameters.sets import Drive
+from antenna_drive.readings import RATE_COMMAND
 from antenna_drive.recording.recording import Recording
-from antenna_drive.twin.intake import COMMAND
 from antenna_drive.twin.outcome import outcome
 from antenna_drive.twin.sequential import Answer, decided, Look, Rule
 
@@ -158,7 +158,7 @@ class GrowingVerdict:
 
 def _length(test: Recording) -> float:
     """Return the length of a test [s]."""
-    if COMMAND not in test or len(test[COMMAND]) < 2:
+    if RATE_COMMAND not in test or len(test[RATE_COMMAND]) < 2:
         return 0.0
-    time = test[COMMAND].time_ns
+    time = test[RATE_COMMAND].time_ns
     return float(time[-1] - time[0]) / 1e9

@@ -14,19 +14,16 @@ from array import array
 from collections import Counter
 import math
 
-from antenna_drive.emulator.batch import CHANNELS
 from antenna_drive.emulator.unit import FloatArray
-from antenna_drive.emulator.wiring import TEST_SIGNAL
+from antenna_drive.readings import RATE_COMMAND, READINGS
 from antenna_drive.recording.recording import Recording, unit_of
 from antenna_drive.recording.sheet import TestSheet
 import numpy as np
 from numpy.typing import NDArray
 from simgap.logs.channel import Channel, make_channel, NANOSECONDS
 
-COMMAND = f'{TEST_SIGNAL}/rate_command'
-# No drive of this kind shows more, by unit.
-RANGES = {'A': 1e3, 'rad/s': 1e4, 'rad': 1e2, 'V': 1e3}
-_COMMAND_RANGE = 0.1  # [rad/s]
+# No drive of this kind shows more, in the unit of each signal.
+_MOST = {RATE_COMMAND: 0.1, **{reading.signal: reading.sensor.most for reading in READINGS}}
 # A stamp that is earlier than the one before by less is a message that came late [s].
 LATE_S = 1.0
 # Without a command for longer than this, nobody knows what the drive did [s].
@@ -62,7 +59,7 @@ class Intake:
         Parameters
         ----------
         name
-            'unit/signal': the rate command, or one of `CHANNELS`
+            'unit/signal': the rate command, or one of the readings
         stamp_ns
             of any clock, the same for all signals [ns]
         value
@@ -81,8 +78,8 @@ class Intake:
             elif since <= 0.0:
                 self.rubbish[name, 'late or repeated'] += 1
                 return False
-            elif name == COMMAND and since > HOLE_S:
-                self._jump(f'no {COMMAND} for {since:.3g} s')
+            elif name == RATE_COMMAND and since > HOLE_S:
+                self._jump(f'no {RATE_COMMAND} for {since:.3g} s')
         self._stamps.setdefault(name, array('q')).append(stamp_ns)
         self._values.setdefault(name, array('d')).append(value)
         self.accepted[name] += 1
@@ -138,7 +135,7 @@ class Intake:
 
     def span_s(self, since_ns: int | None = None) -> float:
         """Return how much of the command is kept, from a stamp on [s]."""
-        stamps = self._stamps.get(COMMAND)
+        stamps = self._stamps.get(RATE_COMMAND)
         if not stamps:
             return 0.0
         begin = stamps[0] if since_ns is None else max(stamps[0], since_ns)
@@ -175,10 +172,9 @@ def _fault(name: str, value: float) -> str:
         return 'not a number'
     if math.isinf(value):
         return 'infinite'
-    allowed = _COMMAND_RANGE if name == COMMAND else RANGES.get(unit_of(name) or '', math.inf)
-    return '' if abs(value) <= allowed else 'out of range'
+    return '' if abs(value) <= _MOST.get(name, math.inf) else 'out of range'
 
 
 def known(name: str) -> bool:
     """Return whether a twin has a use for a signal."""
-    return name == COMMAND or name in CHANNELS
+    return name in _MOST

@@ -15,7 +15,7 @@ from typing import Any
 from antenna_drive.diagnosis.tuned import tuned
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.parameters.loading import load
-from antenna_drive.recording.csv_format import FIELD_COLUMNS
+from antenna_drive.readings import FIELD_COLUMNS
 from antenna_drive.recording.recording import Recording, unit_of
 from antenna_drive.recording.sheet import parse_sheet
 from antenna_drive.twin.growing import diagnosed, look_of

@@ -15,9 +15,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
 
-from antenna_drive.emulator.batch import CHANNELS
 from antenna_drive.emulator.unit import FloatArray
-from antenna_drive.recording.recording import unit_of
+from antenna_drive.readings import READINGS, SIGNALS
 from antenna_drive.twin.baseline import (
     Baseline, BLOCK_S, block_scores, CUT, DRIFT_S, interpolated, LEAST_SAMPLES, motion_of,
     regressors, residual_of, SCORES, shift_of, SignalBaseline, SignalBlock, SLOPES, standardised,
@@ -29,9 +28,6 @@ from scipy.stats import chi2
 
 # A ridge that keeps coefficients of columns that are alike from growing, as a share of a sample.
 _RIDGE = 1e-3
-# What the sensors of such a drive tell, by unit: a residual is never taken for quieter. Of angles
-# it is two digits of an encoder with 21 bits.
-_LEAST = {'A': 0.003, 'rad/s': 0.001, 'rad': 6e-6, 'V': 0.003}
 # A score that moves by less than this share of the residual's size is no gap, however steady it
 # was in the quiet record; and the quiet record's worst block is no gap either.
 _LEAST_DEVIATION, _WORST = 0.1, 3.0
@@ -52,7 +48,7 @@ class Track:
     Attributes
     ----------
     time : of the twin, ascending, shape (n,) [s]
-    course : the twin's readings, shape (n, 6), in the order of `CHANNELS`
+    course : the twin's readings, shape (n, 6), in the order of `SIGNALS`
     washed : the same with the encoder behind its high-pass
     command : axis rate command, shape (n,) [rad/s]
     spacing : of the samples of the command that the twin was driven with [s]
@@ -107,7 +103,7 @@ def lag_of(track: Track, name: str) -> float:
     The lag of the greatest correlation of both, refined by a parabola; 0 where nothing moves.
     """
     times, values = track.samples[name]
-    column = track.course[:, CHANNELS.index(name)]
+    column = track.course[:, SIGNALS.index(name)]
     if times.size < 3 * LEAST_SAMPLES or np.ptp(column) == 0.0 or np.ptp(values) == 0.0:
         return 0.0
     lags = np.arange(-_MOST_LAG_S, _MOST_LAG_S + 0.5 * _LAG_STEP_S, _LAG_STEP_S)
@@ -150,7 +146,7 @@ def _all_prepared(track: Track, table: FloatArray, edges: FloatArray, lags: Mapp
 def _prepared(track: Track, name: str, table: FloatArray, edges: FloatArray,
               lag: FloatArray) -> _Prepared | None:
     """Return one signal beside the twin, with its lag in each block; None if it has too little."""
-    column = CHANNELS.index(name)
+    column = SIGNALS.index(name)
     times, values = track.samples[name]
     times = times - np.interp(times, edges + 0.5 * BLOCK_S, lag)
     inside = (times >= track.time[0]) & (times <= track.time[-1])
@@ -176,7 +172,7 @@ def _fitted_to(item: _Prepared, shifts: Sequence[float]) -> SignalBaseline:
     rows = np.concatenate([part.rows for part in item.parts])
     centre, scale = rows.mean(axis=0), rows.std(axis=0)
     scale = np.where(_moves(rows, scale), scale, 0.0)
-    least = _LEAST[unit_of(item.name) or '']
+    least = READINGS[SIGNALS.index(item.name)].sensor.least
     own = standardised(rows, centre, scale)
     coefficients = _fitted(own, residual, least)
     sigma = _robust(residual - own @ coefficients, least)

@@ -95,11 +95,6 @@ class Shadow:
         return self._start_ns
 
     @property
-    def reached_ns(self) -> int:
-        """Return the time stamp of the last macro-step [ns]."""
-        return (self._start_ns or 0) + int(nanoseconds(self._emulator.k * self._step_s))
-
-    @property
     def spacing_s(self) -> float:
         """Return the time between the last samples of the command, 0 before there are two [s]."""
         return float(np.median(np.diff(self._stamps))) / NANOSECONDS if (

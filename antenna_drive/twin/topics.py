@@ -22,9 +22,9 @@ import math
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.emulator.batch import CHANNELS
+from antenna_drive.readings import RATE_COMMAND, SIGNALS
 from antenna_drive.recording.import_map import parse_map
-from antenna_drive.twin.intake import COMMAND, known
+from antenna_drive.twin.intake import known
 from simgap.inputs.plain_yaml import read_yaml
 from simgap.inputs.schema import ParameterError
 from simgap.logs.channel import nanoseconds
@@ -119,7 +119,7 @@ def _value(signal: SignalMap, numbers: Sequence[float]) -> float:
 def own_topics(real: str = '') -> TopicMap:
     """Return the map of a drive whose topics and units are our own, in a namespace."""
     prefix = real.rstrip('/') + '/' if real else ''
-    names = (COMMAND, *CHANNELS)
+    names = (RATE_COMMAND, *SIGNALS)
     tree = {'time': {'column': SOURCE}, 'signals': {
         name: {'column': prefix + name} for name in names}}
     return _topics(parse_map(tree), SOURCE, 0)
@@ -160,8 +160,8 @@ def _topics(parsed: ImportMap, clock: str, index: int) -> TopicMap:
     vectors: dict[str, bool] = {}
     for name, signal in parsed.signals.items():
         if not known(name):
-            raise ParameterError(f'signals.{name}: a twin compares {", ".join(CHANNELS)}, and '
-                                 f'needs {COMMAND}')
+            raise ParameterError(f'signals.{name}: a twin compares {", ".join(SIGNALS)}, and '
+                                 f'needs {RATE_COMMAND}')
         topics = {str(reference.column) for reference in signal.number.references}
         if len(topics) > 1:
             raise ParameterError(f'signals.{name}: the numbers of an expression have to come in '
@@ -175,10 +175,10 @@ def _topics(parsed: ImportMap, clock: str, index: int) -> TopicMap:
             raise ParameterError(f'signals.{name}: the time is in the messages of {clock}, so '
                                  'every signal has to come from there')
         found.setdefault(topic, {})[name] = signal
-    if COMMAND not in parsed.signals:
-        raise ParameterError(f'signals: {COMMAND} is missing, which the twin is driven with')
+    if RATE_COMMAND not in parsed.signals:
+        raise ParameterError(f'signals: {RATE_COMMAND} is missing, which the twin is driven with')
     if len(parsed.signals) < 2:
         raise ParameterError('signals: nothing to compare; a twin compares '
-                             + ', '.join(CHANNELS))
+                             + ', '.join(SIGNALS))
     return TopicMap([Topic(topic, vectors[topic], signals) for topic, signals in found.items()],
                     clock, index, TIME_UNITS[parsed.time.unit], parsed.time.offset_ns)

@@ -16,10 +16,10 @@ import math
 
 from antenna_drive.diagnosis.sheet_settings import as_the_sheet_says
 from antenna_drive.diagnosis.tuned import loaded
-from antenna_drive.emulator.batch import CHANNELS
 from antenna_drive.emulator.run import Changes, MACRO_STEP
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.parameters.sets import changed, Drive
+from antenna_drive.readings import of, RATE_COMMAND, SIGNALS, TACHOMETER
 from antenna_drive.recording.recording import Recording, unit_of
 from antenna_drive.recording.sheet import TestSheet
 from antenna_drive.twin.baseline import (
@@ -28,7 +28,7 @@ from antenna_drive.twin.baseline import (
     TWO_SIDED, WashOut,
 )
 from antenna_drive.twin.cusum import Charts, limit_of_rate
-from antenna_drive.twin.intake import COMMAND, Intake
+from antenna_drive.twin.intake import Intake
 from antenna_drive.twin.quiet_record import learn, Track
 from antenna_drive.twin.shadow import Shadow
 import numpy as np
@@ -126,8 +126,8 @@ class _Course:
     """The twin's course on an even grid, with the encoder behind its high-pass."""
 
     time: FloatArray = field(default_factory=lambda: np.zeros(0))
-    raw: FloatArray = field(default_factory=lambda: np.zeros((0, len(CHANNELS))))
-    washed: FloatArray = field(default_factory=lambda: np.zeros((0, len(CHANNELS))))
+    raw: FloatArray = field(default_factory=lambda: np.zeros((0, len(SIGNALS))))
+    washed: FloatArray = field(default_factory=lambda: np.zeros((0, len(SIGNALS))))
     command: FloatArray = field(default_factory=lambda: np.zeros(0))
     wash_out: WashOut = field(default_factory=WashOut)
 
@@ -224,8 +224,8 @@ class Twin:
     def _build(self, drive: Drive) -> None:
         """Take another configuration, and begin anew."""
         self._shadow = Shadow(*under_test(self.sheet, drive, self._step_s), self._step_s)
-        self._columns = [self._shadow.names.index(name) for name in CHANNELS]
-        self._command = self._shadow.names.index(COMMAND)
+        self._columns = [self._shadow.names.index(name) for name in SIGNALS]
+        self._command = self._shadow.names.index(RATE_COMMAND)
         self._begin()
 
     def _begin(self) -> None:
@@ -233,9 +233,9 @@ class Twin:
         self._shadow.restart()
         self._course = _Course()
         self._pending: dict[str, tuple[FloatArray, FloatArray]] = {
-            name: (np.zeros(0), np.zeros(0)) for name in CHANNELS}
+            name: (np.zeros(0), np.zeros(0)) for name in SIGNALS}
         self._next_block = 0
-        self._residual_wash = {name: WashOut() for name in CHANNELS}
+        self._residual_wash = {name: WashOut() for name in SIGNALS}
         self._publish_wash = WashOut()
         self._gap = False
         self._sizes: deque[tuple[int, dict[str, float]]] = deque(maxlen=600)
@@ -294,7 +294,7 @@ class Twin:
 
     def _go_on(self) -> list[Compared]:
         """Go on as far as the samples lead, or until the twin was tuned."""
-        grid, samples = self._shadow.advance(*self.intake.new(COMMAND))
+        grid, samples = self._shadow.advance(*self.intake.new(RATE_COMMAND))
         if grid.size:
             start = self._shadow.start_ns or 0
             first = self._grid_row
@@ -321,7 +321,7 @@ class Twin:
         if start is None or course.time.size < 2:
             return []
         result = []
-        for name in CHANNELS:
+        for name in SIGNALS:
             until = start + int(course.time[-1] * NANOSECONDS)
             stamps, values = self.intake.new(name, until)
             inside = stamps >= start + int(course.time[0] * NANOSECONDS)
@@ -331,9 +331,9 @@ class Twin:
             times = (stamps - start) / NANOSECONDS
             lag = self._lag(self.baseline.signals[name]) if (
                 self.baseline and name in self.baseline.signals) else 0.0
-            twin = interpolated(times - lag, course.time, course.raw)[:, CHANNELS.index(name)]
+            twin = interpolated(times - lag, course.time, course.raw)[:, SIGNALS.index(name)]
             residual = values - twin
-            if name == CHANNELS[ENCODER]:
+            if SIGNALS.index(name) == ENCODER:
                 residual = self._publish_wash(residual, _spacing(times))
             result.append(Compared(name, stamps, twin, residual))
             old = self._pending[name]
@@ -403,7 +403,7 @@ class Twin:
         times, values = of_twin[mine], values[mine]
         if not times.size:
             return times, values
-        column = CHANNELS.index(name)
+        column = SIGNALS.index(name)
         return times, residual_of(column, values, interpolated(times, time, raw)[:, column],
                                   times, self._residual_wash[name])
 
@@ -435,7 +435,7 @@ class Twin:
             times, residual = self._residual(name, item, end, time, course.raw[part])
             if times.size:
                 self._missing.pop(name, None)
-                there[name] = SignalBlock(CHANNELS.index(name), residual,
+                there[name] = SignalBlock(SIGNALS.index(name), residual,
                                           interpolated(times, time, table))
             else:
                 self._missing.setdefault(name, begin)
@@ -522,6 +522,6 @@ def _spacing(times: FloatArray) -> float:
 
 def _stands_at_first(recording: Recording) -> bool:
     """Return whether the motors stood still when a recording began."""
-    tachs = [recording[name] for name in CHANNELS
-             if name.endswith('tach_rate') and name in recording]
+    tachs = [recording[reading.signal] for reading in of(TACHOMETER)
+             if reading.signal in recording]
     return bool(tachs) and all(abs(item.values[0]) < _STILL for item in tachs)

@@ -21,8 +21,8 @@ from typing import Any
 
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.lockstep.entry import choose_transport
+from antenna_drive.readings import RATE_COMMAND
 from antenna_drive.recording.csv_format import write_csv
-from antenna_drive.twin.intake import COMMAND
 from antenna_drive.twin.proving import recording_of
 from antenna_drive.twin.watch import GAP
 from lab.campaign.domains import DomainClaim
@@ -74,7 +74,7 @@ def watched_on_topics(columns: Mapping[str, FloatArray], sheet: Mapping[str, Any
             if not began:
                 began.append((time.monotonic(), info['source_timestamp']))
 
-        said.node.create_subscription(Float64, f'{REAL}/{COMMAND}', begin, 10)
+        said.node.create_subscription(Float64, f'{REAL}/{RATE_COMMAND}', begin, 10)
         twin = stack.enter_context(_program(
             'twin', '--ros-args', '-p', f'real:={REAL}', '-p', f'sheet:={folder / "sheet.yaml"}',
             '-p', f'alarms_per_day:={alarms_per_day:f}'))

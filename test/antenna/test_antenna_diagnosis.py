@@ -15,18 +15,18 @@ from typing import Any
 
 from antenna_drive.cli import main
 from antenna_drive.diagnosis.diagnose import diagnose_recordings
-from antenna_drive.diagnosis.field_test import CHANNELS
 from antenna_drive.diagnosis.machine import AntennaMachine
 from antenna_drive.diagnosis.planned_tests import BUILT_IN, confusability_of, planned
 from antenna_drive.diagnosis.waves import Wave
-from simgap.report.render import render
 from antenna_drive.parameters import load
+from antenna_drive.readings import SIGNALS
 from antenna_drive.recording.csv_format import write_csv
 from antenna_drive.recording.recording import Recording
 import numpy as np
 import pytest
 from simgap.errors import UserError
 from simgap.report.page import contents
+from simgap.report.render import render
 from simgap.verdict.diagnosis import Diagnosis, value_lines
 
 NOISE = {'ammeter': 0.01, 'tach_rate': 0.0035, 'encoder': 1e-6, 'bias_voltage': 0.01}
@@ -38,7 +38,7 @@ OFFSETS = {
 
 
 def made(point: Any, seconds: float, names: tuple[str, ...] = ('square', 'triangle'),
-         keep: tuple[str, ...] = tuple(CHANNELS), seed: int = 0) -> dict[str, Recording]:
+         keep: tuple[str, ...] = SIGNALS, seed: int = 0) -> dict[str, Recording]:
     """Return recordings of a drive with these parameter values."""
     tests = {name: planned(BUILT_IN[name], seconds, 100.0) for name in names}
     model = AntennaMachine(tests, load(), threads=1)
@@ -51,7 +51,7 @@ def made(point: Any, seconds: float, names: tuple[str, ...] = ('square', 'triang
     recordings = {}
     for (name, test), read in zip(tests.items(), values, strict=True):
         signals = {'test_signal/rate_command': test['test_signal/rate_command'].values}
-        for c, channel in enumerate(CHANNELS):
+        for c, channel in enumerate(SIGNALS):
             if channel in keep:
                 noise = next(v for key, v in NOISE.items() if key in channel)
                 signals[channel] = read[:, c] + noise * random.normal(size=len(read))

@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from antenna_drive.diagnosis.field_test import BIAS
 from antenna_drive.diagnosis.machine import AntennaMachine
 from antenna_drive.diagnosis.planned_tests import BUILT_IN, planned
 from antenna_drive.parameters import load
+from antenna_drive.readings import AT
 from antenna_drive.recording.sheet import FixedBias, FixedStepBias
 import numpy as np
 import pytest
@@ -79,7 +79,7 @@ def test_a_source_of_bias_that_is_off_gives_as_much_more() -> None:
         assert shown is not None
         expected = np.where(drive.experiments[0].time < 1.0, 0.0, 6.0 * (1.0 + share))
         away = np.abs(drive.experiments[0].time - 1.0) > 1e-9
-        assert shown[away, BIAS] == pytest.approx(expected[away], abs=1e-12)
+        assert shown[away, AT['bias_voltage']] == pytest.approx(expected[away], abs=1e-12)
 
 
 @pytest.mark.parametrize('places', [(0.1, -0.9), (-0.6, -0.6), (0.3, 0.9)])

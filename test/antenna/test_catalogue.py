@@ -8,7 +8,6 @@ from typing import Any
 
 from antenna_drive.diagnosis.catalogue import catalogue
 from antenna_drive.diagnosis.excitation import Bias, Longest, schedule, SheetCommand
-from antenna_drive.diagnosis.field_test import TACH_1
 from antenna_drive.diagnosis.machine import AntennaMachine
 from antenna_drive.diagnosis.modifiers import AntennaParameter
 from antenna_drive.diagnosis.planned_tests import BUILT_IN, planned
@@ -18,6 +17,7 @@ from antenna_drive.emulator.run import simulate
 from antenna_drive.parameters import load
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed
+from antenna_drive.readings import AT, SIGNALS
 from antenna_drive.recording.sheet import Square
 import numpy as np
 import pytest
@@ -140,14 +140,15 @@ def test_time_stamps_err_more_on_what_is_faster(model: Any) -> None:
         shifted = model.simulate([point, *(
             {**point, f'clock:{test.name}': times * late} for times in (1.0, 2.0))])
         # of second order: a ripple is curved
-        slope = (4.0 * shifted[1][k] - 3.0 * shifted[0][k] - shifted[2][k])[:, TACH_1] / (
+        slope = (4.0 * shifted[1][k] - 3.0 * shifted[0][k] - shifted[2][k])[:, AT['tach_1']] / (
             2.0 * late)
-        more = after.noise[:, TACH_1] ** 2 - (test.jitter * slope) ** 2
-        rate = shifted[0][k][:, TACH_1]
-        sheet = test.sensors
-        assert more == pytest.approx(sheet.tach_noise ** 2 + sheet.tach_step ** 2 / 12.0
-                                     + (sheet.tach_relative * rate) ** 2, rel=1e-6)
-        assert after.noise[:, TACH_1].max() > before.noise[:, TACH_1].max()
+        more = after.noise[:, AT['tach_1']] ** 2 - (test.jitter * slope) ** 2
+        rate = shifted[0][k][:, AT['tach_1']]
+        known = test.sensors.known
+        assert more == pytest.approx(
+            known['tach_noise_rad_s'] ** 2 + known['tach_step_rad_s'] ** 2 / 12.0
+            + (known['tach_noise_relative'] * rate) ** 2, rel=1e-6)
+        assert after.noise[:, AT['tach_1']].max() > before.noise[:, AT['tach_1']].max()
         assert after.measured is before.measured
 
 
@@ -172,6 +173,6 @@ def test_batch_agrees_with_the_converged_emulator() -> None:
     fine = simulate(drive, 3.0, 2.5e-5, every=400)
     command = SheetCommand(Square(np.degrees(7.4e-4), 3.0, 0.0))
     out = batch.run(record_of(drive), schedule(command, Bias(), fine.time, Longest(2.5e-3)))
-    for c, name in enumerate(batch.CHANNELS):
+    for c, name in enumerate(SIGNALS):
         scale = np.sqrt(np.mean(fine[name] ** 2))
         assert np.sqrt(np.mean((out[:, c, 0] - fine[name]) ** 2)) < 2e-4 * scale

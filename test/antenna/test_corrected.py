@@ -13,7 +13,7 @@ from antenna_drive.diagnosis.circuits import nearest_circuit
 from antenna_drive.diagnosis.corrected import correct, Corrected
 from antenna_drive.diagnosis.machine import AntennaMachine
 from antenna_drive.diagnosis.planned_tests import BUILT_IN, planned
-from antenna_drive.diagnosis.prediction import predict, RecorderErrors
+from antenna_drive.diagnosis.prediction import predict, recorder_errors
 from antenna_drive.diagnosis.waves import Wave
 from antenna_drive.parameters import load
 from antenna_drive.parameters.sets import changed, Drive
@@ -109,8 +109,8 @@ def test_what_the_recorder_does_is_kept_beside_the_file(
     assert made.unwritten == ('start of each test',)
     drive, recording = loaded(made, tmp_path), tests['square']
     plain, read = (predict('square', recording, drive, recorder).predicted
-                   for recorder in (None, RecorderErrors.of(made.recorder)))
-    ideal = predict('square', recording, drive, RecorderErrors.of([])).predicted
+                   for recorder in (None, recorder_errors(made.recorder)))
+    ideal = predict('square', recording, drive, recorder_errors([])).predicted
     np.testing.assert_array_equal(plain, ideal)
     # the encoder is read later, and a straight line between samples errs by an eighth of the
     # second difference
@@ -178,7 +178,7 @@ def test_a_sheet_does_not_replace_the_measured_numbers_of_its_circuit() -> None:
     ([{'name': 'clock', 'value': float('inf')}], 'allowed is a number')])
 def test_a_wrong_recorder_is_refused(entries: list[dict[str, Any]], told: str) -> None:
     with pytest.raises(UserError, match=told):
-        RecorderErrors.of(entries)
+        recorder_errors(entries)
 
 
 def test_predict_compares_two_configurations(

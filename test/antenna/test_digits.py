@@ -8,21 +8,20 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 import math
 
-from simgap.machine.contract import FloatArray
-
 from antenna_drive.diagnosis.excitation import Bias, Longest, schedule, SheetCommand
-from antenna_drive.diagnosis.field_test import CHANNELS, ENCODER
 from antenna_drive.diagnosis.machine import AntennaMachine
 from antenna_drive.diagnosis.planned_tests import planned
 from antenna_drive.diagnosis.sensors import digit_of
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.sets import Drive
+from antenna_drive.readings import AT, SIGNALS
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import Square, TestSheet
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
+from simgap.machine.contract import FloatArray
 
 WAVEFORM = Square(0.05, 3.0, 0.25)
 SHEET = TestSheet(waveform=WAVEFORM, parameter_tolerance=0.02)
@@ -59,11 +58,11 @@ def recorded(drive: Drive, digit: float, rounding: Callable[[FloatArray], FloatA
     sheet = SHEET
     time = np.arange(601) / 100.0
     signals = {'test_signal/rate_command': SheetCommand(WAVEFORM)(time)}
-    signals.update({name: np.zeros(time.size) for name in CHANNELS})
+    signals.update({name: np.zeros(time.size) for name in SIGNALS})
     model = AntennaMachine({'a': Recording.from_arrays(time, signals, sheet=sheet)}, drive, 1)
     shown, when = readings_of(model, {}), model.experiments[0].time
     signals.update({name: np.interp(time, when, shown[:, c])
-                    for c, name in enumerate(CHANNELS)})
+                    for c, name in enumerate(SIGNALS)})
     signals['plant/encoder'] = digit * rounding(signals['plant/encoder'] / digit)
     return Recording.from_arrays(time, signals, sheet=sheet)
 
@@ -84,10 +83,10 @@ def test_angle_within_the_digit_that_was_read_is_no_residual(
     model = AntennaMachine({'a': recorded(drive, digit, rounding)}, drive, 1)
     step, edge = model.catalogue['encoder.quantisation'].forms[0].parameters
     assert step.high == pytest.approx(digit, rel=1e-6)
-    measured = model.experiments[0].measured[:, ENCODER]
-    plain = readings_of(model, {})[:, ENCODER]
+    measured = model.experiments[0].measured[:, AT['encoder']]
+    plain = readings_of(model, {})[:, AT['encoder']]
     assert np.abs(measured - plain).max() > 0.4 * digit
-    known = readings_of(model, {step.name: digit, edge.name: turn})[:, ENCODER]
+    known = readings_of(model, {step.name: digit, edge.name: turn})[:, AT['encoder']]
     assert np.abs(measured - known).max() < 1e-9
 
 
@@ -100,7 +99,7 @@ def test_planned_test_is_read_in_the_digits_that_were_seen() -> None:
                                              5.0, 100.0)}, drive, 1)
     own = next_test.catalogue.form_named(next_test.catalogue['encoder.quantisation'], form.name)
     assert {p.name for p in own.parameters} <= {p.name for p in form.parameters}
-    read = readings_of(next_test, {own.parameters[0].name: digit})[:, ENCODER]
+    read = readings_of(next_test, {own.parameters[0].name: digit})[:, AT['encoder']]
     assert np.ptp(read) > 10 * digit, 'it moves'
     assert np.abs(read / digit - np.round(read / digit)).max() < 1e-6
 

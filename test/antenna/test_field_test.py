@@ -15,6 +15,7 @@ from antenna_drive.recording.sheet import TestSheet
 import numpy as np
 import pytest
 from simgap.errors import UserError
+from simgap.logs.channel import nanoseconds
 
 NAME = 'field'
 
@@ -35,7 +36,7 @@ def ready(recording: Recording) -> tuple[FieldTest, list[str]]:
 @pytest.mark.parametrize('clock_s', [1_795_262_948.25, 1763.25, -40.5])
 def test_a_clock_that_began_elsewhere_changes_nothing(test: str, clock_s: float) -> None:
     plain, _ = ready(field(test))
-    other, notes = ready(field(test).shift(clock_s))
+    other, notes = ready(field(test).shift_ns(nanoseconds(clock_s)))
     np.testing.assert_allclose(other.time, plain.time, rtol=0.0, atol=1e-9)
     np.testing.assert_array_equal(other.measured, plain.measured)
     np.testing.assert_allclose(other.command(plain.time), plain.command(plain.time))

@@ -13,22 +13,20 @@ from typing import Any
 from antenna_drive.cli import main
 from antenna_drive.diagnosis import investigation
 from antenna_drive.diagnosis.drive_limits import DriveLimits
-from antenna_drive.diagnosis.field_recording import CHANNELS, RATE_COMMAND
-from antenna_drive.diagnosis.investigation import (
-    Investigation, InvestigationPlan, lines, sensed,
-)
+from antenna_drive.diagnosis.investigation import Investigation, InvestigationPlan, lines, sensed
 from antenna_drive.diagnosis.planned_tests import BUILT_IN
 from antenna_drive.diagnosis.sensors import SensorModel
-from simgap.report.render import render
 from antenna_drive.parameters.loading import load
+from antenna_drive.readings import RATE_COMMAND, SIGNALS
 from antenna_drive.recording.recording import Recording
-from antenna_drive.recording.sheet import load_sheet, TestSheet
+from antenna_drive.recording.sheet import load_sheet, Sensors, TestSheet
 import numpy as np
 import pytest
 from simgap.errors import UserError
 from simgap.next_test.candidate import Candidate, Proposal
 from simgap.next_test.rivals import Findings, Rival
 from simgap.next_test.space import TestSpace
+from simgap.report.render import render
 
 DRIVE = load()
 LIMITS = DriveLimits.of_drive(DRIVE)
@@ -184,15 +182,16 @@ def test_a_folder_of_another_investigation_is_refused(
 
 def test_readings_of_an_emulated_drive_get_the_errors_of_sensors() -> None:
     time = np.arange(20000) * 1e-3
-    clean = {name: 3.0 * np.sin(time) for name in CHANNELS}
+    clean = {name: 3.0 * np.sin(time) for name in SIGNALS}
     recording = Recording.from_arrays(time, {RATE_COMMAND: np.sin(time), **clean},
                                       sheet=BUILT_IN['square'])
-    sensors = SensorModel(current_noise=0.02, current_step=0.05, tach_noise=0.01,
-                          tach_relative=0.0, tach_step=0.0, encoder_step=1e-3, bias_noise=0.0)
+    sensors = SensorModel.of(Sensors(
+        current_noise_A=0.02, current_step_A=0.05, tach_noise_rad_s=0.01, tach_noise_relative=0.0,
+        tach_step_rad_s=0.0, encoder_bits=np.log2(2.0 * np.pi / 1e-3), bias_noise_V=0.0))
     found = sensed(recording, sensors, [1, 2])
     assert found.sheet == BUILT_IN['square']
     assert found[RATE_COMMAND].values == pytest.approx(np.sin(time[::5]))
-    off = {name: found[name].values - 3.0 * np.sin(time[::5]) for name in CHANNELS}
+    off = {name: found[name].values - 3.0 * np.sin(time[::5]) for name in SIGNALS}
     # n = 4000 samples: their deviation is known to 1.2 percent
     assert off['motor_1/ammeter'].std() == pytest.approx(
         np.hypot(0.02, 0.05 / np.sqrt(12.0)), rel=0.05)

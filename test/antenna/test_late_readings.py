@@ -6,14 +6,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from antenna_drive.diagnosis.field_test import ENCODER, TACH_1, TACH_2
 from antenna_drive.diagnosis.late_readings import dense, parts_of, read_at
 from antenna_drive.diagnosis.machine import AntennaMachine, LOW_FIDELITY_STEP
 from antenna_drive.diagnosis.plans import Plans
-from antenna_drive.diagnosis.prediction import predict, RecorderErrors
+from antenna_drive.diagnosis.prediction import predict, recorder_errors
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
 from antenna_drive.parameters import load
 from antenna_drive.parameters.sets import changed
+from antenna_drive.readings import AT
 from antenna_drive.recording.recording import Recording
 from field_runs import FAST_TRIANGLE, field_run
 import numpy as np
@@ -93,8 +93,8 @@ def test_a_jump_between_two_samples_moves_the_whole_response() -> None:
     plain = machine.predict({}, 0)
     for c in range(exact.shape[1]):
         off, gap = np.abs(found - exact)[:, c].max(), np.abs(plain - exact)[:, c].max()
-        assert off <= 0.12 * gap + 1e-9 or c == ENCODER, f'{c}: {off} of {gap}'
-    assert np.abs(found - exact)[:, ENCODER].max() < 1e-7
+        assert off <= 0.12 * gap + 1e-9 or c == AT['encoder'], f'{c}: {off} of {gap}'
+    assert np.abs(found - exact)[:, AT['encoder']].max() < 1e-7
 
 
 @pytest.mark.parametrize('late_s', [0.0, 0.0037, 0.0095])
@@ -105,11 +105,11 @@ def test_a_ripple_faster_than_the_samples_is_read_late_without_loss(late_s: floa
         'ripple_second': 0.03, 'ripple_third': 0.01, 'ripple_third_phase': 2.0}.items()})
     recording = field_run(drive, 6.0, every=10, **FAST_TRIANGLE)
     errors = [{'name': 'delay:tach_1', 'value': late_s}]
-    exact = predict('rec', recording, drive, RecorderErrors.of(errors)).predicted
+    exact = predict('rec', recording, drive, recorder_errors(errors)).predicted
     found = AntennaMachine({'rec': recording}, drive).predict({'delay:tach_1': late_s}, 0)
-    rate = exact[:, TACH_2]
-    assert np.abs(np.diff(exact[:, TACH_1])).max() > 0.1 * np.abs(rate).max()
+    rate = exact[:, AT['tach_2']]
+    assert np.abs(np.diff(exact[:, AT['tach_1']])).max() > 0.1 * np.abs(rate).max()
     assert 12.0 * np.abs(rate).max() / (2.0 * np.pi) > RATE_HZ
-    off = np.abs(found - exact)[5:, TACH_1]
+    off = np.abs(found - exact)[5:, AT['tach_1']]
     assert np.median(off) < 1e-3 * np.abs(rate).max()
     assert np.quantile(off, 0.95) < 0.01 * np.abs(rate).max()

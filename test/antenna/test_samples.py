@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
-from antenna_drive.diagnosis.field_recording import CHANNELS, FieldRecording
+from antenna_drive.diagnosis.field_recording import FieldRecording
 from antenna_drive.diagnosis.samples import slips, spikes
 from antenna_drive.parameters import load
+from antenna_drive.readings import SIGNALS
 from antenna_drive.recording.recording import Recording
 from field_runs import field_run, SLOW_SQUARE
 from hypothesis import given, strategies as st
@@ -62,7 +63,7 @@ def test_a_recording_without_its_spikes_keeps_every_other_sample() -> None:
     assert 'rec: spikes of one sample were left out: motor_1/ammeter 3' in notes
     time = plain['motor_1/ammeter'].time_s
     measured, slope = clean.measured(time)
-    expected = np.column_stack([plain[name].values for name in CHANNELS])
+    expected = np.column_stack([plain[name].values for name in SIGNALS])
     expected[[700, 1500, 3001], 0] = np.nan
     np.testing.assert_array_equal(measured, expected)
     assert np.nanmax(np.abs(slope[1:-1, 0])) <= np.abs(np.gradient(current.values, time)).max()

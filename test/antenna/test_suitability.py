@@ -7,10 +7,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from antenna_drive.diagnosis.field_recording import CHANNELS, FieldRecording, RATE_COMMAND
+from antenna_drive.diagnosis.field_recording import FieldRecording
 from antenna_drive.diagnosis.suitability import check
 from antenna_drive.parameters import load
 from antenna_drive.parameters.sets import changed
+from antenna_drive.readings import RATE_COMMAND, SIGNALS
 from antenna_drive.recording.recording import Recording
 from field_runs import FAST_TRIANGLE, field_run, SLOW_SQUARE
 import numpy as np
@@ -89,6 +90,6 @@ def test_no_effect_of_the_drive_is_refused(changes: dict[str, float]) -> None:
         assert not judged(field_run(changed(DRIVE, changes), 20.0, **signal))
 
 
-@pytest.mark.parametrize('kept', CHANNELS)
+@pytest.mark.parametrize('kept', SIGNALS)
 def test_one_reading_is_enough(kept: str) -> None:
     assert not judged(RUNS['triangle'].select([RATE_COMMAND, kept]))

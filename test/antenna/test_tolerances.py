@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 import math
 
-from antenna_drive.diagnosis.field_test import CHANNELS, FieldTest, prepared
+from antenna_drive.diagnosis.field_test import FieldTest, prepared
 from antenna_drive.diagnosis.machine import AntennaMachine
 from antenna_drive.diagnosis.modifiers import (
     FieldChange, ReadingModifier, RunSetup, SensorReadings,
@@ -17,6 +17,7 @@ from antenna_drive.diagnosis.tolerances import nuisances
 from antenna_drive.parameters import load
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed
+from antenna_drive.readings import AT
 from antenna_drive.recording.sheet import Tolerances
 import numpy as np
 import pytest
@@ -71,7 +72,7 @@ def test_a_tolerance_is_spread_evenly_between_its_bounds() -> None:
             assert item.experiment is None
 
 
-@pytest.mark.parametrize('channel', list(CHANNELS.values()))
+@pytest.mark.parametrize('channel', list(AT))
 def test_a_zero_shifts_one_reading_of_one_test(channel: str) -> None:
     for k, test in enumerate(TESTS):
         item = NUISANCES[f'zero:{channel}:{test.name}']
@@ -80,7 +81,7 @@ def test_a_zero_shifts_one_reading_of_one_test(channel: str) -> None:
         assert isinstance(item.modifier, ReadingModifier)
         item.modifier.apply_to_readings(readings, item.high)
         shifted = np.flatnonzero(readings.zero)
-        assert list(CHANNELS.values())[shifted[0]] == channel and shifted.size == 1
+        assert list(AT)[shifted[0]] == channel and shifted.size == 1
 
 
 def test_a_clock_that_is_late_reads_what_comes_later() -> None:
@@ -129,7 +130,7 @@ def test_a_delayed_channel_reads_what_was_a_moment_before(tolerant: AntennaMachi
     """Against the readings themselves, interpolated, to first order; other channels stay."""
     time = tolerant.experiments[0].time
     plain, late = (tolerant.predict(point, 0) for point in ({}, {'delay:encoder': 0.005}))
-    encoder = list(CHANNELS.values()).index('encoder')
+    encoder = list(AT).index('encoder')
     course = CubicSpline(time, plain[:, encoder])
     second_order = 0.5 * 0.005 ** 2 * np.abs(course(time, 2)).max()
     moving = np.abs(course(time, 1)) > 0.3 * np.abs(course(time, 1)).max()
@@ -142,7 +143,7 @@ def test_a_delayed_channel_reads_what_was_a_moment_before(tolerant: AntennaMachi
 def test_a_slow_clock_reads_later_the_longer_it_runs(tolerant: AntennaMachine) -> None:
     time = tolerant.experiments[0].time
     plain, slow = (tolerant.predict(point, 0) for point in ({}, {'clock_rate:made': 1e-4}))
-    encoder = list(CHANNELS.values()).index('encoder')
+    encoder = list(AT).index('encoder')
     course = CubicSpline(time, plain[:, encoder])
     expected = course(time + 1e-4 * (time - time[0]))
     change = np.abs(expected - plain[:, encoder]).max()

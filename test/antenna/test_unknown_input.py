@@ -5,10 +5,10 @@
 from __future__ import annotations
 
 from antenna_drive.diagnosis.disturbances import DISTURBANCES
-from antenna_drive.diagnosis.field_test import CHANNELS
 from antenna_drive.diagnosis.machine import AntennaMachine
 from antenna_drive.diagnosis.planned_tests import BUILT_IN, planned
 from antenna_drive.parameters import load
+from antenna_drive.readings import SIGNALS
 from antenna_drive.recording.recording import Recording
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def disturbed(place_name: str, strength: float, seed: int) -> AntennaMachine:
     time = model.experiments[0].time
     command = test['test_signal/rate_command']
     signals = {'test_signal/rate_command': np.interp(time, command.time_s, command.values)}
-    signals.update({name: readings[:, c] for c, name in enumerate(CHANNELS)})
+    signals.update({name: readings[:, c] for c, name in enumerate(SIGNALS)})
     recording = Recording.from_arrays(time, signals, sheet=test.sheet)
     return AntennaMachine({'square': recording}, load(), threads=1)
 

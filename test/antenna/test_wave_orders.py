@@ -5,10 +5,10 @@
 from __future__ import annotations
 
 from antenna_drive.diagnosis.catalogue import catalogue
-from antenna_drive.diagnosis.field_test import CHANNELS, CURRENT_1, TACH_1, TACH_2, UNITS
 from antenna_drive.diagnosis.wave_orders import likely_orders
 from antenna_drive.diagnosis.waves import Wave
 from antenna_drive.physics.harmonics import wave
+from antenna_drive.readings import AT, READINGS, SIGNALS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -20,10 +20,10 @@ def experiment(seed: int) -> Experiment:
     """Return a test in which the motors turn to and fro at up to three turns a second."""
     time = np.arange(0.0, 20.0, 0.015)
     random = np.random.default_rng(seed)
-    measured = np.zeros((time.size, len(CHANNELS)))
-    for c in (TACH_1, TACH_2):
+    measured = np.zeros((time.size, len(SIGNALS)))
+    for c in (AT['tach_1'], AT['tach_2']):
         measured[:, c] = 18.0 * np.sin(0.9 * time) + 1e-3 * random.normal(size=time.size)
-    return Experiment('a', time, tuple(CHANNELS.values()), UNITS, measured,
+    return Experiment('a', time, tuple(AT), tuple(reading.unit for reading in READINGS), measured,
                       np.ones_like(measured))
 
 
@@ -34,10 +34,10 @@ def test_planted_wave_is_found_beneath_a_slow_misfit_that_is_louder(order: int,
     test = experiment(seed)
     form = catalogue()['motor_1.torque_ripple'].forms[0]
     assert isinstance(form, Wave)
-    rate = test.measured[:, TACH_1]
+    rate = test.measured[:, AT['tach_1']]
     angle = np.r_[0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(test.time))]
     residual = np.random.default_rng(seed).normal(size=test.measured.shape)
-    residual[:, CURRENT_1] += 2.0 * np.sin(order * angle + 0.3) + 6.0 * np.sign(rate)
+    residual[:, AT['current_1']] += 2.0 * np.sin(order * angle + 0.3) + 6.0 * np.sign(rate)
     assert float(order) in likely_orders(form, [test], [residual], 3)
 
 

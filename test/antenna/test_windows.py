@@ -7,13 +7,14 @@ from __future__ import annotations
 from typing import Any
 
 from antenna_drive.diagnosis.excitation import Bias
-from antenna_drive.diagnosis.field_recording import BIAS, ENCODER, FieldRecording
+from antenna_drive.diagnosis.field_recording import FieldRecording
 from antenna_drive.diagnosis.field_test import FieldTest, prepared, window_of
 from antenna_drive.diagnosis.machine import AntennaMachine, TRUNCATED_S
 from antenna_drive.diagnosis.sheet_settings import as_the_sheet_says
 from antenna_drive.diagnosis.windows import first_window, Window
 from antenna_drive.parameters import load
 from antenna_drive.parameters.sets import changed
+from antenna_drive.readings import AT
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import CircuitBias, FixedStepBias, TestSheet, Triangle
 from field_runs import FAST_TRIANGLE, field_run, NOISE, SLOW_SQUARE
@@ -39,7 +40,7 @@ def misfit(test: FieldTest) -> FloatArray:
     tachometer changes by many standard deviations; such samples are few.
     """
     off = (test.measured - test.simulated(2.5e-3)) / NOISE
-    off[:, ENCODER] -= np.median(off[:, ENCODER])
+    off[:, AT['encoder']] -= np.median(off[:, AT['encoder']])
     return np.asarray(1.4826 * np.nanmedian(np.abs(off), axis=0))
 
 
@@ -68,7 +69,7 @@ def test_an_offset_of_the_encoder_stays_after_a_long_rest() -> None:
     """The drive has not moved: the reading belongs to the angle at which it started."""
     off = changed(DRIVE, {'plant.encoder.offset': 3e-4})
     test, = compared(rec=field_run(off, 50.0, SHEET, start_after=20.0, **SLOW_SINE))
-    shift = test.measured[:, ENCODER] - test.simulated(2.5e-3)[:, ENCODER]
+    shift = test.measured[:, AT['encoder']] - test.simulated(2.5e-3)[:, AT['encoder']]
     assert np.median(shift) == pytest.approx(3e-4, abs=1e-6)
 
 
@@ -98,7 +99,7 @@ def test_a_window_in_the_middle_of_a_motion_agrees_once_it_has_settled() -> None
     # and the waves from the angle at which the simulation follows the recording
     recorded = np.interp(test.time + 75.0, recording['plant/encoder'].time_s,
                          recording['plant/encoder'].values)
-    off = recorded - test.simulated(2.5e-3)[:, ENCODER]
+    off = recorded - test.simulated(2.5e-3)[:, AT['encoder']]
     assert test.start_angle == pytest.approx(np.median(off), abs=1e-6)
 
 
@@ -112,10 +113,10 @@ def stepped(at: float, duration: float) -> Recording:
 def test_a_step_of_the_bias_is_looked_at() -> None:
     recordings = {name: stepped(70.0, 150.0) for name in 'abc'}
     for test in prepared(recordings, DRIVE, lambda note: None):
-        voltage = test.measured[:, BIAS]
+        voltage = test.measured[:, AT['bias_voltage']]
         assert np.count_nonzero(voltage > 5.0) > 0.5 * voltage.size
         assert test.bias.after == pytest.approx(6.0, abs=0.01)
-        shown = test.simulated(2.5e-3)[:, BIAS]
+        shown = test.simulated(2.5e-3)[:, AT['bias_voltage']]
         assert np.abs(shown - voltage).max() < 0.1
 
 
@@ -148,8 +149,8 @@ def test_a_step_in_the_sheet_is_shifted_with_the_window() -> None:
     sheet = TestSheet(circuit='new', filter_1='new', bias=FixedStepBias(6.0, 70.0))
     recording = stepped(70.0, 150.0)
     test = compared(**{name: Recording(recording.channels, sheet=sheet) for name in 'abc'})[0]
-    seen = test.measured[:, BIAS] > 3.0
-    assert np.array_equal(seen, test.simulated(2.5e-3)[:, BIAS] > 3.0)
+    seen = test.measured[:, AT['bias_voltage']] > 3.0
+    assert np.array_equal(seen, test.simulated(2.5e-3)[:, AT['bias_voltage']] > 3.0)
 
 
 @pytest.mark.parametrize('signal, repeats', [

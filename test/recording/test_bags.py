@@ -387,7 +387,7 @@ def test_what_is_no_bag_is_refused(tmp_path: Path) -> None:
 
 def test_negative_time_stamps_are_refused_before_anything_is_written(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match='-0.5 s is negative'):
-        write_bag(some_recording(10).shift(-0.5), tmp_path / 'run')
+        write_bag(some_recording(10).shift_ns(-500_000_000), tmp_path / 'run')
     assert list(tmp_path.iterdir()) == []
 
 

@@ -11,7 +11,8 @@ import struct
 import tempfile
 import warnings
 
-from antenna_drive.recording.csv_format import FIELD_COLUMNS, meta_path, read_csv, write_csv
+from antenna_drive.readings import FIELD_COLUMNS
+from antenna_drive.recording.csv_format import meta_path, read_csv, write_csv
 from antenna_drive.recording.recording import Change, Recording
 from antenna_drive.recording.sheet import parse_sheet
 from hypothesis import given, strategies as st

@@ -9,9 +9,9 @@ import math
 from pathlib import Path
 
 from antenna_drive.cli import main
+from antenna_drive.readings import FIELD_COLUMNS
 from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.bag_writer import write_bag
-from antenna_drive.recording.csv_format import FIELD_COLUMNS
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import parse_sheet
 import numpy as np

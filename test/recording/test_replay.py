@@ -14,9 +14,10 @@ from antenna_drive.cli import main
 from antenna_drive.emulator.run import Emulator
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.sets import Drive
+from antenna_drive.readings import FIELD_COLUMNS
 from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.bag_writer import write_bag
-from antenna_drive.recording.csv_format import FIELD_COLUMNS, write_csv
+from antenna_drive.recording.csv_format import write_csv
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.replay import command_table, distances, of_sheet, twin
 from antenna_drive.recording.runs import from_run

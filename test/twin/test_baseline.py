@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from antenna_drive.emulator.batch import CHANNELS
 from antenna_drive.emulator.unit import FloatArray
+from antenna_drive.readings import SIGNALS
 from antenna_drive.twin.baseline import (
     Baseline, regressors, SCORES, shift_of, SignalBaseline, SignalBlock,
 )
@@ -21,14 +21,14 @@ def quiet_record(course: FloatArray, seed: int = 5) -> Baseline:
     random = np.random.default_rng(seed)
     time = np.arange(len(course)) / 200.0
     samples = {name: (time, course[:, k] + 0.01 * random.standard_normal(time.size))
-               for k, name in enumerate(CHANNELS)}
+               for k, name in enumerate(SIGNALS)}
     return learn(Track(time, course, course, np.sin(time), 0.01, samples), 5.0)
 
 
 def sines(count: int = 22000) -> FloatArray:
     """Return a course in which every signal moves."""
     time = np.arange(count) / 200.0
-    return np.stack([np.sin((k + 1.3) * time) for k in range(len(CHANNELS))], axis=1)
+    return np.stack([np.sin((k + 1.3) * time) for k in range(len(SIGNALS))], axis=1)
 
 
 def test_jumps_between_samples_are_no_gap() -> None:
@@ -38,7 +38,7 @@ def test_jumps_between_samples_are_no_gap() -> None:
     ahead = random.uniform(-0.008, 0.008, 120)
     samples = {name: (time, np.sin((k + 1.3) * (time + ahead[time.astype(int)]))
                       + 0.01 * random.standard_normal(time.size))
-               for k, name in enumerate(CHANNELS)}
+               for k, name in enumerate(SIGNALS)}
 
     def learned(spacing: float) -> Baseline:
         return learn(Track(time, course, course, np.sin(time), spacing, samples), 5.0)
@@ -54,7 +54,7 @@ def test_clocks_that_drift_apart_are_followed() -> None:
     time = np.arange(len(course)) / 200.0
     samples = {name: (time, np.sin((k + 1.3) * time * (1.0 + 3e-4))
                       + 0.01 * random.standard_normal(time.size))
-               for k, name in enumerate(CHANNELS)}
+               for k, name in enumerate(SIGNALS)}
     learned = learn(Track(time, course, course, np.sin(time), 0.01, samples), 5.0)
     for name in ('motor_1/tach_rate', 'motor_2/tach_rate'):
         item = learned.signals[name]
@@ -94,9 +94,9 @@ def test_record_without_enough_samples_judges_nothing() -> None:
 def test_rounding_of_a_constant_signal_has_nothing_to_say() -> None:
     course = sines()
     # a source of constant voltage: the last digit flickers, and so does the slope
-    course[:, CHANNELS.index(BIAS)] = 7.5 + 1e-15 * (np.arange(len(course)) % 7)
+    course[:, SIGNALS.index(BIAS)] = 7.5 + 1e-15 * (np.arange(len(course)) % 7)
     baseline = quiet_record(course)
-    slope = 1 + len(CHANNELS) + CHANNELS.index(BIAS)
+    slope = 1 + len(SIGNALS) + SIGNALS.index(BIAS)
     for name, item in baseline.signals.items():
         assert item.coefficients[slope] == 0.0, name
         assert np.count_nonzero(item.coefficients) > 10

@@ -11,10 +11,11 @@ from typing import Any
 
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.sets import Drive
+from antenna_drive.readings import RATE_COMMAND
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import TestSheet
 from antenna_drive.twin.growing import FIRST_S, GrowingVerdict, look_of
-from antenna_drive.twin.intake import COMMAND, Intake
+from antenna_drive.twin.intake import Intake
 from antenna_drive.workers import worker_processes
 from later import Later
 import numpy as np
@@ -25,8 +26,8 @@ from worker_tasks import lengths_found
 
 
 def test_of(seconds: float) -> Recording:
-    return Recording({COMMAND: make_channel(
-        COMMAND, 'rad/s', np.array([0, round(seconds * 1e9)]), np.zeros(2))})
+    return Recording({RATE_COMMAND: make_channel(
+        RATE_COMMAND, 'rad/s', np.array([0, round(seconds * 1e9)]), np.zeros(2))})
 
 
 test_of.__test__ = False  # type: ignore[attr-defined]
@@ -118,7 +119,7 @@ def test_probabilities_of_a_look_are_those_of_the_diagnosis() -> None:
 def test_a_look_in_another_process_gets_what_the_drive_has_sent() -> None:
     intake = Intake(60.0)
     for k in range(2001):
-        intake.put(COMMAND, k * 10_000_000, 1e-3)
+        intake.put(RATE_COMMAND, k * 10_000_000, 1e-3)
     with worker_processes(1) as executor:
         growing = GrowingVerdict(executor, load(), diagnose=lengths_found)
         assert growing.due(intake.span_s())

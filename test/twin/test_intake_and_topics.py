@@ -5,8 +5,9 @@
 import math
 from pathlib import Path
 
+from antenna_drive.readings import RATE_COMMAND
 from antenna_drive.recording.sheet import TestSheet as Sheet
-from antenna_drive.twin.intake import COMMAND, Intake
+from antenna_drive.twin.intake import Intake
 from antenna_drive.twin.topics import load_topics, own_topics
 import pytest
 from simgap.errors import UserError
@@ -31,12 +32,12 @@ def test_rubbish_is_counted_by_name_and_left_out() -> None:
 
 def test_jump_of_time_and_a_hole_begin_another_stretch() -> None:
     intake = Intake()
-    intake.put(COMMAND, 10 * 10**9, 0.0)
+    intake.put(RATE_COMMAND, 10 * 10**9, 0.0)
     intake.put(TACH, 10 * 10**9, 0.0)
-    intake.put(COMMAND, 2 * 10**9, 0.0)
+    intake.put(RATE_COMMAND, 2 * 10**9, 0.0)
     assert intake.stretch == 1
     assert intake.jumps == ['the time jumped back by 8 s']
-    intake.put(COMMAND, 3 * 10**9, 0.0)
+    intake.put(RATE_COMMAND, 3 * 10**9, 0.0)
     assert intake.stretch == 2
     assert 'no test_signal/rate_command for 1 s' in intake.jumps[1]
     # a reading that is missing for a while is told, but nothing begins anew
@@ -48,16 +49,16 @@ def test_jump_of_time_and_a_hole_begin_another_stretch() -> None:
 def test_last_minutes_are_kept_and_make_a_recording() -> None:
     intake = Intake(keep_s=10.0)
     for k in range(3000):
-        intake.put(COMMAND, k * 10**7, 1e-4)
+        intake.put(RATE_COMMAND, k * 10**7, 1e-4)
         intake.put(TACH, k * 10**7 + 1000, float(k))
         if k % 100 == 99:
-            intake.new(COMMAND)
+            intake.new(RATE_COMMAND)
             intake.new(TACH)
             intake.forget()
     recording = intake.recording(Sheet())
     assert 10.0 <= (recording[TACH].time_ns[-1] - recording[TACH].time_ns[0]) / 1e9 <= 20.0
     assert recording[TACH].values[-1] == 2999.0
-    assert recording[COMMAND].time_ns[0] == 0
+    assert recording[RATE_COMMAND].time_ns[0] == 0
 
 
 def write(tmp_path: Path, text: str) -> Path:
@@ -79,7 +80,7 @@ signals:
     samples = topics.read(topic, (2500.0, 180.0, 200.0, 1.0), 7, 8)
     assert {stamp for _, stamp, _ in samples} == {3_500_000_000}
     assert {name: value for name, _, value in samples} == pytest.approx({
-        COMMAND: -math.pi * 1e-3, 'motor_1/ammeter': 0.11, 'motor_2/ammeter': 201.0})
+        RATE_COMMAND: -math.pi * 1e-3, 'motor_1/ammeter': 0.11, 'motor_2/ammeter': 201.0})
     short = topics.read(topic, (2500.0, 180.0), 7, 8)
     assert [name for name, _, value in short if math.isnan(value)] == [
         'motor_1/ammeter', 'motor_2/ammeter']
@@ -91,8 +92,8 @@ def test_own_topics_are_those_of_a_drive_in_a_namespace() -> None:
     assert {topic.name for topic in topics.topics} > {
         '/elevation/test_signal/rate_command', '/elevation/plant/encoder'}
     topic = topics.topics[0]
-    assert topics.read(topic, (0.5,), 7, 8) == [(COMMAND, 7, 0.5)]
-    assert {item.name for item in own_topics().topics} > {COMMAND}
+    assert topics.read(topic, (0.5,), 7, 8) == [(RATE_COMMAND, 7, 0.5)]
+    assert {item.name for item in own_topics().topics} > {RATE_COMMAND}
 
 
 @pytest.mark.parametrize(('text', 'said'), [

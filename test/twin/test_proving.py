@@ -8,16 +8,16 @@ from collections.abc import Mapping
 from typing import Any
 
 from antenna_drive.parameters.sets import Drive
+from antenna_drive.readings import RATE_COMMAND
 from antenna_drive.recording.recording import Recording
 from antenna_drive.twin import proving
-from antenna_drive.twin.intake import COMMAND
 from lab.cli.twin_trial import of_verdicts
 import numpy as np
 import pytest
 from simgap.logs.channel import make_channel
 
-TEST = Recording({COMMAND: make_channel(
-    COMMAND, 'rad/s', np.arange(0, 31) * 1_000_000_000, np.zeros(31))})
+TEST = Recording({RATE_COMMAND: make_channel(
+    RATE_COMMAND, 'rad/s', np.arange(0, 31) * 1_000_000_000, np.zeros(31))})
 GAP = ('motor_1.coulomb_friction',)
 
 
@@ -33,7 +33,7 @@ def test_tests_grow_until_the_rule_stops_and_are_looked_at_whole(
     given: list[list[float]] = []
 
     def diagnosed(there: Mapping[str, Recording], drive: Drive) -> dict[str, Any]:
-        given.append([float(item[COMMAND].time_ns[-1]) / 1e9 for item in there.values()])
+        given.append([float(item[RATE_COMMAND].time_ns[-1]) / 1e9 for item in there.values()])
         return answer(GAP, 0.95 if len(given) > 1 else 0.6)
 
     monkeypatch.setattr(proving, 'diagnosed', diagnosed)

@@ -5,7 +5,7 @@
 from antenna_drive.emulator.run import simulate
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.sets import changed
-from antenna_drive.twin.intake import COMMAND
+from antenna_drive.readings import RATE_COMMAND
 from antenna_drive.twin.shadow import AHEAD, Shadow
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def test_shadow_of_an_emulated_drive_is_that_drive(piece: int) -> None:
                              'test_signal.rate.amplitude': 0.001,
                              'test_signal.rate.period': 0.9})
     run = simulate(drive, 2.0)
-    stamps, values = (run.time * 1e9).round().astype(np.int64), run[COMMAND]
+    stamps, values = (run.time * 1e9).round().astype(np.int64), run[RATE_COMMAND]
     shadow = Shadow(load())
     grids, samples = [], []
     for first in range(0, len(stamps), piece):

@@ -10,7 +10,7 @@ from typing import Any
 
 from antenna_drive.diagnosis.tuned import tuned
 from antenna_drive.parameters.loading import load
-from antenna_drive.recording.csv_format import FIELD_COLUMNS
+from antenna_drive.readings import FIELD_COLUMNS
 from antenna_drive.recording.sheet import parse_sheet
 from antenna_drive.twin import watch
 from antenna_drive.twin.baseline import Baseline
