@@ -150,8 +150,8 @@ def _earlier(path: Path | None) -> Sequence[Rival]:
 def _report(path: str | None, diagnosis: Diagnosis) -> None:
     """Write the page about a diagnosis, if one was asked for."""
     if path:
-        from simgap.report.render import render
         from simgap.report.page import contents
+        from simgap.report.render import render
         with replaced(Path(path)) as stream:
             stream.write(render('verdict.html', **vars(contents(diagnosis))).encode())
 

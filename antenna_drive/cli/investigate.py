@@ -90,9 +90,9 @@ def run(arguments: argparse.Namespace) -> int:
     )
     from antenna_drive.diagnosis.planned_tests import BUILT_IN
     from antenna_drive.diagnosis.sensors import SensorModel
-    from simgap.report.render import render
     from antenna_drive.parameters.loading import load
     from antenna_drive.recording.sheet import load_sheet
+    from simgap.report.render import render
     drive = load(*arguments.config)
     limits = (read_limits(arguments.limits, drive) if arguments.limits
               else DriveLimits.of_drive(drive))

@@ -19,8 +19,8 @@ from pathlib import Path
 import time
 from typing import Any
 
-from antenna_drive.workers.processes import expect_overflow
 from antenna_drive.workers.tasks import Result, TaskLost, Workers
+from simgap.command.programs import expect_overflow
 from simgap.errors import UserError
 
 # How long a scheduler may take to answer, and may be without any worker [s].

@@ -9,8 +9,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from lab.cli import main
-from lab.cli import twin_trial
+from lab.cli import main, twin_trial
 from lab.trials import batch
 from lab.trials.results import FILE, TrialResults
 import pytest
