@@ -16,8 +16,8 @@ import pytest
 
 pytest.importorskip('rclpy', reason='there is no ROS 2 here')
 
-from antenna_drive.lockstep.leaving import leave  # noqa: E402
-from lab.cli import main  # noqa: E402, I100
+from antenna_drive.lockstep.leaving import leave  # noqa: E402, I100
+from lab.cli import main  # noqa: E402
 import rclpy  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
