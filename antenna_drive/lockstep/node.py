@@ -13,8 +13,9 @@ from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.lockstep import compiled_loop, ros_parameters
 from antenna_drive.lockstep.changes import CHANGES, write_record
 from antenna_drive.lockstep.compiled_unit import form_of
+from antenna_drive.lockstep.conductor import Conductor
 from antenna_drive.lockstep.exchange import BRIEF_WAIT_S, compile_ahead, Exchange
-from antenna_drive.lockstep.member import Conductor, Member
+from antenna_drive.lockstep.member import Member
 from antenna_drive.lockstep.pace import LEAD_S, Pace
 from antenna_drive.lockstep.partner import ANSWER, HOLD, ON_MISS, PartnerUnit
 from antenna_drive.lockstep.partner_link import Answer, PartnerLink
