@@ -25,7 +25,7 @@ from simgap.errors import UserError
 if TYPE_CHECKING:
     from antenna_drive.emulator.unit import Unit
     from antenna_drive.emulator.wiring import Wiring
-    from antenna_drive.lockstep.node import ReadSheet
+    from antenna_drive.lockstep.node_parameters import ReadSheet
     from rclpy.node import Node
     from simgap.inputs.schema import Value
 
@@ -269,7 +269,8 @@ def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], wiring: str,
           ending: _Ending, read_sheet: ReadSheet | None) -> None:
     from antenna_drive.emulator.wiring import find
     from antenna_drive.lockstep.getting_ready import told_while_compiling
-    from antenna_drive.lockstep.node import DriveNode, OWN_PARAMETERS
+    from antenna_drive.lockstep.node import DriveNode
+    from antenna_drive.lockstep.node_parameters import OWN_PARAMETERS
     from antenna_drive.lockstep.ros_parameters import Overrides
 
     overrides = Overrides(node)
