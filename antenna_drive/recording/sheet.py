@@ -16,7 +16,7 @@ import math
 from pathlib import Path
 from typing import Any, ClassVar, get_args, get_type_hints
 
-from antenna_drive.parameters.sets import KNOTS_LIMIT, SINES_LIMIT
+from antenna_drive.parameters.waveforms import KNOTS_LIMIT, SINES_LIMIT
 from simgap.errors import one_line
 from simgap.inputs.labels import parse_labels, plain_value
 from simgap.inputs.plain_yaml import read_yaml

@@ -9,7 +9,6 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 import os
 import signal
-import warnings
 
 from simgap.command.programs import end_with_parent, expect_overflow
 
