@@ -156,7 +156,8 @@ def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None,
     end_with_starter()
 
     def act(arguments: list[str]) -> int:
-        _run_node(default_name, make, arguments, fed_by_topic, wiring, ending, read_sheet)
+        with ros_node(default_name, arguments, "config:=\"['old_circuit']\"") as node:
+            _spin(node, make, fed_by_topic, wiring, ending, read_sheet)
         # The node has left the graph. What the interpreter and the compiler would still tidy up
         # takes seconds on a busy machine, and a node must be gone within two.
         sys.stdout.flush()
@@ -256,13 +257,6 @@ def stopped_by_signals() -> Event:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, frame: stop.set())
     return stop
-
-
-def _run_node(default_name: str, make: MakeUnit, arguments: list[str],
-              fed_by_topic: Sequence[str], wiring: str, ending: _Ending,
-              read_sheet: ReadSheet | None) -> None:
-    with ros_node(default_name, arguments, "config:=\"['old_circuit']\"") as node:
-        _spin(node, make, fed_by_topic, wiring, ending, read_sheet)
 
 
 def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], wiring: str,
