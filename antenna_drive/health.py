@@ -25,6 +25,7 @@ import time
 from typing import Any
 
 from antenna_drive import __version__
+import simgap
 from simgap.command.remedies import REMEDIES, ROS_REMEDY
 from simgap.errors import one_line
 
@@ -62,6 +63,8 @@ def _machine() -> Iterator[Finding]:
     memory = os.sysconf('SC_PHYS_PAGES') * os.sysconf('SC_PAGE_SIZE') / 2**30
     yield Finding('machine', 'system', OK, f'{platform.system()} {platform.machine()}, '
                                            f'{os.cpu_count()} cores, {memory:.0f} GB')
+    yield Finding('machine', 'engine', OK,
+                  f'simgap {simgap.__version__}, {Path(simgap.__file__).parent}')
     program = shutil.which('antenna-drive')
     if program is None:
         yield Finding('machine', 'antenna-drive', NOTE, 'not on PATH',

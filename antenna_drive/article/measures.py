@@ -202,10 +202,9 @@ def article_measures(drive: Drive) -> dict[str, Measure]:
     """
     ratio, most = drive.plant.axis.gear_ratio, drive.motor_1.motor.current_limit
     degrees = 180.0 / math.pi
-    square = {'period': SQUARE['period']}
     whole_periods = {'after': SQUARE['period']}
-    plateau = {**square, 'window': PLATEAU}
-    calm = {**square, 'window': CALM}
+    plateau = {'period': SQUARE['period'], 'window': PLATEAU}
+    calm = {'period': SQUARE['period'], 'window': CALM}
     tachs = {'motor_1/tach_rate': 0.5, 'motor_2/tach_rate': 0.5}
     bias = {'motor_2/current': 100.0 / most, 'motor_1/current': -100.0 / most}
     voltage = {'torque_share/bias_voltage': 1.0}

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import count
 import math
 from typing import Any
 
@@ -77,48 +78,46 @@ def report(problem: CalibrationProblem, found: SearchResult, trade_offs: Sequenc
     for figure in trade_offs:
         if figure not in known:
             raise ParameterError(f'--trade-off {figure}: no such target{nearest(figure, known)}')
-    best = found.best
-    size = len(problem.free)
-    total = 2 * size + size * len(_PROFILE)
-    done = 0
+    best, size = found.best, len(problem.free)
+    total, done = 2 * size + size * len(_PROFILE), count(1)
 
     def evaluated(shares: FloatArray) -> Any:
-        nonlocal done
         evaluation = problem.evaluate([float(share) for share in shares])
-        done += 1
         if progress:
-            progress(done / total)
+            progress(next(done) / total)
         return evaluation
 
     local = _slopes(problem, best, evaluated)
     conditional, marginal, correlation, flat = _uncertainties(local)
-    parameters = []
-    for i, item in enumerate(problem.free):
-        value = item.at(best.shares[i])
-        parameters.append({
-            'name': item.name, 'unit': item.unit, 'value': value,
-            'conditional': _spread(item, best.shares[i], conditional[i]),
-            'marginal': _spread(item, best.shares[i], marginal[i]),
-            'determined': bool(marginal[i] <= _DETERMINED),
-            'at_bound': bool(min(best.shares[i], 1.0 - best.shares[i]) < 0.01),
-            'profile': _profile(item, i, best, local, evaluated),
-        })
-    names = [item.name for item in problem.free]
     return {
         'cost': best.evaluation.cost,
         'start_cost': found.candidates[0].evaluation.cost,
         'candidates': len(found.candidates) - 1,
         'targets': _targets(problem, best, found.candidates[0]),
-        'parameters': parameters,
-        'correlations': [
-            {'first': names[i], 'second': names[j], 'correlation': correlation[i, j]}
-            for i in range(size) for j in range(i) if abs(correlation[i, j]) >= _CORRELATED],
-        'flat_directions': [
-            {names[i]: float(direction[i]) for i in np.argsort(-np.abs(direction))[:4]}
-            for direction in flat],
+        'parameters': [
+            {'name': item.name, 'unit': item.unit, 'value': item.at(share),
+             'conditional': _spread(item, share, conditional[i]),
+             'marginal': _spread(item, share, marginal[i]),
+             'determined': bool(marginal[i] <= _DETERMINED),
+             'at_bound': bool(min(share, 1.0 - share) < 0.01),
+             'profile': _profile(item, i, best, local, evaluated)}
+            for i, (item, share) in enumerate(zip(problem.free, best.shares, strict=True))],
+        **_common([item.name for item in problem.free], correlation, flat),
         'trade_offs': {figure: _trade_off(problem, (*found.candidates, *also), figure)
                        for figure in trade_offs},
     }
+
+
+def _common(names: Sequence[str], correlation: FloatArray, flat: FloatArray) -> dict[str, Any]:
+    """Return which parameters are correlated, and which combinations the targets do not see."""
+    return {
+        'correlations': [
+            {'first': names[i], 'second': names[j], 'correlation': correlation[i, j]}
+            for i in range(len(names)) for j in range(i)
+            if abs(correlation[i, j]) >= _CORRELATED],
+        'flat_directions': [
+            {names[i]: float(direction[i]) for i in np.argsort(-np.abs(direction))[:4]}
+            for direction in flat]}
 
 
 def _targets(problem: CalibrationProblem, best: FitCandidate, start: FitCandidate,

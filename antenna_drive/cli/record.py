@@ -95,10 +95,8 @@ def record_drive(parameters: Mapping[str, Mapping[str, Any]], config: Sequence[s
         for the bag
     duration, step_s
         simulated time and macro-step [s]
-    pace
-        times real time; 0 for as fast as possible
-    quiet
-        show no progress
+    pace, quiet
+        times real time, 0 for as fast as possible; and whether to show no progress
 
     Returns
     -------

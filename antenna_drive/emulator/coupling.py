@@ -31,6 +31,8 @@ class Coupling:
 
     Attributes
     ----------
+    table, blocks : an expression for each signal of the source, and the blocks, by name
+    u : the NAME of the u_NAME that a block reads
     functions : what the text calls, by name
     inputs : the number of inputs in each u_NAME
 
@@ -38,19 +40,19 @@ class Coupling:
 
     def __init__(self, wiring: Wiring, table: Mapping[str, str]) -> None:
         """Lay out states and modes; `table` has an expression for each signal of the source."""
-        self._table = table
-        self._blocks = blocks(wiring)
-        self._sources = {name: wiring.units[name].sources for name in self._blocks}
+        self.table = table
+        self.blocks = blocks(wiring)
+        self._sources = {name: wiring.units[name].sources for name in self.blocks}
         # blocks that are fed alike share their inputs
-        self._u = {name: next(other for other, fed in self._sources.items() if fed == own)
-                   for name, own in self._sources.items()}
-        self.inputs = {name: len(self._sources[name]) for name in dict.fromkeys(self._u.values())}
+        self.u = {name: next(other for other, fed in self._sources.items() if fed == own)
+                  for name, own in self._sources.items()}
+        self.inputs = {name: len(self._sources[name]) for name in dict.fromkeys(self.u.values())}
         self.functions = {f'{kind}_{name}': getattr(block, kind)
-                          for name, block in self._blocks.items()
+                          for name, block in self.blocks.items()
                           for kind in ('start', 'rates', 'switch', 'read') if getattr(block, kind)}
         # a block whose number of states depends on its parameters comes last
-        order = sorted(self._blocks, key=lambda name: self._blocks[name].more_states is not None)
-        if sum(block.more_states is not None for block in self._blocks.values()) > 1:
+        order = sorted(self.blocks, key=lambda name: self.blocks[name].more_states is not None)
+        if sum(block.more_states is not None for block in self.blocks.values()) > 1:
             raise UserError(f'{", ".join(order[-2:])}: only one block of a drive may have a '
                             'number of states that depends on its parameters')
         self._x: dict[str, str] = {}
@@ -58,7 +60,7 @@ class Coupling:
         self._state: dict[str, int] = {}
         state = mode = 0
         for name in order:
-            block, self._state[name] = self._blocks[name], state
+            block, self._state[name] = self.blocks[name], state
             end = '' if block.more_states else state + len(block.states)
             self._x[name] = f'x[{state}:{end}]'
             self._mode[name] = f'mode[{mode}:{mode + len(block.modes)}]'
@@ -68,20 +70,20 @@ class Coupling:
     def start(self) -> str:
         """Return the text that starts every block; x and mode are zero before."""
         return _lines([f'start_{name}(p[0].{name}, {self._x[name]}, {self._mode[name]})'
-                       for name in self._blocks])
+                       for name in self.blocks])
 
     def rates(self) -> str:
         """Return the text that writes all derivatives."""
         return self._text(
-            self._blocks, lambda name: [self._call('rates', name, f'd{self._x[name]}')],
+            self.blocks, lambda name: [self.call('rates', name, f'd{self._x[name]}')],
             derivatives=True)
 
     def switch(self) -> str:
         """Return the text that tells whether a mode has to change, and changes those that do."""
-        names = [name for name, block in self._blocks.items() if block.switch]
+        names = [name for name, block in self.blocks.items() if block.switch]
         return self._text(names, lambda name: [
             'if changed and not commit:', '    return True',
-            f'changed |= {self._call("switch", name, "commit")}'])
+            f'changed |= {self.call("switch", name, "commit")}'])
 
     def sample(self, channels: tuple[str, ...]) -> str:
         """Return the text that reads outputs, and values of states, into the rows of out."""
@@ -89,21 +91,21 @@ class Coupling:
         states: list[str] = []
         for row, channel in enumerate(channels):
             name, _, output = channel.partition('/')
-            if any(signal.name == output for signal in self._blocks[name].outputs):
+            if any(signal.name == output for signal in self.blocks[name].outputs):
                 wanted.setdefault(name, []).append((row, output))
             else:
-                states.append(f'out[{row}, 0] = x[{self._place(name, output)}]')
+                states.append(f'out[{row}, 0] = x[{self.place(name, output)}]')
 
         def read(name: str) -> list[str]:
-            rows = [signal.name for signal in self._blocks[name].outputs]
-            return [f'read_{name}({self._x[name]}, {self._mode[name]}, u_{self._u[name]}, 0.0, '
+            rows = [signal.name for signal in self.blocks[name].outputs]
+            return [f'read_{name}({self._x[name]}, {self._mode[name]}, u_{self.u[name]}, 0.0, '
                     f'p.{name}, y)', *(f'out[{row}, {n}] = y[{rows.index(output)}, {n}]'
                                        for row, output in wanted[name] for n in range(2))]
 
         return _lines([self._text(wanted, read, slopes=False), *states])
 
-    def _call(self, function: str, name: str, *more: str) -> str:
-        own = (self._x[name], self._mode[name], f'u_{self._u[name]}', f'p.{name}')
+    def call(self, function: str, name: str, *more: str) -> str:
+        own = (self._x[name], self._mode[name], f'u_{self.u[name]}', f'p.{name}')
         return f'{function}_{name}(0.0, {", ".join((*own, *more))})'
 
     def _text(self, names: Collection[str], act: Callable[[str], list[str]],
@@ -114,60 +116,11 @@ class Coupling:
         `derivatives` says that a block that has acted has written its derivatives, `slopes` that
         it uses those of its inputs.
         """
-        filled: dict[_Place, _Source] = {}
-        acted: set[str] = set()
-
-        def fill(places: Collection[_Place], by_equation: bool, above: tuple[_Place, ...] = (),
-                 ) -> list[str] | None:
-            """Return what fills these inputs, None if one of them cannot be filled yet."""
-            text: list[str] = []
-            for place in places:
-                if place in filled:
-                    continue
-                right = None if place in above else value(self._source(place), by_equation,
-                                                          (*above, place))
-                if right is None:
-                    return None
-                text += right[:-1]
-                if right[-1]:
-                    text.append(f'u_{place[0]}[{place[1]}, {place[2]}] = {right[-1]}')
-            return text
-
-        def value(source: _Source, by_equation: bool, above: tuple[_Place, ...],
-                  ) -> list[str] | None:
-            """Return what is to be done first, then an expression, '' for what stays zero."""
-            signal, column = source
-            if signal in self._table:
-                return [self._table[signal]] if column == 0 else None
-            for (name, row, _), known in filled.items():
-                if known == source:
-                    return [f'u_{name}[{row}, {column}]']
-            name, _, output = signal.partition('/')
-            block = self._blocks[name]
-            is_state = output in block.states._fields
-            if is_state and column == 0:
-                return [f'x[{self._place(name, output)}]']
-            equations = block.slopes if column else block.values
-            equation = equations.get(output)
-            if output in equations and equation is None:
-                return ['']
-            rate_of = output if is_state else equation.rate_of if equation else ''
-            if rate_of and name in acted:
-                return [f'dx[{self._place(name, rate_of)}]']
-            if equation is None or not by_equation:
-                return None
-            first = fill([(self._u[name], block.inputs._fields.index(item), 0)
-                          for item in equation.feedthrough], by_equation, above)
-            if first is None:
-                return None
-            function = f'{"slope" if column else "value"}_{output}'
-            self.functions[f'{function}_{name}'] = equation.function
-            return [*first, self._call(function, name)]
-
+        inputs = _Inputs(self)
         text: list[str] = []
-        waiting = {name: self._needed(name, slopes) for name in self._blocks if name in names}
+        waiting = {name: self._needed(name, slopes) for name in self.blocks if name in names}
         while waiting:
-            ways = ((name, fill(needed, by_equation))
+            ways = ((name, inputs.fill(needed, by_equation))
                     for by_equation in ((False, True) if derivatives else (True,))
                     for name, needed in waiting.items())
             name, lines = next(((name, lines) for name, lines in ways if lines is not None),
@@ -175,24 +128,80 @@ class Coupling:
             if not name:
                 raise UserError(f'{", ".join(waiting)}: feed each other in a loop without a '
                                 'state in it, or by an output without an Equation')
-            filled.update((place, self._source(place)) for place in waiting.pop(name))
+            inputs.filled.update((place, self.source(place)) for place in waiting.pop(name))
             text += [*lines, *act(name)]
             if derivatives:
-                acted.add(name)
+                inputs.acted.add(name)
         return _lines(text)
 
     def _needed(self, name: str, slopes: bool) -> list[_Place]:
-        inputs = self._blocks[name].inputs._fields
-        used = self._blocks[name].slopes_used if slopes else ()
-        return [*((self._u[name], row, 0) for row in range(len(inputs))),
-                *((self._u[name], inputs.index(item), 1) for item in used)]
+        inputs = self.blocks[name].inputs._fields
+        used = self.blocks[name].slopes_used if slopes else ()
+        return [*((self.u[name], row, 0) for row in range(len(inputs))),
+                *((self.u[name], inputs.index(item), 1) for item in used)]
 
-    def _source(self, place: _Place) -> _Source:
+    def source(self, place: _Place) -> _Source:
         name, row, column = place
         return self._sources[name][row], column
 
-    def _place(self, name: str, state: str) -> int:
-        return self._state[name] + int(getattr(self._blocks[name].states, state))
+    def place(self, name: str, state: str) -> int:
+        return self._state[name] + int(getattr(self.blocks[name].states, state))
+
+
+class _Inputs:
+    """The inputs of a coupling that are filled so far, and the blocks that have acted."""
+
+    def __init__(self, coupling: Coupling) -> None:
+        self.filled: dict[_Place, _Source] = {}
+        self.acted: set[str] = set()
+        self._of = coupling
+
+    def fill(self, places: Collection[_Place], by_equation: bool, above: tuple[_Place, ...] = (),
+             ) -> list[str] | None:
+        """Return what fills these inputs, None if one of them cannot be filled yet."""
+        text: list[str] = []
+        for place in places:
+            if place in self.filled:
+                continue
+            right = None if place in above else self._value(
+                self._of.source(place), by_equation, (*above, place))
+            if right is None:
+                return None
+            text += right[:-1]
+            if right[-1]:
+                text.append(f'u_{place[0]}[{place[1]}, {place[2]}] = {right[-1]}')
+        return text
+
+    def _value(self, source: _Source, by_equation: bool, above: tuple[_Place, ...],
+               ) -> list[str] | None:
+        """Return what is to be done first, then an expression, '' for what stays zero."""
+        of, (signal, column) = self._of, source
+        if signal in of.table:
+            return [of.table[signal]] if column == 0 else None
+        for (name, row, _), known in self.filled.items():
+            if known == source:
+                return [f'u_{name}[{row}, {column}]']
+        name, _, output = signal.partition('/')
+        block = of.blocks[name]
+        is_state = output in block.states._fields
+        if is_state and column == 0:
+            return [f'x[{of.place(name, output)}]']
+        equations = block.slopes if column else block.values
+        equation = equations.get(output)
+        if output in equations and equation is None:
+            return ['']
+        rate_of = output if is_state else equation.rate_of if equation else ''
+        if rate_of and name in self.acted:
+            return [f'dx[{of.place(name, rate_of)}]']
+        if equation is None or not by_equation:
+            return None
+        first = self.fill([(of.u[name], block.inputs._fields.index(item), 0)
+                           for item in equation.feedthrough], by_equation, above)
+        if first is None:
+            return None
+        function = f'{"slope" if column else "value"}_{output}'
+        of.functions[f'{function}_{name}'] = equation.function
+        return [*first, of.call(function, name)]
 
 
 def _lines(lines: Sequence[str]) -> str:

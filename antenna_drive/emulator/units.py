@@ -15,7 +15,8 @@ from antenna_drive.emulator.unit import FloatArray, Unit
 from antenna_drive.emulator.wiring import DRIVE, Wired, Wiring
 from antenna_drive.parameters.loading import check_waveform
 from antenna_drive.parameters.records import record_of
-from antenna_drive.parameters.sets import changed, Drive, TestSignal, values
+from antenna_drive.parameters.sets import changed, Drive, values
+from antenna_drive.parameters.waveforms import TestSignal
 from antenna_drive.physics import signal_generator
 from antenna_drive.physics.block import Block, Source
 from antenna_drive.physics.integrator import work_space

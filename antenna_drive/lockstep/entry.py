@@ -25,7 +25,7 @@ from simgap.errors import UserError
 if TYPE_CHECKING:
     from antenna_drive.emulator.unit import Unit
     from antenna_drive.emulator.wiring import Wiring
-    from antenna_drive.lockstep.node import ReadSheet
+    from antenna_drive.lockstep.node_parameters import ReadSheet
     from rclpy.node import Node
     from simgap.inputs.schema import Value
 
@@ -156,7 +156,8 @@ def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None,
     end_with_starter()
 
     def act(arguments: list[str]) -> int:
-        _run_node(default_name, make, arguments, fed_by_topic, wiring, ending, read_sheet)
+        with ros_node(default_name, arguments, "config:=\"['old_circuit']\"") as node:
+            _spin(node, make, fed_by_topic, wiring, ending, read_sheet)
         # The node has left the graph. What the interpreter and the compiler would still tidy up
         # takes seconds on a busy machine, and a node must be gone within two.
         sys.stdout.flush()
@@ -258,18 +259,12 @@ def stopped_by_signals() -> Event:
     return stop
 
 
-def _run_node(default_name: str, make: MakeUnit, arguments: list[str],
-              fed_by_topic: Sequence[str], wiring: str, ending: _Ending,
-              read_sheet: ReadSheet | None) -> None:
-    with ros_node(default_name, arguments, "config:=\"['old_circuit']\"") as node:
-        _spin(node, make, fed_by_topic, wiring, ending, read_sheet)
-
-
 def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], wiring: str,
           ending: _Ending, read_sheet: ReadSheet | None) -> None:
     from antenna_drive.emulator.wiring import find
     from antenna_drive.lockstep.getting_ready import told_while_compiling
-    from antenna_drive.lockstep.node import DriveNode, OWN_PARAMETERS
+    from antenna_drive.lockstep.node import DriveNode
+    from antenna_drive.lockstep.node_parameters import OWN_PARAMETERS
     from antenna_drive.lockstep.ros_parameters import Overrides
 
     overrides = Overrides(node)

@@ -21,10 +21,11 @@ from antenna_drive.emulator.unit import FloatArray, Unit
 from antenna_drive.lockstep import compiled_loop as loop
 from antenna_drive.lockstep.compiled_loop import Call, Peer, Reading, Time, Word
 from antenna_drive.lockstep.compiled_unit import CompiledForm, form_of
+from antenna_drive.lockstep.conductor import Conductor, SLACK
 from antenna_drive.lockstep.delays import empty_counts
 from antenna_drive.lockstep.frame import HEADER, READING_PREFIX
 from antenna_drive.lockstep.inbox import DEPTH, Frame
-from antenna_drive.lockstep.member import Conductor, Member, SLACK
+from antenna_drive.lockstep.member import Member
 from antenna_drive.lockstep.pace import Pace
 from antenna_drive.physics.arrays import IntArray
 from antenna_drive.physics.compiling import generated

@@ -4,34 +4,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 import gc
 import time
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
-from antenna_drive.lockstep import compiled_loop, ros_parameters
+from antenna_drive.lockstep import compiled_loop, node_parameters, ros_parameters
 from antenna_drive.lockstep.changes import CHANGES, write_record
 from antenna_drive.lockstep.compiled_unit import form_of
-from antenna_drive.lockstep.exchange import BRIEF_WAIT_S, compile_ahead, Exchange
-from antenna_drive.lockstep.member import Conductor, Member
-from antenna_drive.lockstep.pace import LEAD_S, Pace
-from antenna_drive.lockstep.partner import ANSWER, HOLD, ON_MISS, PartnerUnit
+from antenna_drive.lockstep.conductor import Conductor
+from antenna_drive.lockstep.exchange import compile_ahead, Exchange
+from antenna_drive.lockstep.member import Member
+from antenna_drive.lockstep.node_parameters import ReadSheet
+from antenna_drive.lockstep.pace import Pace
+from antenna_drive.lockstep.partner import ANSWER, PartnerUnit
 from antenna_drive.lockstep.partner_link import Answer, PartnerLink
 from antenna_drive.lockstep.rcl_channel import RclChannel, Unusable
 from antenna_drive.lockstep.readings import ChangeRecord, READING_OVERRIDES, READING_QOS, Readings
 from antenna_drive.lockstep.realtime import lock_memory, schedule_first_in_first_out
+from antenna_drive.lockstep.reception import Reception
 from antenna_drive.lockstep.report import Report
 from antenna_drive.lockstep.ros_link import FrameLink
-from antenna_drive.lockstep.run_control import PAUSED, PLAYING, RunControl, RunState, STOPPED
 from antenna_drive.lockstep.run_services import RunServices, StateReader
 from antenna_drive.lockstep.serving import Serving
 from numba.core.errors import NumbaError
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
-from rclpy.parameter import Parameter
-from simgap.errors import one_line, UserError
-from simgap.inputs.schema import Entry, Value
+from simgap.errors import one_line
+from simgap.inputs.schema import Value
 from std_msgs.msg import Float64
 
 # No wait is longer than this [s]: signals and reports are served in between.
@@ -41,40 +41,6 @@ _DELIVERY_S = 1.0
 
 _AMPERES = 'armature.physical_amperes_per_article_ampere'
 
-PUBLISH_RATE = Entry('Hz', 0.0, 1e4, 'readings per simulated second on each signal topic, 0: none',
-                     live=True)
-PACE = Entry('1', 0.0, 1e3, 'how many times faster than real time, 0: as fast as possible',
-             live=True)
-LEAD = Entry('s', 0.0, 1.0, 'how long before it is due a step may be made')
-STEP = Entry('s', 1e-5, 0.1, 'macro-step')
-EXCHANGE = Entry('', description='auto: the compiled exchange where it can be used; '
-                 'python: the exchange in Python', choices=('auto', 'python'))
-PRIORITY = Entry('1', 0, 99, 'real-time priority (SCHED_FIFO) of the lock-step, 0: none',
-                 whole=True)
-MEMORY = Entry('', description='locked: all memory of the node stays in RAM (mlockall)',
-               choices=('pageable', 'locked'))
-DURATION = Entry('s', 0.0, 1e9, 'simulated time after which the run ends, 0: never')
-STEPS = Entry('1', 1, 1_000_000, 'how many macro-steps the service step makes', live=True,
-              whole=True)
-
-PARTNER_RATE = Entry('Hz', 1.0, 1e4,
-                     'how often per simulated second the partner is told its inputs')
-DEADLINE = Entry('s', 0.0, 1e3,
-                 'how old the step may be that was answered last, in simulated time; 0: any age')
-MISS = Entry('', description='what the outputs do while an answer is overdue', choices=ON_MISS)
-
-# The test sheet that the service play plays.
-SHEET = 'run.sheet'
-
-# Returns the settings that play the test sheet in a file.
-ReadSheet = Callable[[str], Mapping[str, Value]]
-
-# The parameters of a node itself, beside the settings of its unit.
-OWN_PARAMETERS = ('config', 'wiring', 'exchange', 'publish_rate', 'realtime.priority',
-                  'realtime.memory', 'partner.rate', 'partner.deadline', 'partner.on_miss',
-                  'run.step', 'run.pace', 'run.lead', 'run.duration', 'run.observers',
-                  'run.steps', SHEET)
-
 
 class DriveNode:
     """
@@ -83,6 +49,13 @@ class DriveNode:
     The lock-step loop runs in the thread that calls `spin`; parameter services and whatever
     else the node offers run in a second thread, which sleeps unless it is asked.
     """
+
+    # what only the conductor, the stand-in of a partner, or a compiled unit has
+    _pace: Pace | None = None
+    _services: RunServices | None = None
+    _partner: PartnerLink | None = None
+    _channel: RclChannel | None = None
+    _exchange: Exchange | None = None
 
     def __init__(self, node: Node, unit: Unit, overrides: ros_parameters.Overrides,
                  config: Collection[str] = (), fed_by_topic: Collection[str] = (),
@@ -118,65 +91,67 @@ class DriveNode:
         """
         self._node = node
         self._unit = unit
-        self._outputs = outputs
         self.tuning = ros_parameters.Tuning(unit)
-        self._stop = False
-        birth = float(time.time_ns() // 1000)
-        settings: dict[str, tuple[Entry, Value]] = {
+        self._stop = self._quiet = self._stands_still = self._said_end = False
+        self._every = 0
+        settings: ros_parameters.Settings = {
             name: item for name, item in unit.settings().items()
             if name not in (*fed_by_topic, ANSWER)}
-        rate_hz = overrides.number('publish_rate', PUBLISH_RATE, 100.0)
-        exchange = overrides.get('exchange', EXCHANGE, 'auto')
-        priority = overrides.get('realtime.priority', PRIORITY, 0)
-        memory = overrides.get('realtime.memory', MEMORY, 'pageable')
-        if isinstance(unit, PartnerUnit):
-            overrides.get('partner.rate', PARTNER_RATE, 100.0)
-            overrides.get('partner.deadline', DEADLINE, 0.0)
-            overrides.get('partner.on_miss', MISS, HOLD)
-            ros_parameters.declare_names(
-                node, 'partner.reads', overrides.names('partner.reads', unit.inputs),
-                'signals that the partner is told')
-        self._pace: Pace | None = None
-        self._control: RunControl | None = None
-        self._services: RunServices | None = None
-        self._read_sheet = read_sheet
-        self._member = self._make_member(birth, overrides)
-        own = overrides.own
-        overrides.check_all_known([*settings, *own])
-        ros_parameters.declare_names(node, 'config', [*config] or ['reference'],
-                                     'configuration files or sets of config/, later over earlier')
-        ros_parameters.declare_names(node, 'wiring', [wiring],
-                                     "module:NAME of the wiring, '' for the drive's own")
-        ros_parameters.declare(node, {**settings, **own})
-        self._own_entries = {name: entry for name, (entry, _) in own.items()}
+        node_parameters.declare(node, unit, overrides, settings, config, wiring,
+                                read_sheet is not None)
+        self._own = overrides.own
+        self._member = self._make_member(outputs, overrides.names('run.observers', ()))
         self._link = FrameLink(node, self._member.layouts)
+        self._reception = Reception(self._link, self._member, self._pace is not None)
         self.tuning.wake = self._wake
-        self._readings = Readings(node, unit.outputs, rate_hz, self._pace is not None,
-                                  _number(settings.get(_AMPERES)))
+        self._readings = Readings(
+            node, unit.outputs, self._number('publish_rate'), self._pace is not None,
+            _as_float(settings[_AMPERES][1]) if _AMPERES in settings else None)
         self._record = ChangeRecord(node)
         self._report = Report(node, self._member, self._pace, self._link.publishers)
-        if self._control is not None:
-            self._services = self._offer_services(self._control)
-            self._report.told_state = self._state
+        self._offer(settings, fed_by_topic, read_sheet)
+        if self._own['exchange'][1] == 'auto':
+            self._exchange = self._make_exchange()
+        if self._own['realtime.memory'][1] == 'locked':
+            lock_memory()
+        if priority := int(self._number('realtime.priority')):
+            schedule_first_in_first_out(priority)
+
+    def _number(self, name: str) -> float:
+        """Return the value that one of the node's own parameters had at the start."""
+        return _as_float(self._own[name][1])
+
+    def _make_member(self, outputs: Mapping[str, Sequence[Signal]],
+                     observers: Collection[str]) -> Member:
+        birth = float(time.time_ns() // 1000)
+        if self._unit.name != TEST_SIGNAL:
+            return Member(self._unit, birth, outputs)
+        self._pace = Pace(self._number('run.pace'), self._number('run.lead'))
+        step_s = self._number('run.step')
+        return Conductor(self._unit, birth, step_s,
+                         round(self._number('run.duration') / step_s) or None, outputs, observers)
+
+    def _offer(self, settings: ros_parameters.Settings, fed_by_topic: Collection[str],
+               read_sheet: ReadSheet | None) -> None:
+        """Offer what the second thread serves: services, topics and changes of parameters."""
+        node, member = self._node, self._member
+        if isinstance(member, Conductor):
+            assert self._pace is not None
+            self._services = RunServices(node, member, self._pace, self._wake, self._reached,
+                                         self._report.hurry, read_sheet)
+            self._report.told_state = self._services.state
         else:
-            self._report.told_state = StateReader(node, self._member.conductor).latest
+            self._report.told_state = StateReader(node, member.conductor).latest
         for setting in fed_by_topic:
             self._follow(setting)
-        ros_parameters.accept_changes(
-            node, {name: entry for name, (entry, _) in {**settings, **own}.items()}, self._change)
-        self._every = 0
-        self._partner = (self._make_partner(unit, overrides) if isinstance(unit, PartnerUnit)
-                         else None)
-        self._quiet = False
-        self._stands_still = False
-        self._said_end = False
-        self._told_state = ('', 0)
-        self._channel: RclChannel | None = None
-        self._exchange = self._make_exchange() if exchange == 'auto' else None
-        if memory == 'locked':
-            lock_memory()
-        if priority:
-            schedule_first_in_first_out(int(priority))  # type: ignore[arg-type]
+        ros_parameters.accept_changes(node, {
+            name: entry for name, (entry, _) in {**settings, **self._own}.items()}, self._change)
+        if isinstance(self._unit, PartnerUnit):
+            self._partner = self._report.partner = PartnerLink(
+                node, member, self._unit, self._number('partner.rate'),
+                self._number('partner.deadline'), str(self._own['partner.on_miss'][1]),
+                self._reached, lambda answer: self.tuning.request({ANSWER: answer}, wait=False),
+                self._force)
 
     def _make_exchange(self) -> Exchange | None:
         """Make the compiled exchange, or say once why there is none."""
@@ -194,72 +169,6 @@ class DriveNode:
     def _stamps(self) -> int:
         """Return of how many steps the compiled exchange notes the time; for a benchmark."""
         return 0
-
-    def _make_member(self, birth: float, overrides: ros_parameters.Overrides) -> Member:
-        if self._unit.name != TEST_SIGNAL:
-            return Member(self._unit, birth, self._outputs)
-        step_s = overrides.number('run.step', STEP, 1e-3)
-        pace = overrides.number('run.pace', PACE, 1.0)
-        lead_s = overrides.number('run.lead', LEAD, LEAD_S)
-        duration = overrides.number('run.duration', DURATION, 0.0)
-        observers = overrides.names('run.observers', ())
-        overrides.get('run.steps', STEPS, 1)
-        ros_parameters.declare_names(self._node, 'run.observers', observers,
-                                     'names of recorders that every step waits for')
-        sheet = ''.join(overrides.names(SHEET, ()))
-        if self._read_sheet is not None:
-            self._node.declare_parameter(SHEET, sheet, ParameterDescriptor(
-                description='file with the test sheet that the service play plays'),
-                ignore_override=True)
-        self._pace = Pace(pace, lead_s)
-        self._control = RunControl(ros_parameters.PATIENCE_S)
-        return Conductor(self._unit, birth, step_s, round(duration / step_s) or None,
-                         self._outputs, observers)
-
-    def _offer_services(self, control: RunControl) -> RunServices:
-        return RunServices(
-            self._node, control, self._wake, self._state,
-            lambda: int(self._node.get_parameter('run.steps').value or 1), self._restart_clock,
-            None if self._read_sheet is None else self._play)
-
-    def _state(self) -> RunState:
-        """Return what the conductor says of its run, from any thread."""
-        member = self._member
-        assert isinstance(member, Conductor) and self._control is not None
-        step = self._reached()
-        state = PAUSED if self._control.holds(step) else PLAYING
-        if member.run == 0.0 or member.ended or member.fault:
-            state = STOPPED
-        return RunState(state, int(member.run), step)
-
-    def _restart_clock(self) -> None:
-        """Let the next step be due now, and the others after it, at the pace as it is."""
-        assert self._pace is not None
-        self._pace.change(self._pace.factor, time.monotonic(), self._reached())
-
-    def _play(self) -> str:
-        """Put the waveform of the test sheet in force; return why that is refused, or ''."""
-        assert self._read_sheet is not None
-        path = str(self._node.get_parameter(SHEET).value or '')
-        if not path:
-            return f'{SHEET}: not given, set it to the file of a test sheet'
-        try:
-            settings = self._read_sheet(path)
-        except UserError as error:
-            return str(error)
-        result = self._node.set_parameters_atomically([
-            Parameter(name, value=list(value) if isinstance(value, tuple) else value)
-            for name, value in settings.items()])
-        return '' if result.successful else result.reason
-
-    def _make_partner(self, unit: PartnerUnit, overrides: ros_parameters.Overrides) -> PartnerLink:
-        settings = overrides.own
-        self._report.partner = PartnerLink(
-            self._node, self._member, unit, _as_float(settings['partner.rate'][1]),
-            _as_float(settings['partner.deadline'][1]), str(settings['partner.on_miss'][1]),
-            self._reached, lambda answer: self.tuning.request({ANSWER: answer}, wait=False),
-            self._force)
-        return self._report.partner
 
     def _force(self, answer: Answer) -> None:
         """Put an answer of nobody in force, as a change."""
@@ -282,7 +191,7 @@ class DriveNode:
 
     def _change(self, changes: dict[str, Value]) -> str:
         # in the thread of the parameter services
-        own = {name: value for name, value in changes.items() if name in self._own_entries}
+        own = {name: value for name, value in changes.items() if name in self._own}
         for_unit = {name: value for name, value in changes.items() if name not in own}
         reason = self.tuning.request(for_unit) if for_unit else ''
         if reason:
@@ -323,7 +232,7 @@ class DriveNode:
                 outputs = self._go_on()
                 if outputs is not None:
                     self._publish(outputs)
-                if self._quiet or not self._gather():
+                if self._quiet or not self._reception.gather():
                     self._wait_for_anything()
         finally:
             self._report.ended()
@@ -344,7 +253,9 @@ class DriveNode:
         """
         member, pace = self._member, self._pace
         exchange.listen()
-        if (self._stop or self._quiet or not member.steady() or self._held()
+        services = self._services
+        if (self._stop or self._quiet or not member.steady()
+                or services is not None and services.held()
                 or pace is not None and pace.factor > 0.0 and not pace.begun):
             return False
         if self.tuning.pending:
@@ -365,32 +276,8 @@ class DriveNode:
         """Yield the steps after which Python has something to do."""
         if self._partner is not None:
             yield self._partner.next_step()
-        if self._control is not None:
-            yield self._control.halt
-
-    def _held(self) -> bool:
-        """Return whether an operator holds the drive at its step, or wants a new run."""
-        control, member = self._control, self._member
-        if control is None:
-            return False
-        if control.reset_wanted:
-            assert isinstance(member, Conductor)
-            member.begin_again()
-        if not control.holds(member.step):
-            return False
-        if member.run and control.stands(member.step):
-            self._tell_state()
-        return True
-
-    def _tell_state(self, only_news: bool = False) -> None:
-        """Say what the run does now, to people and to the other nodes."""
-        if self._services is None:
-            return
-        state = self._state()
-        if not only_news or (state.state, state.run) != self._told_state:
-            self._told_state = (state.state, state.run)
-            self._services.publish()
-            self._report.hurry()
+        if self._services is not None:
+            yield self._services.control.halt
 
     def _made(self, exchange: Exchange, before: int) -> None:
         """Do what is due after the steps that the compiled exchange has made since `before`."""
@@ -413,13 +300,13 @@ class DriveNode:
         member = self._member
         if self._pace is None:
             return member.go_on(self._stands_still)
-        assert isinstance(member, Conductor) and self._control is not None
-        held = self._held()
+        assert isinstance(member, Conductor) and self._services is not None
+        held = self._services.held()
         if self._quiet:
             outputs = member.new_run(time.time_ns() / 1e3, self._stands_still)
             if outputs is not None:
                 self._pace.begin()
-                self._control.begun()
+                self._services.control.begun()
                 return outputs
         if held:
             return None
@@ -446,24 +333,22 @@ class DriveNode:
         self._report.last_change = write_record(member.run, member.step, CHANGES, changes)
 
     def _publish(self, outputs: FloatArray) -> None:
-        if self._member.step == 0:
+        member = self._member
+        if member.step == 0:
             # Before the frame: it takes tens of milliseconds, and nobody waits for a step yet.
             self._begun()
-        self._link.publish(self._member.message())
-        self._publish_readings(outputs)
-        self._stepped()
-
-    def _publish_readings(self, outputs: FloatArray) -> None:
-        member = self._member
+        self._link.publish(member.message())
         if self._every and member.step % self._every == 0:
             self._readings.publish(member.step, member.step_s, outputs)
+        self._stepped()
 
     def _stepped(self) -> None:
         self._quiet = self._stands_still = False
         if self._partner is not None:
             self._partner.stepped()
         self._report.stepped()
-        self._tell_state(only_news=True)
+        if self._services is not None:
+            self._services.tell_news()
         self._report.publish_if_due(time.monotonic())
 
     def _begun(self) -> None:
@@ -477,41 +362,13 @@ class DriveNode:
         self._node.get_logger().info(
             f'run {member.run:.0f} begins, macro-step {member.step_s:g} s')
 
-    def _gather(self) -> bool:
-        """
-        Take a frame of each peer that the next step waits for.
-
-        Returns
-        -------
-        False if a wait for something else is called for: one of them takes its time, or the
-        next step waits for nobody but the clock
-
-        """
-        member = self._member
-        link = self._link
-        missing = member.missing()
-        # One peer at a time: a wait costs something for each that it looks at, and to be woken
-        # by each in turn costs most.
-        for peer in missing:
-            frame = link.take(peer)
-            if frame is None:
-                link.wait_for(peer, BRIEF_WAIT_S)
-                frame = link.take(peer)
-                if frame is None:
-                    return False
-                if peer is not missing[0]:
-                    # While the slowest is waited for, the frames of the others come.
-                    member.inbox.put_first(peer)
-            member.receive(peer, frame)
-        return bool(missing) or self._pace is None
-
     def _wait_for_anything(self) -> None:
         member = self._member
         missing = member.missing()
         now = time.monotonic()
         timeout = _LONGEST_WAIT_S
         if self._pace is not None and member.run and not missing:
-            if not self._held():
+            if self._services is None or not self._services.held():
                 timeout = min(timeout, self._pace.remaining(member.step + 1, member.step_s, now))
         else:
             self._report.waiting(now)
@@ -519,35 +376,17 @@ class DriveNode:
             self._said_end = True
             self._report.ended()
             self._hello()
-        self._tell_state(only_news=True)
+        if self._services is not None:
+            self._services.tell_news()
         ready = self._link.wait(member.wanted(), timeout)
         for peer in ready:
-            self._take_some(peer)
+            self._reception.take_some(peer)
         self._quiet = not ready
         now = time.monotonic()
         self._stands_still = self._report.stands_still(now)
         self._report.publish_if_due(now)
 
-    def _take_some(self, peer: str) -> None:
-        """
-        Take all frames of an observer; those of a peer that steps up to the first not refused.
-
-        For as long as frames come, the conductor begins no new run. One a turn would be too few:
-        whoever speaks in a peer's name may send more than that, and an observer may have reported
-        each of hundreds of steps.
-        """
-        member = self._member
-        while (frame := self._link.take(peer)) is not None:
-            refused = member.inbox.refused.total()
-            member.receive(peer, frame)
-            if peer in member.inbox.stepping and member.inbox.refused.total() == refused:
-                break
-
 
 def _as_float(value: Value) -> float:
     assert isinstance(value, (int, float))
     return value
-
-
-def _number(setting: tuple[Entry, Value] | None) -> float | None:
-    return None if setting is None else _as_float(setting[1])

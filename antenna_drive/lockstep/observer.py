@@ -23,9 +23,10 @@ from antenna_drive.emulator.wiring import OUTPUTS
 from antenna_drive.lockstep.changes import read_record
 from antenna_drive.lockstep.entry import choose_transport
 from antenna_drive.lockstep.frame import NO_RUN
+from antenna_drive.lockstep.guest import Guest
 from antenna_drive.lockstep.inbox import Frame
 from antenna_drive.lockstep.leaving import leave
-from antenna_drive.lockstep.member import Guest, Member
+from antenna_drive.lockstep.member import Member
 from antenna_drive.lockstep.readings import CHANGES_QOS
 from antenna_drive.lockstep.ros_link import FRAME_QOS, FrameLink
 from antenna_drive.lockstep.run_control import PAUSED

@@ -6,10 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from antenna_drive.lockstep.conductor import Conductor
 from antenna_drive.lockstep.delays import PERCENTILES
 from antenna_drive.lockstep.diagnostics import diagnostics
 from antenna_drive.lockstep.exchange import Exchange
-from antenna_drive.lockstep.member import Conductor, Member
+from antenna_drive.lockstep.member import Member
 from antenna_drive.lockstep.pace import Pace
 from antenna_drive.lockstep.partner_link import PartnerLink
 from antenna_drive.lockstep.run_control import PAUSED, RunState

@@ -9,12 +9,21 @@ std_srvs/Trigger fits all of them but a number of steps, which is the parameter 
 from __future__ import annotations
 
 from collections.abc import Callable
+import time
 from typing import Any
 
+from antenna_drive.lockstep.conductor import Conductor
+from antenna_drive.lockstep.node_parameters import ReadSheet, SHEET
+from antenna_drive.lockstep.pace import Pace
 from antenna_drive.lockstep.ros_link import NotForExecutors
-from antenna_drive.lockstep.run_control import read_state, RunControl, RunState
+from antenna_drive.lockstep.ros_parameters import PATIENCE_S
+from antenna_drive.lockstep.run_control import (
+    PAUSED, PLAYING, read_state, RunControl, RunState, STOPPED,
+)
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from simgap.errors import UserError
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
@@ -28,73 +37,117 @@ STEP_PATIENCE_S = 1.0
 
 
 class RunServices:
-    """The services `<node>/pause`, `resume`, `step`, `reset`, `play`, `state`, and the state."""
+    """
+    A run as people control it, on the node of its conductor.
 
-    def __init__(self, node: Node, control: RunControl, wake: Callable[[], None],
-                 state: Callable[[], RunState], steps: Callable[[], int],
-                 restart_clock: Callable[[], None], play: Callable[[], str] | None) -> None:
+    The services are `<node>/pause`, `resume`, `step`, `reset`, `state`, and `play` where a test
+    sheet can be played; the state is on `<node>/run_state`.
+    """
+
+    def __init__(self, node: Node, conductor: Conductor, pace: Pace, wake: Callable[[], None],
+                 reached: Callable[[], int], hurry: Callable[[], None],
+                 read_sheet: ReadSheet | None) -> None:
         """
         Offer the services.
 
         Parameters
         ----------
-        node, control
-            the node that offers them, and what they ask
+        node, conductor, pace
+            the node that offers them, and the run that they control
         wake
             makes the lock-step thread look
-        state
-            returns the state of the run
-        steps
-            returns how many steps `step` makes
-        restart_clock
-            lets a paced drive go on from where it stands, without catching up
-        play
-            puts the test sheet that the parameters name in force and says what it is; None for
-            a conductor that plays none
+        reached
+            returns the step that the node is at, to any thread
+        hurry
+            lets /diagnostics follow a change of the state at once
+        read_sheet
+            returns the settings that play the test sheet in a file; None for a conductor that
+            plays none
 
         """
-        self._state = state
+        self.control = RunControl(PATIENCE_S)
+        self._node, self._conductor, self._pace = node, conductor, pace
+        self._wake, self._reached, self._hurry = wake, reached, hurry
+        self._told = ('', 0)
         self._topic = node.create_publisher(String, f'{node.get_name()}/{TOPIC}', STATE_QOS)
+        self._offer('pause', lambda: self.control.pause(wake))
+        self._offer('resume', self._resume)
+        self._offer('step', self._step)
+        self._offer('reset', lambda: self.control.reset(wake))
+        self._offer('state', lambda: '')
+        if read_sheet is not None:
+            self._offer('play', lambda: self._play(read_sheet))
 
-        def offer(name: str, act: Callable[[], str]) -> None:
-            def serve(request: Any, response: Any) -> Any:
-                reason = act()
-                response.success = not reason
-                response.message = reason or str(state())
-                return response
+    def _offer(self, name: str, act: Callable[[], str]) -> None:
+        def serve(request: Any, response: Any) -> Any:
+            reason = act()
+            response.success = not reason
+            response.message = reason or str(self.state())
+            return response
 
-            node.create_service(Trigger, f'{node.get_name()}/{name}', serve)
+        self._node.create_service(Trigger, f'{self._node.get_name()}/{name}', serve)
 
-        def resume() -> str:
-            if control.paused:
-                restart_clock()
-            reason = control.resume()
-            wake()
-            return reason
+    def _restart_clock(self) -> None:
+        """Let the next step of a paused run be due now, and the others after it, at its pace."""
+        if self.control.paused:
+            self._pace.change(self._pace.factor, time.monotonic(), self._reached())
 
-        def step() -> str:
-            if control.paused:
-                restart_clock()
-            return control.step(steps(), wake, STEP_PATIENCE_S)
+    def _resume(self) -> str:
+        self._restart_clock()
+        reason = self.control.resume()
+        self._wake()
+        return reason
 
-        def begin_sheet() -> str:
-            assert play is not None
-            reason = play() or control.reset(wake)
-            if not reason and control.paused:
-                reason = resume()
-            return reason
+    def _step(self) -> str:
+        self._restart_clock()
+        steps = int(self._node.get_parameter('run.steps').value or 1)
+        return self.control.step(steps, self._wake, STEP_PATIENCE_S)
 
-        offer('pause', lambda: control.pause(wake))
-        offer('resume', resume)
-        offer('step', step)
-        offer('reset', lambda: control.reset(wake))
-        offer('state', lambda: '')
-        if play is not None:
-            offer('play', begin_sheet)
+    def _play(self, read_sheet: ReadSheet) -> str:
+        """Begin a run with the waveform of the test sheet that the parameters name."""
+        path = str(self._node.get_parameter(SHEET).value or '')
+        if not path:
+            return f'{SHEET}: not given, set it to the file of a test sheet'
+        try:
+            settings = read_sheet(path)
+        except UserError as error:
+            return str(error)
+        result = self._node.set_parameters_atomically([
+            Parameter(name, value=list(value) if isinstance(value, tuple) else value)
+            for name, value in settings.items()])
+        reason = ('' if result.successful else result.reason) or self.control.reset(self._wake)
+        return self._resume() if not reason and self.control.paused else reason
 
-    def publish(self) -> None:
-        """Tell the state of the run to whoever listens."""
-        self._topic.publish(String(data=self._state().text()))
+    def state(self) -> RunState:
+        """Return what the conductor says of its run, from any thread."""
+        conductor = self._conductor
+        step = self._reached()
+        state = PAUSED if self.control.holds(step) else PLAYING
+        if conductor.run == 0.0 or conductor.ended or conductor.fault:
+            state = STOPPED
+        return RunState(state, int(conductor.run), step)
+
+    def held(self) -> bool:
+        """Return whether the drive is held at its step; begin the new run that was asked for."""
+        control, conductor = self.control, self._conductor
+        if control.reset_wanted:
+            conductor.begin_again()
+        if not control.holds(conductor.step):
+            return False
+        if conductor.run and control.stands(conductor.step):
+            self._tell(self.state())
+        return True
+
+    def tell_news(self) -> None:
+        """Say what the run does now, to people and to the other nodes, if that is news."""
+        state = self.state()
+        if (state.state, state.run) != self._told:
+            self._tell(state)
+
+    def _tell(self, state: RunState) -> None:
+        self._told = (state.state, state.run)
+        self._topic.publish(String(data=state.text()))
+        self._hurry()
 
 
 class StateReader:

@@ -224,12 +224,12 @@ class _TwinNode:
                 residual.publish(Float64(data=off))
 
     def _keep_quiet_record(self) -> None:
-        if self._written or self._twin.baseline is None or self._quiet_file is None:
+        if self._written or self._twin.judge.baseline is None or self._quiet_file is None:
             return
         self._written = True
         try:
             with drafted(self._quiet_file) as stream:
-                stream.write(json.dumps({'baseline': self._twin.baseline.plain(),
+                stream.write(json.dumps({'baseline': self._twin.judge.baseline.plain(),
                                          'configuration': self._twin.configuration}).encode())
             self._log.info(f'the quiet record is kept in {self._quiet_file}')
         except OSError as error:
@@ -302,12 +302,12 @@ def _read_quiet(path: Path | None) -> tuple[Baseline | None, str]:
 
 def _told(twin: Twin) -> tuple[str, list[tuple[str, str]]]:
     """Return the state in a line, and in named values."""
-    state, settings = twin.state, twin.settings
+    state, settings, judge = twin.state, twin.settings, twin.judge
     values = [('state', state), ('tuning', twin.tuned or 'not yet'),
-              ('watched', ', '.join(twin.baseline.signals) if twin.baseline else 'nothing yet'),
+              ('watched', ', '.join(judge.baseline.signals) if judge.baseline else 'nothing yet'),
               ('false alarms per day', f'{settings.alarms_per_day:g}'),
-              ('blocks judged', str(twin.blocks - twin.unjudged)),
-              ('blocks not judged', f'{twin.unjudged} (motion beyond that of the quiet record)'),
+              ('blocks judged', str(judge.blocks - judge.unjudged)),
+              ('blocks not judged', f'{judge.unjudged} (motion beyond that of the quiet record)'),
               ('jumps of time', '; '.join(twin.intake.jumps[-3:]) or 'none')]
     values += [(f'rubbish {name}', f'{count} samples {what}')
                for (name, what), count in sorted(twin.intake.rubbish.items())]

@@ -19,8 +19,9 @@ from typing import Any, get_type_hints
 
 from antenna_drive.parameters import files
 from antenna_drive.parameters.sets import (
-    Axis, Drive, Encoder, entries, Filter1, MotorDrive, TestSignal, TorqueShare, Waveform,
+    Axis, Drive, Encoder, entries, Filter1, MotorDrive, TorqueShare,
 )
+from antenna_drive.parameters.waveforms import TestSignal, Waveform
 from simgap.inputs.plain_yaml import read_yaml
 from simgap.inputs.schema import Entry, mapping_of, nearest, ParameterError, quoted, Value
 

@@ -15,37 +15,17 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 import math
 from typing import Any, TypeVar
 
+from antenna_drive.parameters.declaring import Choice, effect, given, option
+from antenna_drive.parameters.waveforms import TestSignal
 from simgap.inputs.schema import Entry, Value
 
 Set = TypeVar('Set')
-# A choice is a text in a set; in the set's record it is the text's place among the choices.
-Choice = Any
 
-# The greatest numbers of flexible modes and of sines in a multisine that a set can hold.
+# The greatest number of flexible modes that a set can hold.
 MODES_LIMIT = 6
-SINES_LIMIT = 32
-# ... and so many points has a signal of straight lines.
-KNOTS_LIMIT = 64
 
-WAVEFORMS = ('zero', 'square', 'saw_tooth', 'saw_tooth_jump', 'step', 'sine', 'chirp', 'multisine',
-             'prbs', 'external', 'knots')
 BIAS_SOURCES = ('circuit', 'fixed')
 SHARE_STARTS = ('zero', 'steady')
-
-
-def _given(unit: str, low: float, high: float, description: str, *, live: bool = False) -> Any:
-    """Declare a number that a configuration must give."""
-    return field(metadata={'entry': Entry(unit, low, high, description, live)})
-
-
-def _effect(neutral: float, unit: str, low: float, high: float, description: str) -> Any:
-    """Declare the term of an unmodelled effect, with its neutral value."""
-    return field(default=neutral, metadata={'entry': Entry(unit, low, high, description)})
-
-
-def _option(default: Any, entry: Entry) -> Any:
-    return field(default=default, metadata={'entry': entry})
-
 
 _PHASE = ('rad', -2.0 * math.pi, 2.0 * math.pi)
 
@@ -54,31 +34,31 @@ _PHASE = ('rad', -2.0 * math.pi, 2.0 * math.pi)
 class RateCommand:
     """Transfer function 1, Table 1."""
 
-    k_s: float = _given('1', 0.01, 10.0, 'scale of the rate command')
-    k_1: float = _given('V s/rad', 1.0, 1e5, 'volts per axis rate')
-    tau_1: float = _given('s', 1e-4, 10.0, 'time constant')
+    k_s: float = given('1', 0.01, 10.0, 'scale of the rate command')
+    k_1: float = given('V s/rad', 1.0, 1e5, 'volts per axis rate')
+    tau_1: float = given('s', 1e-4, 10.0, 'time constant')
 
 
 @dataclass(frozen=True, kw_only=True)
 class Amplifier:
     """Amplifiers 1 and 2 of Fig. 6."""
 
-    rate_gain: float = _given('A/V', 1e-3, 1e3, 'proportional gain of amplifier 1 [k_r]')
-    integral_time: float = _given('s', 1e-3, 100.0, 'integral time of amplifier 1 [T_2]')
-    lag: float = _given('s', 1e-4, 10.0, 'lag behind amplifier 1 [T_a]')
-    current_feedback_gain: float = _given(
+    rate_gain: float = given('A/V', 1e-3, 1e3, 'proportional gain of amplifier 1 [k_r]')
+    integral_time: float = given('s', 1e-3, 100.0, 'integral time of amplifier 1 [T_2]')
+    lag: float = given('s', 1e-4, 10.0, 'lag behind amplifier 1 [T_a]')
+    current_feedback_gain: float = given(
         'ohm', 0.0, 1e3, 'current feedback of amplifier 2 [G_a]')
-    tach_gain: float = _given('V s/rad', 1e-6, 10.0, 'volts per tachometer rate [k_t]')
-    bias_command_gain: float = _given(
+    tach_gain: float = given('V s/rad', 1e-6, 10.0, 'volts per tachometer rate [k_t]')
+    bias_command_gain: float = given(
         '1', 0.0, 10.0, 'share of the counter torque that reaches amplifier 1 [s_F]')
-    offset: float = _effect(0.0, 'V', -1.0, 1.0, 'offset at the input of amplifier 1')
-    crossover: float = _effect(
+    offset: float = effect(0.0, 'V', -1.0, 1.0, 'offset at the input of amplifier 1')
+    crossover: float = effect(
         0.0, 'A', 0.0, 10.0, 'demand that the crossover of amplifier 2 swallows')
-    forward_gain_share: float = _effect(
+    forward_gain_share: float = effect(
         1.0, '1', 0.1, 10.0, 'gain of amplifier 2 as a share of R + G_a')
-    dead_zone: float = _effect(
+    dead_zone: float = effect(
         0.0, 'V', 0.0, 1.0, 'half the width within which amplifier 1 does not answer')
-    delay: float = _effect(
+    delay: float = effect(
         0.0, 's', 0.0, 0.1, 'time by which the rate error comes late, to first order')
 
 
@@ -86,15 +66,15 @@ class Amplifier:
 class Armature:
     """The motor's armature, Fig. 6."""
 
-    resistance: float = _given('ohm', 1e-3, 1e3, 'armature resistance [R]')
-    inductance: float = _given('H', 1e-5, 10.0, 'armature inductance [L]')
-    back_emf_constant: float = _given('V s/rad', 1e-4, 1e3, 'back-EMF constant [k_b]')
-    physical_amperes_per_article_ampere: float = _given(
+    resistance: float = given('ohm', 1e-3, 1e3, 'armature resistance [R]')
+    inductance: float = given('H', 1e-5, 10.0, 'armature inductance [L]')
+    back_emf_constant: float = given('V s/rad', 1e-4, 1e3, 'back-EMF constant [k_b]')
+    physical_amperes_per_article_ampere: float = given(
         '1', 0.1, 100.0, 'real amperes in one article ampere [kappa]')
-    voltage_limit: float = _given('V', 1.0, 1e4, 'greatest armature voltage [V_max]')
-    back_emf_share: float = _effect(
+    voltage_limit: float = given('V', 1.0, 1e4, 'greatest armature voltage [V_max]')
+    back_emf_share: float = effect(
         1.0, '1', 0.1, 10.0, "back-EMF as a share of what the amplifier's limiter is made for")
-    resistance_change: float = _effect(
+    resistance_change: float = effect(
         0.0, 'ohm', -1e3, 1e3, 'resistance beyond the one that amplifier 2 is made for')
 
 
@@ -102,101 +82,101 @@ class Armature:
 class Motor:
     """The motor's mechanics, Fig. 7."""
 
-    torque_constant: float = _given('N m/A', 1e-3, 1e3, 'torque per article ampere [k_m]')
-    friction_torque_per_ampere: float = _given(
+    torque_constant: float = given('N m/A', 1e-3, 1e3, 'torque per article ampere [k_m]')
+    friction_torque_per_ampere: float = given(
         'N m/A', 1e-3, 1e3, 'what one article ampere of friction counts as a torque')
-    current_limit: float = _given('A', 1e-2, 1e3, 'greatest current [i_max]')
-    rotor_inertia: float = _given('kg m^2', 1e-6, 1e3, 'rotor inertia [J_m]')
-    coulomb_torque: float = _given('A', 0.0, 100.0, 'Coulomb friction of the motor [T_c]')
-    stiction_ratio: float = _given('1', 1.0, 5.0, 'stiction over Coulomb friction, Eq. (4)')
-    velocity_threshold: float = _given(
+    current_limit: float = given('A', 1e-2, 1e3, 'greatest current [i_max]')
+    rotor_inertia: float = given('kg m^2', 1e-6, 1e3, 'rotor inertia [J_m]')
+    coulomb_torque: float = given('A', 0.0, 100.0, 'Coulomb friction of the motor [T_c]')
+    stiction_ratio: float = given('1', 1.0, 5.0, 'stiction over Coulomb friction, Eq. (4)')
+    velocity_threshold: float = given(
         'rad/s', 0.0, 1.0, 'rate below which friction can stop the rotor [v_t]')
-    viscous_friction: float = _effect(
+    viscous_friction: float = effect(
         0.0, 'N m s/rad', 0.0, 1.0, 'friction torque per rate, at viscous_rate')
-    viscous_rate: float = _effect(
+    viscous_rate: float = effect(
         10.0, 'rad/s', 1e-3, 1e3, 'rate at which the flow index makes no difference')
-    flow_index: float = _effect(
+    flow_index: float = effect(
         1.0, '1', 0.1, 3.0, 'exponent of the rate in viscous friction: below 1 it thins')
-    stribeck_torque: float = _effect(
+    stribeck_torque: float = effect(
         0.0, 'N m', 0.0, 10.0, 'friction above the Coulomb level at creep')
-    stribeck_rate: float = _effect(
+    stribeck_rate: float = effect(
         5.0, 'rad/s', 1e-3, 1e3, 'rate at which the Stribeck torque has fallen to 1/e')
-    stribeck_shape: float = _effect(
+    stribeck_shape: float = effect(
         2.0, '1', 0.1, 4.0, 'exponent of the rate in the fall of the Stribeck torque')
-    friction_asymmetry: float = _effect(
+    friction_asymmetry: float = effect(
         0.0, '1', -0.9, 0.9, 'share by which forward friction exceeds the mean of both ways')
-    load_dependent_friction: float = _effect(
+    load_dependent_friction: float = effect(
         0.0, '1', 0.0, 0.5, 'friction torque per gear torque')
-    torque_ripple: float = _effect(0.0, 'N m', 0.0, 20.0, 'amplitude of the torque ripple')
-    torque_ripple_cycles: float = _effect(
+    torque_ripple: float = effect(0.0, 'N m', 0.0, 20.0, 'amplitude of the torque ripple')
+    torque_ripple_cycles: float = effect(
         12.0, '1', 0.1, 200.0, 'cycles of the torque ripple per motor revolution')
-    torque_ripple_phase: float = _effect(0.0, *_PHASE, 'phase of the torque ripple')
-    torque_ripple_second: float = _effect(
+    torque_ripple_phase: float = effect(0.0, *_PHASE, 'phase of the torque ripple')
+    torque_ripple_second: float = effect(
         0.0, 'N m', 0.0, 20.0, 'amplitude of the second harmonic of the torque ripple')
-    torque_ripple_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
-    torque_ripple_third: float = _effect(
+    torque_ripple_second_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
+    torque_ripple_third: float = effect(
         0.0, 'N m', 0.0, 20.0, 'amplitude of the third harmonic of the torque ripple')
-    torque_ripple_third_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
+    torque_ripple_third_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gearbox:
     """The gearbox with backlash, Eq. (1), referred to the motor shaft."""
 
-    stiffness: float = _given('N m/rad', 1e-3, 1e6, 'torsional stiffness [k_g]')
-    half_gap: float = _given('rad', 0.0, 10.0, 'half the backlash gap [b]')
-    contact_damping: float = _given(
+    stiffness: float = given('N m/rad', 1e-3, 1e6, 'torsional stiffness [k_g]')
+    half_gap: float = given('rad', 0.0, 10.0, 'half the backlash gap [b]')
+    contact_damping: float = given(
         'N m s/rad', 0.0, 1e3, 'damping of the touching flanks [d_g]')
-    hysteresis: float = _effect(0.0, 'N m', 0.0, 20.0, 'torque of the internal friction')
-    hysteresis_share: float = _effect(
+    hysteresis: float = effect(0.0, 'N m', 0.0, 20.0, 'torque of the internal friction')
+    hysteresis_share: float = effect(
         0.0, '1', 0.0, 0.9, 'internal friction as a share of the elastic torque')
-    hysteresis_angle: float = _effect(
+    hysteresis_angle: float = effect(
         0.02, 'rad', 1e-4, 1.0, 'wind-up over which the internal friction builds up')
-    transmission_error: float = _effect(
+    transmission_error: float = effect(
         0.0, 'rad', 0.0, 1.0, 'amplitude of the transmission error')
-    transmission_error_cycles: float = _effect(
+    transmission_error_cycles: float = effect(
         1.0, '1', 0.001, 200.0, 'cycles of the transmission error per motor revolution')
-    transmission_error_phase: float = _effect(0.0, *_PHASE, 'phase of the transmission error')
-    transmission_error_second: float = _effect(
+    transmission_error_phase: float = effect(0.0, *_PHASE, 'phase of the transmission error')
+    transmission_error_second: float = effect(
         0.0, 'rad', 0.0, 1.0, 'amplitude of the second harmonic of the transmission error')
-    transmission_error_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
-    transmission_error_third: float = _effect(
+    transmission_error_second_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
+    transmission_error_third: float = effect(
         0.0, 'rad', 0.0, 1.0, 'amplitude of the third harmonic of the transmission error')
-    transmission_error_third_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
+    transmission_error_third_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
 
 
 @dataclass(frozen=True, kw_only=True)
 class Tachometer:
     """The motor's tachometer; amplifier 1 sees its errors."""
 
-    gain: float = _effect(1.0, '1', 0.1, 10.0, 'reading per rate')
-    offset: float = _effect(0.0, 'rad/s', -10.0, 10.0, 'reading at standstill')
-    ripple: float = _effect(0.0, '1', 0.0, 1.0, 'amplitude of the ripple, as a share of the rate')
-    ripple_cycles: float = _effect(1.0, '1', 0.1, 200.0, 'cycles of the ripple per revolution')
-    ripple_phase: float = _effect(0.0, *_PHASE, 'phase of the ripple')
-    ripple_second: float = _effect(
+    gain: float = effect(1.0, '1', 0.1, 10.0, 'reading per rate')
+    offset: float = effect(0.0, 'rad/s', -10.0, 10.0, 'reading at standstill')
+    ripple: float = effect(0.0, '1', 0.0, 1.0, 'amplitude of the ripple, as a share of the rate')
+    ripple_cycles: float = effect(1.0, '1', 0.1, 200.0, 'cycles of the ripple per revolution')
+    ripple_phase: float = effect(0.0, *_PHASE, 'phase of the ripple')
+    ripple_second: float = effect(
         0.0, '1', 0.0, 1.0, 'amplitude of the second harmonic of the ripple')
-    ripple_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
-    ripple_third: float = _effect(
+    ripple_second_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
+    ripple_third: float = effect(
         0.0, '1', 0.0, 1.0, 'amplitude of the third harmonic of the ripple')
-    ripple_third_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
+    ripple_third_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ammeter:
     """The reading of the motor current; no loop sees its errors."""
 
-    gain: float = _effect(1.0, '1', 0.1, 10.0, 'reading per current')
-    offset: float = _effect(0.0, 'A', -10.0, 10.0, 'reading at no current')
+    gain: float = effect(1.0, '1', 0.1, 10.0, 'reading per current')
+    offset: float = effect(0.0, 'A', -10.0, 10.0, 'reading at no current')
 
 
 @dataclass(frozen=True, kw_only=True)
 class MotorDrive:
     """One motor with its amplifiers and its gearbox: G_o of Fig. 6."""
 
-    sign: float = _given('1', -1.0, 1.0, 'sign of the counter torque in this motor [s]')
-    gear_ratio: float = _given('1', 1.0, 1e6, 'motor turns per turn of the axis [N]')
-    start_in_gap: float = _option(
+    sign: float = given('1', -1.0, 1.0, 'sign of the counter torque in this motor [s]')
+    gear_ratio: float = given('1', 1.0, 1e6, 'motor turns per turn of the axis [N]')
+    start_in_gap: float = option(
         0.0, Entry('1', -1.0, 1.0, 'place of the motor in its gap at the start, -1 to 1'))
     rate_command: RateCommand
     amplifier: Amplifier
@@ -211,8 +191,8 @@ class MotorDrive:
 class Axis:
     """The antenna about one axis: hub, friction and flexible modes."""
 
-    gear_ratio: float = _given('1', 1.0, 1e6, 'motor turns per turn of the axis [N]')
-    inertia_hub: float = _given('kg m^2', 1.0, 1e12, 'inertia of the hub [J_0]')
+    gear_ratio: float = given('1', 1.0, 1e6, 'motor turns per turn of the axis [N]')
+    inertia_hub: float = given('kg m^2', 1.0, 1e12, 'inertia of the hub [J_0]')
     mode_inertias: tuple[float, ...] = field(metadata={'entry': Entry(
         'kg m^2', 1e-3, 1e12, 'inertia of each mode [m_j]', lengths=(1, MODES_LIMIT))})
     mode_frequencies: tuple[float, ...] = field(metadata={'entry': Entry(
@@ -225,41 +205,41 @@ class Axis:
     pointing_cross_elevation: tuple[float, ...] = field(metadata={'entry': Entry(
         '1', -100.0, 100.0, 'cross-elevation error per bend of each mode',
         lengths=(1, MODES_LIMIT))})
-    coulomb_torque: float = _given(
+    coulomb_torque: float = given(
         'A', 0.0, 1e3, 'Coulomb friction, as current of both motors together')
-    friction_torque_per_ampere: float = _given(
+    friction_torque_per_ampere: float = given(
         'N m/A', 1e-3, 1e3, 'what one article ampere of friction counts as a motor torque')
-    stiction_ratio: float = _given('1', 1.0, 5.0, 'stiction over Coulomb friction, Eq. (4)')
-    velocity_threshold: float = _given(
+    stiction_ratio: float = given('1', 1.0, 5.0, 'stiction over Coulomb friction, Eq. (4)')
+    velocity_threshold: float = given(
         'rad/s', 0.0, 1e-3, 'rate below which friction can stop the axis [v_t]')
-    start_elevation: float = _option(
+    start_elevation: float = option(
         math.pi / 4, Entry('rad', -0.2, 3.4, 'elevation at the start'))
-    viscous_friction: float = _effect(
+    viscous_friction: float = effect(
         0.0, 'N m s/rad', 0.0, 1e10, 'friction torque per rate, at viscous_rate')
-    viscous_rate: float = _effect(
+    viscous_rate: float = effect(
         1e-3, 'rad/s', 1e-7, 1.0, 'rate at which the flow index makes no difference')
-    flow_index: float = _effect(
+    flow_index: float = effect(
         1.0, '1', 0.1, 3.0, 'exponent of the rate in viscous friction: below 1 it thins')
-    stribeck_torque: float = _effect(
+    stribeck_torque: float = effect(
         0.0, 'N m', 0.0, 1e7, 'friction above the Coulomb level at creep')
-    stribeck_rate: float = _effect(
+    stribeck_rate: float = effect(
         1e-4, 'rad/s', 1e-7, 1.0, 'rate at which the Stribeck torque has fallen to 1/e')
-    stribeck_shape: float = _effect(
+    stribeck_shape: float = effect(
         2.0, '1', 0.1, 4.0, 'exponent of the rate in the fall of the Stribeck torque')
-    friction_wave: float = _effect(
+    friction_wave: float = effect(
         0.0, '1', 0.0, 0.9, 'share by which friction varies with the angle')
-    friction_wave_cycles: float = _effect(
+    friction_wave_cycles: float = effect(
         100.0, '1', 0.1, 1e5, 'cycles of that variation per turn of the axis')
-    friction_wave_phase: float = _effect(0.0, *_PHASE, 'phase of that variation')
-    friction_wave_second: float = _effect(
+    friction_wave_phase: float = effect(0.0, *_PHASE, 'phase of that variation')
+    friction_wave_second: float = effect(
         0.0, '1', 0.0, 0.9, 'amplitude of the second harmonic of that variation')
-    friction_wave_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
-    friction_wave_third: float = _effect(
+    friction_wave_second_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
+    friction_wave_third: float = effect(
         0.0, '1', 0.0, 0.9, 'amplitude of the third harmonic of that variation')
-    friction_wave_third_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
-    gravity_torque: float = _effect(
+    friction_wave_third_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
+    gravity_torque: float = effect(
         0.0, 'N m', -1e7, 1e7, 'imbalance: torque at zero elevation, pulling down')
-    steady_wind_torque: float = _effect(0.0, 'N m', -1e7, 1e7, 'torque of a steady wind')
+    steady_wind_torque: float = effect(0.0, 'N m', -1e7, 1e7, 'torque of a steady wind')
 
     @property
     def mode_inertias_count(self) -> int:
@@ -271,18 +251,18 @@ class Axis:
 class Encoder:
     """The reading of the axis angle; no loop sees its errors."""
 
-    offset: float = _effect(0.0, 'rad', -1.0, 1.0, 'reading at angle zero')
-    step: float = _effect(0.0, 'rad', 0.0, 0.1, 'size of one count')
-    cyclic_error: float = _effect(0.0, 'rad', 0.0, 0.1, 'amplitude of the cyclic error')
-    cyclic_error_cycles: float = _effect(
+    offset: float = effect(0.0, 'rad', -1.0, 1.0, 'reading at angle zero')
+    step: float = effect(0.0, 'rad', 0.0, 0.1, 'size of one count')
+    cyclic_error: float = effect(0.0, 'rad', 0.0, 0.1, 'amplitude of the cyclic error')
+    cyclic_error_cycles: float = effect(
         4096.0, '1', 1.0, 1e6, 'cycles of the cyclic error per turn')
-    cyclic_error_phase: float = _effect(0.0, *_PHASE, 'phase of the cyclic error')
-    cyclic_error_second: float = _effect(
+    cyclic_error_phase: float = effect(0.0, *_PHASE, 'phase of the cyclic error')
+    cyclic_error_second: float = effect(
         0.0, 'rad', 0.0, 0.1, 'amplitude of the second harmonic of the cyclic error')
-    cyclic_error_second_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
-    cyclic_error_third: float = _effect(
+    cyclic_error_second_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
+    cyclic_error_third: float = effect(
         0.0, 'rad', 0.0, 0.1, 'amplitude of the third harmonic of the cyclic error')
-    cyclic_error_third_phase: float = _effect(0.0, *_PHASE, 'phase of that harmonic')
+    cyclic_error_third_phase: float = effect(0.0, *_PHASE, 'phase of that harmonic')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -297,32 +277,32 @@ class Plant:
 class TorqueShare:
     """The torque-share circuit, Fig. 14 and Table 1."""
 
-    bias_pot: float = _given('1', 0.0, 1.0, 'bias pot, scales the bias voltage [k_p]', live=True)
-    fade_out_voltage: float = _given(
+    bias_pot: float = given('1', 0.0, 1.0, 'bias pot, scales the bias voltage [k_p]', live=True)
+    fade_out_voltage: float = given(
         'V', -50.0, 0.0, 'voltage that widens the flat part of the bias [f_o]', live=True)
-    current_to_voltage: float = _given('V/A', 1e-3, 100.0, 'volts per current [c_i]')
-    saturation_low: float = _given('V', -50.0, 50.0, 'lower limit of Eq. (10)')
-    saturation_high: float = _given('V', -50.0, 50.0, 'upper limit of Eq. (10)')
-    k_2: float = _given('1/s', -100.0, 0.0, 'gain of transfer function 2')
-    s_2: float = _given('1/s', 1e-3, 100.0, 'pole of transfer functions 2 and 4')
-    k_3: float = _given('1/s', 1e-3, 100.0, 'gain and pole of transfer function 3')
-    g_4: float = _given('1', 0.0, 100.0, 'transfer function 4 over transfer function 2')
-    bias_source: Choice = _option('circuit', Entry(
+    current_to_voltage: float = given('V/A', 1e-3, 100.0, 'volts per current [c_i]')
+    saturation_low: float = given('V', -50.0, 50.0, 'lower limit of Eq. (10)')
+    saturation_high: float = given('V', -50.0, 50.0, 'upper limit of Eq. (10)')
+    k_2: float = given('1/s', -100.0, 0.0, 'gain of transfer function 2')
+    s_2: float = given('1/s', 1e-3, 100.0, 'pole of transfer functions 2 and 4')
+    k_3: float = given('1/s', 1e-3, 100.0, 'gain and pole of transfer function 3')
+    g_4: float = given('1', 0.0, 100.0, 'transfer function 4 over transfer function 2')
+    bias_source: Choice = option('circuit', Entry(
         '', description='where the bias voltage comes from', live=True, choices=BIAS_SOURCES))
-    fixed_voltage: float = _option(0.0, Entry(
+    fixed_voltage: float = option(0.0, Entry(
         'V', -50.0, 50.0, 'bias voltage of a fixed source', live=True))
-    start: Choice = _option('zero', Entry(
+    start: Choice = option('zero', Entry(
         '', description='state of the circuit at the start', choices=SHARE_STARTS))
-    voltmeter_gain: float = _effect(1.0, '1', 0.1, 10.0, 'reading per bias voltage')
+    voltmeter_gain: float = effect(1.0, '1', 0.1, 10.0, 'reading per bias voltage')
 
 
 @dataclass(frozen=True, kw_only=True)
 class Filter1:
     """Filter 1, Eq. (15), as k' / (s + p)."""
 
-    gain: float = _given('1/s', 0.0, 1e4, "gain [k']", live=True)
-    pole: float = _given('1/s', 0.0, 1e3, 'pole [p]', live=True)
-    difference_gain: float = _given(
+    gain: float = given('1/s', 0.0, 1e4, "gain [k']", live=True)
+    pole: float = given('1/s', 0.0, 1e3, 'pole [p]', live=True)
+    difference_gain: float = given(
         'V/A', 1e-3, 1e3, 'volts per difference of the currents [k_f]')
 
 
@@ -332,60 +312,6 @@ class Share:
 
     circuit: TorqueShare
     filter_1: Filter1
-
-
-@dataclass(frozen=True, kw_only=True)
-class Waveform:
-    """A test signal over time; amplitude in the unit of what it commands."""
-
-    waveform: Choice = _option('zero', Entry(
-        '', description='shape of the signal', live=True, choices=WAVEFORMS))
-    amplitude: float = _option(0.0, Entry(
-        'SI', -1e9, 1e9, 'greatest value, rad/s or N m', live=True))
-    offset: float = _option(0.0, Entry('SI', -1e9, 1e9, 'added to the waveform', live=True))
-    period: float = _option(5.0, Entry('s', 0.01, 1e5, 'period', live=True))
-    phase: float = _option(0.0, Entry('1', -1.0, 1.0, 'start within the period', live=True))
-    start_after: float = _option(0.0, Entry(
-        's', 0.0, 1e6, 'time before which the signal is zero', live=True))
-    sweep_from: float = _option(0.1, Entry('Hz', 0.0, 500.0, 'first frequency', live=True))
-    sweep_to: float = _option(5.0, Entry('Hz', 0.0, 500.0, 'last frequency', live=True))
-    sweep_time: float = _option(30.0, Entry('s', 0.01, 1e5, 'time of one sweep', live=True))
-    frequencies: tuple[float, ...] = _option((0.3, 0.7, 1.5), Entry(
-        'Hz', 0.0, 500.0, 'frequencies of a multisine', live=True, lengths=(1, SINES_LIMIT)))
-    weights: tuple[float, ...] = _option((0.4, 0.3, 0.3), Entry(
-        '1', -100.0, 100.0, 'weights of a multisine', live=True, lengths=(1, SINES_LIMIT)))
-    phases: tuple[float, ...] = _option((0.0, 0.0, 0.0), Entry(
-        'rad', -100.0, 100.0, 'phases of a multisine', live=True, lengths=(1, SINES_LIMIT)))
-    bit_time: float = _option(0.2, Entry('s', 1e-3, 1e3, 'time of one bit of a PRBS', live=True))
-    external: float = _option(0.0, Entry(
-        'SI', -1e9, 1e9, 'value commanded from outside', live=True))
-    knot_times: tuple[float, ...] = _option((0.0, 1.0), Entry(
-        's', 0.0, 1e6, 'times of the points of straight lines, two alike for a jump', live=True,
-        lengths=(1, KNOTS_LIMIT)))
-    knot_values: tuple[float, ...] = _option((0.0, 1.0), Entry(
-        '1', -1.0, 1.0, 'values there, as shares of the amplitude', live=True,
-        lengths=(1, KNOTS_LIMIT)))
-
-    @property
-    def frequencies_count(self) -> int:
-        """Return the number of sines of a multisine."""
-        return len(self.frequencies)
-
-    @property
-    def knot_times_count(self) -> int:
-        """Return the number of points of straight lines."""
-        return len(self.knot_times)
-
-
-@dataclass(frozen=True, kw_only=True)
-class TestSignal:
-    """What the drive is commanded: a rate [rad/s], and a torque on the axis [N m]."""
-
-    __test__ = False  # not a test case, whatever its name suggests to pytest
-
-    rate: Waveform = field(default_factory=Waveform)
-    torque: Waveform = field(default_factory=Waveform)
-    delay: float = _effect(0.0, 's', 0.0, 1.0, 'time by which the command comes late')
 
 
 @dataclass(frozen=True, kw_only=True)

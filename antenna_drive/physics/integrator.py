@@ -51,8 +51,7 @@ def located_runge_kutta(
     states
         how many there always are, which compiles to straight code; 0 if their number varies
     inputs_jump
-        True if u may jump from one macro-step to the next, so that the mode at its start is
-        looked at anew; otherwise what switches there is located just behind it
+        True if u may jump between macro-steps: the mode at their start is then looked at again
 
     Returns
     -------
@@ -60,6 +59,67 @@ def located_runge_kutta(
         macro-step h [s] in so many equal steps; work is from `work_space`
 
     """
+    step_to, settle, locate = _runge_kutta(rates, states), _settling(switch), _location(switch)
+
+    @inner
+    def advance(
+            x: FloatArray, mode: IntArray, u: Any, p: Any, h: float, steps: int, work: FloatArray,
+    ) -> None:
+        n, step = states if states else x.size, h / steps
+        k5, y, z = work[4], work[5], work[6]
+        if inputs_jump:
+            settle(0.0, x, mode, u, p)
+        t, done, switchings = 0.0, 0, 0
+        while done < steps:
+            end = (done + 1) * step
+            dt = end - t
+            step_to(t, end, x, mode, u, p, work)
+            if switchings < _SWITCHINGS_LIMIT and switch(end, y, mode, u, p, False):
+                rates(end, y, mode, u, p, k5)
+                high = locate(t, dt, x, mode, u, p, work)
+                t += high * dt
+                for j in range(n):
+                    x[j] = z[j]
+                switchings += 1
+                settle(t, x, mode, u, p)
+                if high == 1.0:
+                    done, t = done + 1, end
+            else:
+                for j in range(n):
+                    x[j] = y[j]
+                done, t = done + 1, end
+                if switchings == _SWITCHINGS_LIMIT:
+                    settle(t, x, mode, u, p)
+
+    return advance
+
+
+def _runge_kutta(rates: Callable[..., Any], states: int) -> Callable[..., Any]:
+    """Make the compiled step from t to `end`: its slopes and the state y into the work space."""
+    @inner
+    def step_to(t: float, end: float, x: FloatArray, mode: IntArray, u: Any, p: Any,
+                work: FloatArray) -> None:
+        n = states if states else x.size
+        k1, k2, k3, k4, y = work[0], work[1], work[2], work[3], work[5]
+        dt = end - t
+        rates(t, x, mode, u, p, k1)
+        for j in range(n):
+            y[j] = x[j] + 0.5 * dt * k1[j]
+        rates(t + 0.5 * dt, y, mode, u, p, k2)
+        for j in range(n):
+            y[j] = x[j] + 0.5 * dt * k2[j]
+        rates(t + 0.5 * dt, y, mode, u, p, k3)
+        for j in range(n):
+            y[j] = x[j] + dt * k3[j]
+        rates(end, y, mode, u, p, k4)
+        for j in range(n):
+            y[j] = x[j] + dt / 6.0 * (k1[j] + 2.0 * k2[j] + 2.0 * k3[j] + k4[j])
+
+    return step_to
+
+
+def _settling(switch: Callable[..., Any]) -> Callable[..., Any]:
+    """Make the compiled function that switches until the mode holds."""
     @inner
     def settle(t: float, x: FloatArray, mode: IntArray, u: Any, p: Any) -> None:
         # one switching may call for another: a body that stops may break away at once
@@ -67,64 +127,29 @@ def located_runge_kutta(
             if not switch(t, x, mode, u, p, True):
                 break
 
-    @inner
-    def advance(
-            x: FloatArray, mode: IntArray, u: Any, p: Any, h: float, steps: int, work: FloatArray,
-    ) -> None:
-        n = states if states else x.size
-        k1, k2, k3, k4 = work[0], work[1], work[2], work[3]
-        k5, y, z = work[4], work[5], work[6]
-        step = h / steps
-        if inputs_jump:
-            settle(0.0, x, mode, u, p)
-        t = 0.0
-        done = 0
-        switchings = 0
-        while done < steps:
-            end = (done + 1) * step
-            dt = end - t
-            rates(t, x, mode, u, p, k1)
-            for j in range(n):
-                y[j] = x[j] + 0.5 * dt * k1[j]
-            rates(t + 0.5 * dt, y, mode, u, p, k2)
-            for j in range(n):
-                y[j] = x[j] + 0.5 * dt * k2[j]
-            rates(t + 0.5 * dt, y, mode, u, p, k3)
-            for j in range(n):
-                y[j] = x[j] + dt * k3[j]
-            rates(end, y, mode, u, p, k4)
-            for j in range(n):
-                y[j] = x[j] + dt / 6.0 * (k1[j] + 2.0 * k2[j] + 2.0 * k3[j] + k4[j])
-            if switchings < _SWITCHINGS_LIMIT and switch(end, y, mode, u, p, False):
-                # the cubic through both ends and their slopes stands in for the path between
-                rates(end, y, mode, u, p, k5)
-                low = 0.0
-                high = 1.0
-                for _ in range(_HALVINGS):
-                    s = 0.5 * (low + high)
-                    _cubic(x, k1, y, k5, dt, s, z)
-                    if switch(t + s * dt, z, mode, u, p, False):
-                        high = s
-                    else:
-                        low = s
-                _cubic(x, k1, y, k5, dt, high, z)
-                t += high * dt
-                for j in range(n):
-                    x[j] = z[j]
-                switchings += 1
-                settle(t, x, mode, u, p)
-                if high == 1.0:
-                    done += 1
-                    t = end
-            else:
-                for j in range(n):
-                    x[j] = y[j]
-                done += 1
-                t = end
-                if switchings == _SWITCHINGS_LIMIT:
-                    settle(t, x, mode, u, p)
+    return settle
 
-    return advance
+
+def _location(switch: Callable[..., Any]) -> Callable[..., Any]:
+    """Make the compiled search for the share of dt at which the mode ceases to hold."""
+    @inner
+    def locate(t: float, dt: float, x: FloatArray, mode: IntArray, u: Any, p: Any,
+               work: FloatArray) -> float:
+        # the cubic through both ends and their slopes stands in for the path between
+        k1, k5, y, z = work[0], work[4], work[5], work[6]
+        low = 0.0
+        high = 1.0
+        for _ in range(_HALVINGS):
+            s = 0.5 * (low + high)
+            _cubic(x, k1, y, k5, dt, s, z)
+            if switch(t + s * dt, z, mode, u, p, False):
+                high = s
+            else:
+                low = s
+        _cubic(x, k1, y, k5, dt, high, z)
+        return high
+
+    return locate
 
 
 @inner

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from antenna_drive.parameters.sets import TestSignal, Waveform
+from antenna_drive.parameters.waveforms import TestSignal, Waveform
 from antenna_drive.physics.arrays import FloatArray
 from antenna_drive.physics.block import output_rows, put, Signal, Source
 from antenna_drive.physics.compiling import compiled

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 import io
 import math
 import os
@@ -26,8 +25,9 @@ from typing import Any
 from antenna_drive.recording.atomic import new_folder, refuse_existing, refuse_io, sync_folder
 from antenna_drive.recording.bag import (
     CDR_HEADER, CHANGE, CONFIGURATION, FORMAT, FORMAT_VERSION, MESSAGE_DEFINITION, MESSAGE_HASH,
-    MESSAGE_TYPE, METADATA, NOTES, ROSBAG2_VERSION,
+    MESSAGE_TYPE, METADATA, NOTES,
 )
+from antenna_drive.recording.bag_description import description, StorageFile
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import dump_sheet, FILE_NAME, TestSheet
 from mcap.writer import Writer
@@ -35,36 +35,11 @@ import numpy as np
 from simgap.drafts import drafted
 from simgap.inputs.plain import freeze, PlainDataError, to_json
 from simgap.logs.channel import NANOSECONDS, RecordingError
-import yaml
 
 FLUSH_S = 0.5
 SPLIT_S = 600.0
 
 _CDR_FLOAT64 = struct.Struct('<4sd')
-
-
-@dataclass
-class _StorageFile:
-    """A file of a bag: when it was begun [s], its messages by topic, its time stamps [ns]."""
-
-    name: str
-    began_at: float
-    counts: list[int]
-    first_ns: int = 2**63 - 1
-    last_ns: int = -1
-
-    def reaches(self, time_ns: int) -> None:
-        """Note the time stamp of a sample."""
-        self.first_ns = min(time_ns, self.first_ns)
-        self.last_ns = max(time_ns, self.last_ns)
-
-    def span(self) -> dict[str, Any]:
-        """Return what rosbag2 says of it."""
-        count = sum(self.counts)
-        return {
-            'starting_time': {'nanoseconds_since_epoch': self.first_ns if count else 0},
-            'duration': {'nanoseconds': self.last_ns - self.first_ns if count else 0},
-            'message_count': count}
 
 
 class BagWriter:
@@ -119,15 +94,13 @@ class BagWriter:
         """
         self.path = Path(path)
         self.written_ns = self.synced_ns = -1
-        self._sync_s = sync_s
         self._signals = dict(signals)
-        self._flush_s = flush_s
+        self._flush_s, self._sync_s, self._split_s = flush_s, sync_s, split_s
         self._flush_ns = flush_s * NANOSECONDS
         self._clock = clock
         self._flushed_at = self._synced_at = clock()
         self._flushed_ns = 0
-        self._split_s = split_s
-        self._files: list[_StorageFile] = []
+        self._files: list[StorageFile] = []
         self._stem = stem or self.path.name
         self._writer: Writer | None = None
         attachments = {
@@ -152,7 +125,7 @@ class BagWriter:
         # not buffered: after a full disk nothing may be written that was held back; the writer
         # buffers a raw stream itself
         raw = (self.path / name).open('xb', buffering=0)
-        self._files.append(_StorageFile(name, self._clock(), [0] * len(self._signals)))
+        self._files.append(StorageFile(name, self._clock(), [0] * len(self._signals)))
         return raw, Writer(raw, enable_data_crcs=True)
 
     def _begin(self, writer: Writer, attachments: Mapping[str, str]) -> list[int]:
@@ -336,29 +309,9 @@ class BagWriter:
         with self._guarded() as writer:
             self._complete(writer)
             with drafted(self.path / METADATA) as stream:
-                stream.write(self._metadata().encode())
+                stream.write(description(self._signals, self._files).encode())
             sync_folder(self.path)
         self._abandon()
-
-    def _metadata(self) -> str:
-        whole = _StorageFile(
-            '', 0.0, [sum(own) for own in zip(*(f.counts for f in self._files), strict=True)],
-            min(f.first_ns for f in self._files), self._last_ns)
-        topics = [
-            {'topic_metadata': {
-                'name': f'/{name}', 'type': MESSAGE_TYPE, 'serialization_format': 'cdr',
-                'offered_qos_profiles': '', 'type_description_hash': MESSAGE_HASH},
-             'message_count': number}
-            for name, number in zip(self._signals, whole.counts, strict=True)]
-        text: str = yaml.safe_dump({'rosbag2_bagfile_information': {
-            'version': ROSBAG2_VERSION, 'storage_identifier': 'mcap',
-            **whole.span(),
-            'topics_with_message_count': topics,
-            'compression_format': '', 'compression_mode': '',
-            'relative_file_paths': [file.name for file in self._files],
-            'files': [{'path': file.name, **file.span()} for file in self._files],
-            'custom_data': {}, 'ros_distro': 'unknown'}}, sort_keys=False)
-        return text
 
     @contextmanager
     def _guarded(self) -> Iterator[Writer]:

@@ -17,7 +17,7 @@ import math
 from pathlib import Path
 from typing import Any, ClassVar, get_args, get_type_hints
 
-from antenna_drive.parameters.sets import KNOTS_LIMIT, SINES_LIMIT
+from antenna_drive.parameters.waveforms import KNOTS_LIMIT, SINES_LIMIT
 from antenna_drive.readings import not_negative, SENSORS, SheetNumber
 from simgap.errors import one_line
 from simgap.inputs.labels import parse_labels, plain_value

@@ -7,7 +7,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from antenna_drive.parameters.sets import values, Waveform
+from antenna_drive.parameters.sets import values
+from antenna_drive.parameters.waveforms import Waveform
 from antenna_drive.recording import sheet as sheets
 from simgap.errors import UserError
 from simgap.inputs.schema import Value

@@ -116,7 +116,7 @@ def watched(columns: Mapping[str, FloatArray], sheet: Mapping[str, Any], onset_s
                 break
         before = twin.state
     return {'alarms': alarms, **told, 'tuning': twin.tuned,
-            'judged': twin.blocks - twin.unjudged, 'unjudged': twin.unjudged}
+            'judged': twin.judge.blocks - twin.judge.unjudged, 'unjudged': twin.judge.unjudged}
 
 
 def grown(tests: Sequence[Recording], lengths_s: Sequence[float], looks_s: Sequence[float],

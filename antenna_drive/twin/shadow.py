@@ -12,11 +12,13 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from antenna_drive.diagnosis.sheet_settings import as_the_sheet_says
 from antenna_drive.emulator import units, wiring
 from antenna_drive.emulator.run import Changes, Emulator, MACRO_STEP
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
-from antenna_drive.parameters.sets import Drive
+from antenna_drive.parameters.sets import changed, Drive
 from antenna_drive.recording.replay import command_table
+from antenna_drive.recording.sheet import TestSheet
 import numpy as np
 from numpy.typing import NDArray
 from simgap.logs.channel import Channel, NANOSECONDS, nanoseconds
@@ -143,3 +145,26 @@ class Shadow:
         if self._emulator.k in self._changes:
             self._emulator.tune(self._changes[self._emulator.k])
         return self._emulator.advance(stop - self._emulator.k)[1]
+
+
+def under_test(sheet: TestSheet, drive: Drive, step_s: float) -> tuple[Drive, Changes]:
+    """
+    Return a drive as a test sheet sets it, and what changes while it runs.
+
+    Parameters
+    ----------
+    sheet
+        of the test
+    drive
+        the configuration
+    step_s
+        macro-step [s]
+
+    """
+    drive, bias = as_the_sheet_says(sheet, drive)
+    voltage = 'torque_share.circuit.fixed_voltage'
+    if drive.torque_share.circuit.bias_source != 'fixed':
+        return drive, {}
+    changes: Changes = {} if bias.before == bias.after else {
+        round(bias.at / step_s): {'torque_share': {'fixed_voltage': bias.after}}}
+    return changed(drive, {voltage: bias.before}), changes

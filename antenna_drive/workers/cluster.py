@@ -19,7 +19,9 @@ from pathlib import Path
 import time
 from typing import Any
 
+import antenna_drive
 from antenna_drive.workers.tasks import Result, TaskLost, Workers
+import simgap
 from simgap.command.programs import expect_overflow
 from simgap.errors import UserError
 
@@ -75,7 +77,7 @@ class ClusterWorkers(Workers):
         except CancelledError as error:
             raise self._lost() from error
         except ModuleNotFoundError as error:
-            if (error.name or '').partition('.')[0] != 'antenna_drive':
+            if (error.name or '').partition('.')[0] not in ('antenna_drive', 'simgap'):
                 raise
             raise UserError(f'{self._address}: a worker has not this antenna_drive; install the '
                             'same one there') from error
@@ -131,11 +133,11 @@ def _done_there(wanted: str, function: Callable[..., Result],
 
 @cache
 def fingerprint() -> str:
-    """Return a digest of the sources and data of this package: equal for the same code alone."""
-    folder = Path(__file__).parents[1]
+    """Return a digest of the sources and data of drive and engine: equal for the same code."""
     digest = hashlib.sha256()
-    for path in sorted(folder.rglob('*')):
-        if path.suffix in ('.py', '.yaml'):
-            digest.update(str(path.relative_to(folder)).encode())
-            digest.update(path.read_bytes())
+    for folder in (Path(antenna_drive.__file__).parent, Path(simgap.__file__).parent):
+        for path in sorted(folder.rglob('*')):
+            if path.suffix in ('.py', '.yaml'):
+                digest.update(str(path.relative_to(folder.parent)).encode())
+                digest.update(path.read_bytes())
     return digest.hexdigest()

@@ -14,8 +14,8 @@ from antenna_drive.emulator.units import BlockUnit, build, SourceUnit
 from antenna_drive.emulator.wiring import UNITS
 from antenna_drive.lockstep import compiled_loop
 from antenna_drive.lockstep.compiled_unit import form_of
+from antenna_drive.lockstep.conductor import Conductor, SLACK
 from antenna_drive.lockstep.exchange import Exchange
-from antenna_drive.lockstep.member import Conductor, SLACK
 from antenna_drive.lockstep.pace import Pace
 from antenna_drive.parameters import load
 from memory_channel import Frame, MemoryChannel

@@ -17,11 +17,11 @@ from pathlib import Path
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.lockstep import compiled_loop
 from antenna_drive.lockstep.compiled_unit import CompiledForm, FORMS
+from antenna_drive.lockstep.conductor import Conductor, SLACK
 from antenna_drive.lockstep.exchange import Exchange
+from antenna_drive.lockstep.guest import Guest
 from antenna_drive.lockstep.inbox import DEPTH, Inbox, Refusal
-from antenna_drive.lockstep.member import (
-    Conductor, DECEIVED_STANDSTILL_S, Guest, Member, MEMORY, SLACK, STANDSTILL_S,
-)
+from antenna_drive.lockstep.member import DECEIVED_STANDSTILL_S, Member, MEMORY, STANDSTILL_S
 from hypothesis import example, given, settings, strategies as st
 from memory_channel import MemoryChannel
 import numpy as np

@@ -73,16 +73,16 @@ def learned() -> Twin:
 def test_twin_of_a_healthy_antenna_is_near_its_noise(learned: Twin) -> None:
     # the sheet's noise is 0.01 A, the recorder's up to 2.5 times that; the tolerances alone put
     # the configuration of the drawing 0.15 A away
-    assert learned.baseline is not None
+    assert learned.judge.baseline is not None
     for motor in ('motor_1', 'motor_2'):
-        assert learned.baseline.signals[f'{motor}/ammeter'].sigma < 0.035
+        assert learned.judge.baseline.signals[f'{motor}/ammeter'].sigma < 0.035
 
 
 @pytest.mark.parametrize('effect', ['motor_2.viscous_friction', 'axis.wind_steady',
                                     'current_1.gain', 'encoder.offset'])
 def test_effect_is_told_soon_and_dated(learned: Twin, effect: str) -> None:
     columns, sheet = case(effect)
-    twin = Twin(learned.drive, parse_sheet(sheet), BRIEF, learned.baseline)
+    twin = Twin(learned.drive, parse_sheet(sheet), BRIEF, learned.judge.baseline)
     told = next(time for time in played(twin, columns) if twin.state == watch.GAP)
     assert ONSET_S < told < ONSET_S + 10.0
     gaps = twin.gaps()
@@ -93,9 +93,9 @@ def test_effect_is_told_soon_and_dated(learned: Twin, effect: str) -> None:
 
 
 def test_quiet_record_goes_through_a_file(learned: Twin) -> None:
-    assert learned.baseline is not None
-    again = Baseline.of_plain(learned.baseline.plain())
-    assert again.plain() == learned.baseline.plain()
+    assert learned.judge.baseline is not None
+    again = Baseline.of_plain(learned.judge.baseline.plain())
+    assert again.plain() == learned.judge.baseline.plain()
 
 
 def test_stretch_of_rubbish_is_named_and_forgotten(learned: Twin) -> None:
@@ -104,7 +104,7 @@ def test_stretch_of_rubbish_is_named_and_forgotten(learned: Twin) -> None:
     time = columns['time_s']
     columns['current_1_A'][(time > 30.0) & (time < 33.0)] = np.nan
     columns['encoder_rad'][(time > 40.0) & (time < 43.0)] = 1e30
-    twin = Twin(learned.drive, parse_sheet(sheet), BRIEF, learned.baseline)
+    twin = Twin(learned.drive, parse_sheet(sheet), BRIEF, learned.judge.baseline)
     bad: dict[str, set[str]] = {}
     last = ''
     for now in played(twin, columns):
@@ -123,7 +123,7 @@ def test_jump_of_time_begins_anew_and_goes_on(learned: Twin) -> None:
     columns, sheet = case()
     time = columns['time_s']
     moved = np.where(time > 40.0, time - 300.0, time)
-    twin = Twin(learned.drive, parse_sheet(sheet), BRIEF, learned.baseline)
+    twin = Twin(learned.drive, parse_sheet(sheet), BRIEF, learned.judge.baseline)
     names = [name for name in columns if name != 'time_s']
     found: list[str] = []
     for k, stamp in enumerate(moved.tolist()):
@@ -141,7 +141,7 @@ def test_jump_of_time_begins_anew_and_goes_on(learned: Twin) -> None:
 
 def test_drive_that_stops_is_stale_and_comes_back(learned: Twin) -> None:
     columns, sheet = case()
-    twin = Twin(learned.drive, parse_sheet(sheet), BRIEF, learned.baseline)
+    twin = Twin(learned.drive, parse_sheet(sheet), BRIEF, learned.judge.baseline)
     assert twin.state == watch.WAITING
     pieces = played(twin, columns)
     while next(pieces) < 20.0:
@@ -157,8 +157,8 @@ def test_drive_that_stops_is_stale_and_comes_back(learned: Twin) -> None:
 
 def test_motion_beyond_the_quiet_record_is_not_judged(learned: Twin) -> None:
     columns, sheet = case('axis.wind_steady')
-    assert learned.baseline is not None
-    narrow = replace(learned.baseline, envelope=(1e-6, 1e-6))
+    assert learned.judge.baseline is not None
+    narrow = replace(learned.judge.baseline, envelope=(1e-6, 1e-6))
     twin = Twin(learned.drive, parse_sheet(sheet), BRIEF, narrow)
     assert watch.GAP not in [word for _, word in states(twin, columns)]
-    assert twin.unjudged == twin.blocks > 60
+    assert twin.judge.unjudged == twin.judge.blocks > 60
