@@ -7,10 +7,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from simgap.report.curves import kept
 from antenna_drive.recording.panels import PANELS
 from antenna_drive.recording.recording import Recording
 from simgap.logs.channel import NANOSECONDS
+from simgap.report.curves import kept
 
 # Samples of a curve that are sent to the page.
 MOST_SAMPLES = 20_000

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
-from simgap.report.curves import COLOURS
 from antenna_drive.recording.panels import panels_of, real_amperes
 from antenna_drive.recording.recording import Recording
 from simgap.logs.channel import RecordingError
+from simgap.report.curves import COLOURS
 
 FORMATS = ('png', 'pdf', 'svg')
 

@@ -15,11 +15,13 @@ import sys
 import time
 from types import TracebackType
 from typing import Any, IO, TextIO
+import warnings
 
 import numpy as np
 from simgap.drafts import drafted
 from simgap.errors import UserError
 from simgap.inputs.schema import Entry
+from simgap.logs.channel import RecordingWarning
 
 STANDARD_OUTPUT = '-'
 
@@ -184,3 +186,17 @@ def _plain(value: object) -> Any:
     if isinstance(value, float) and math.isnan(value):
         return None
     return value
+
+
+@contextmanager
+def warnings_in_one_line() -> Iterator[None]:
+    """Show warnings about recordings to people, without the place in the program."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter('always', RecordingWarning)
+        yield
+    for warning in caught:
+        if issubclass(warning.category, RecordingWarning):
+            print(f'warning: {warning.message}', file=sys.stderr)
+        else:
+            warnings.warn_explicit(warning.message, warning.category, warning.filename,
+                                   warning.lineno)

@@ -9,6 +9,7 @@ This is its public face; docs/own-machine.md leads through it step by step.
 from simgap.logs.gaps import without_gaps
 from simgap.logs.log import Log, LogError, OneTest, read_log, read_logs
 from simgap.model.allowed_tests import own_tests, OwnTests
+from simgap.model.bench import ModelBench
 from simgap.model.checking import check_model, Checked
 from simgap.model.declaration import (
     effect, form, free, known, machine, Model, ModelError, push, reading, ripple, shape, size,
@@ -22,7 +23,7 @@ from simgap.model.unseen import Unseen, unseen
 
 __all__ = [
     'check_model', 'Checked', 'diagnose_logs', 'effect', 'form', 'free', 'known', 'load_model',
-    'Log', 'LogError', 'machine', 'Model', 'ModelError', 'Numbers', 'OneTest', 'OwnMachine',
+    'Log', 'LogError', 'machine', 'Model', 'ModelBench', 'ModelError', 'Numbers', 'OneTest', 'OwnMachine',
     'own_tests', 'OwnTests', 'push', 'pushes_found', 'reading', 'read_log',
     'read_logs', 'ripple', 'shape', 'size', 'summary_of', 'Unseen', 'unseen',
     'within', 'without_gaps',

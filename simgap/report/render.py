@@ -12,9 +12,9 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from simgap.report.curves import plotted
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
+from simgap.report.curves import plotted
 
 FOLDER = Path(__file__).parent
 TEMPLATES = FOLDER / 'templates'

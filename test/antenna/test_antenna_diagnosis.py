@@ -19,7 +19,6 @@ from antenna_drive.diagnosis.field_test import CHANNELS
 from antenna_drive.diagnosis.machine import AntennaMachine
 from antenna_drive.diagnosis.planned_tests import BUILT_IN, confusability_of, planned
 from antenna_drive.diagnosis.waves import Wave
-from simgap.report.render import render
 from antenna_drive.parameters import load
 from antenna_drive.recording.csv_format import write_csv
 from antenna_drive.recording.recording import Recording
@@ -27,6 +26,7 @@ import numpy as np
 import pytest
 from simgap.errors import UserError
 from simgap.report.page import contents
+from simgap.report.render import render
 from simgap.verdict.diagnosis import Diagnosis, value_lines
 
 NOISE = {'ammeter': 0.01, 'tach_rate': 0.0035, 'encoder': 1e-6, 'bias_voltage': 0.01}

@@ -7,12 +7,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from simgap.report.render import render
 import numpy as np
 import pytest
 from simgap.machine.by_label import by_label, ByLabel, groups_of, without_labels
 from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
 from simgap.report.page import contents
+from simgap.report.render import render
 from simgap.verdict.diagnosis import diagnose
 
 TIME = np.arange(0.0, 10.0, 0.02)

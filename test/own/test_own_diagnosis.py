@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from simgap.report.render import render
 import numpy as np
 from own.swing import log_of, logs, NOISE, simulate, swing, TIME
 import pytest
@@ -16,6 +15,7 @@ from simgap.model import (
     unseen,
 )
 from simgap.report.page import contents
+from simgap.report.render import render
 
 
 def test_nothing_is_named_where_nothing_is_wrong() -> None:

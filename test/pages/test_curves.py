@@ -7,11 +7,11 @@ from __future__ import annotations
 import base64
 from typing import Any
 
-from simgap.report.curves import COLOURS, kept, plotted
 from hypothesis import given, strategies as st
 import numpy as np
 from numpy.typing import NDArray
 import pytest
+from simgap.report.curves import COLOURS, kept, plotted
 
 
 def unpacked(curve: dict[str, Any]) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -10,7 +10,6 @@ import math
 from pathlib import Path
 import re
 
-from simgap.report.curves import COLOURS
 from antenna_drive.recording.panels import PANELS, panels_of
 from antenna_drive.recording.recording import Change, Recording
 from antenna_drive.recording.report import page
@@ -19,6 +18,7 @@ from chromium import EXECUTABLE, Page
 import numpy as np
 import pytest
 from simgap.logs.channel import RecordingError
+from simgap.report.curves import COLOURS
 
 needs_browser = pytest.mark.skipif(EXECUTABLE is None, reason='there is no Chromium '
                                                               '(apt-get install chromium)')
