@@ -34,7 +34,6 @@ COMMANDS = {
     'diagnose': Command('diagnose', 'say where a real drive and the model part, and why'),
     'propose': Command('propose', 'design the next test: the one that settles a verdict'),
     'investigate': Command('investigate', 'test a drive until it is clear what is wrong with it'),
-    'check-model': Command('check_model', 'tell what is wrong with a model of your own machine'),
     'check-model': Command('simgap.cli.check',
                            'tell what is wrong with a model of your own machine'),
     'predict': Command('predict', 'predict a recording that the diagnosis has not seen'),

@@ -103,6 +103,6 @@ def run(arguments: argparse.Namespace) -> int:
             'holds all that was found about the machine')
             + (f'; {len(correction.recorder)} errors of the recorder are in the JSON'
                if correction.recorder else ''))
-    give({**diagnosis.result, 'recorder': list(correction.recorder)}, arguments.json,
+    give({**diagnosis.as_data(), 'recorder': list(correction.recorder)}, arguments.json,
          '\n'.join(lines))
     return 0

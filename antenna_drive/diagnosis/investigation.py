@@ -21,7 +21,8 @@ import numpy as np
 from simgap.next_test.investigation import Bench, InvestigationPlan
 from simgap.next_test.rivals import Rival
 from simgap.settings import DEFAULT, Settings
-from simgap.verdict.diagnosis import Diagnosis, Progress
+from simgap.verdict.diagnosis import Progress
+from simgap.verdict.record import Verdict
 
 # Of a recording with added errors of sensors [Hz].
 _RATE_HZ = 200.0
@@ -76,7 +77,7 @@ class DriveBench(Bench):
         self._play(number, test, duration, out)
 
     def diagnose(self, recordings: Mapping[str, Path], progress: Progress,
-                 earlier: Sequence[Rival]) -> Diagnosis:
+                 earlier: Sequence[Rival]) -> Verdict:
         """Return the diagnosis of all recordings, see `Bench`."""
         found = {}
         for k, (name, path) in enumerate(recordings.items(), 1):

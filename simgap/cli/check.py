@@ -41,9 +41,6 @@ def run(arguments: argparse.Namespace) -> int:
     with warnings_in_one_line():
         logs = read_logs(arguments.logs, arguments.map)
     checked = check_model(model, logs)
-    lines = [f'wrong: {line}' for line in checked.faults]
-    lines += checked.remarks
-    lines.append(f'{len(checked.faults)} to mend' if checked.faults else 'nothing is wrong')
     give({'faults': list(checked.faults), 'remarks': list(checked.remarks)}, arguments.json,
-         '\n'.join(lines))
+         checked.summary())
     return 1 if checked.faults else 0

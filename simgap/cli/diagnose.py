@@ -34,7 +34,7 @@ from simgap.inputs.schema import Entry
 if TYPE_CHECKING:
     from simgap.next_test.rivals import Rival
     from simgap.settings import Settings
-    from simgap.verdict.diagnosis import Diagnosis
+    from simgap.verdict.record import Verdict
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -79,18 +79,18 @@ def diagnosed(name: str, paths: Sequence[str], arguments: argparse.Namespace) ->
     """Diagnose a machine by its model and its logs; options as in `add_diagnosis_options`."""
     check_options(arguments, jobs=Entry('', 1, whole=True))
     give_back_large_arrays()
-    from simgap.model import diagnose_logs, load_model, read_logs, summary_of
+    from simgap.model import diagnose_logs, load_model, read_logs
 
     model, earlier = load_model(name), earlier_of(arguments.after)
     with warnings_in_one_line():
         logs = read_logs(paths, arguments.map)
     with Progress('diagnosis', 1.0) as progress:
-        diagnosis = diagnose_logs(
+        verdict = diagnose_logs(
             model, logs, lambda share, doing: progress.update(share), arguments.jobs,
             settings_of(arguments.threshold), arguments.without,
             dict(numbers_of('--matters', arguments.matters)), earlier)
-    write_report(arguments.report, diagnosis)
-    give(diagnosis.result, arguments.json, summary_of(diagnosis))
+    write_report(arguments.report, verdict)
+    give(verdict.as_data(), arguments.json, verdict.summary())
     return 0
 
 
@@ -99,13 +99,13 @@ def earlier_of(path: Path | None) -> Sequence[Rival]:
     return findings_of(path, planning_of(path)).rivals if path else ()
 
 
-def write_report(path: str | None, diagnosis: Diagnosis) -> None:
+def write_report(path: str | None, verdict: Verdict) -> None:
     """Write the page about a diagnosis, if one was asked for."""
     if path:
         from simgap.report.page import contents
         from simgap.report.render import render
         with replaced(Path(path)) as stream:
-            stream.write(render('verdict.html', **vars(contents(diagnosis))).encode())
+            stream.write(render('verdict.html', **vars(contents(verdict))).encode())
 
 
 def numbers_of(option: str, texts: Sequence[str]) -> Iterator[tuple[str, float]]:

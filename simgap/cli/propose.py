@@ -7,7 +7,7 @@ The verdict of `simgap diagnose --json` names several answers that its logs cann
 tests that the model declares are searched for the one that settles most, within its limits:
 
   simgap diagnose my_machine.py a.csv b.csv --json verdict.json
-  simgap propose my_machine.py verdict.json --out next.csv --report next.html
+  simgap propose verdict.json --model my_machine.py --out next.csv --report next.html
 
 If one answer is left or sure, or something without a name is likelier than each answer, the test
 looks for other effects, as with --objective detect. --objective sharpen asks for the test that
@@ -38,8 +38,9 @@ _RULES = ('d-optimal', 'random')
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    parser.add_argument('model', metavar='MODEL', help='as for simgap diagnose')
     add_proposal_options(parser)
+    parser.add_argument('--model', metavar='MODEL', required=True,
+                        help='as for simgap diagnose')
 
 
 def add_proposal_options(parser: argparse.ArgumentParser) -> None:

@@ -12,9 +12,13 @@ from simgap.logs.log import read_log
 from simgap.model.allowed_tests import own_tests
 from simgap.model.declaration import Model
 from simgap.model.diagnose import diagnose_logs
-from simgap.next_test.investigation import Bench
+from simgap.next_test.investigation import Bench, Investigation, InvestigationPlan
 from simgap.next_test.rivals import Rival
-from simgap.verdict.diagnosis import Diagnosis, Progress
+from simgap.verdict.diagnosis import Progress
+from simgap.verdict.record import Verdict
+
+
+Play = Callable[[int, Path, float, Path], None]
 
 
 class ModelBench(Bench):
@@ -41,7 +45,7 @@ class ModelBench(Bench):
     played = 'command_{number}.csv'
 
     def __init__(self, model: Model, duration_s: float,
-                 play: Callable[[int, Path, float, Path], None], threads: int = 2) -> None:
+                 play: Play, threads: int = 2) -> None:
         """Keep what the machine is."""
         self.space = own_tests(model, duration_s)
         self.limits = dict(model.limits)
@@ -60,7 +64,26 @@ class ModelBench(Bench):
             (out.parent / f'test_{number}.yaml').write_bytes(constants.read_bytes())
 
     def diagnose(self, recordings: Mapping[str, Path], progress: Progress,
-                 earlier: Sequence[Rival]) -> Diagnosis:
+                 earlier: Sequence[Rival]) -> Verdict:
         """Return the diagnosis of all logs, see `Bench`."""
         return diagnose_logs(self._model, [read_log(path) for path in recordings.values()],
                              progress, self._threads, earlier=earlier)
+
+
+def investigate(model: Model, folder: Path, play: Play,
+                plan: InvestigationPlan = InvestigationPlan(), threads: int = 2) -> dict[str, Any]:
+    """
+    Test a machine until the answer is sure; return the story, see `Investigation.run`.
+
+    Parameters
+    ----------
+    model, play, threads
+        as in `ModelBench`
+    folder
+        of the investigation, with a file for each step
+    plan
+        what is to be done
+
+    """
+    return Investigation(folder, ModelBench(model, plan.duration, play, threads), plan,
+                         threads=threads).run()

@@ -27,7 +27,8 @@ from simgap.next_test.design import DesignEffort, objective_for, TestDesign, Tes
 from simgap.next_test.proposal import as_data
 from simgap.next_test.rivals import Findings, Rival
 from simgap.settings import DEFAULT, Settings
-from simgap.verdict.diagnosis import Diagnosis, Progress as Share
+from simgap.verdict.diagnosis import Progress as Share
+from simgap.verdict.record import Verdict
 
 SETTINGS, STORY = 'investigation.json', 'story.json'
 # Why an investigation ends.
@@ -84,7 +85,7 @@ class Bench(ABC):
 
     @abstractmethod
     def diagnose(self, recordings: Mapping[str, Path], progress: Share,
-                 earlier: Sequence[Rival]) -> Diagnosis:
+                 earlier: Sequence[Rival]) -> Verdict:
         """Return the diagnosis of all recordings so far; `earlier` as in `diagnosis.diagnose`."""
 
 
@@ -235,7 +236,7 @@ class Investigation:
             {name: there for name, there in recorded.items() if there is not None},
             lambda share, doing: progress(f'diagnosis after test {number}', share),
             self._findings(number - 1).rivals)
-        _write(path, diagnosis.result)
+        _write(path, diagnosis.as_data())
         return json.loads(path.read_text(encoding='utf-8'))  # type: ignore[no-any-return]
 
 
