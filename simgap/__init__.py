@@ -4,8 +4,8 @@
 Says why a real machine and its simulation part: where, which effect, and how far it shrinks.
 
 A `Model` is a simulation with what is known of its numbers, and `Effect`s that it may lack. Each
-test of the real machine is a `Log`. `diagnose` says in a `Verdict` which effect closes the gap, and
-`propose` designs the test that tells the answers of a verdict apart, a `Proposal`:
+test of the real machine is a `Log`. `diagnose` says in a `Verdict` which effect closes the gap.
+`propose` designs the test that separates the answers of a verdict, a `Proposal`:
 
 >>> import simgap
 >>> model = simgap.load_model('first.py:machine')                   # doctest: +SKIP
@@ -25,7 +25,7 @@ from typing import Any, TYPE_CHECKING
 
 if TYPE_CHECKING:
     from simgap.model import (
-        check_model as check, diagnose_logs as diagnose, effect, Effect, form, free, investigate,
+        check_model as check, diagnose_logs as diagnose, Effect, effect, form, free, investigate,
         known, load_model, Log, machine as declare, Model, Numbers, OneTest, propose, push,
         read_log, read_logs, reading, ripple, shape, size, unseen, within,
     )

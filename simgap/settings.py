@@ -3,10 +3,10 @@
 """
 Every threshold of the diagnosis: its unit, what it decides, and the trial that set it.
 
-`Settings()` is what a diagnosis uses unless it is given another record. `antenna-drive thresholds`
-prints the table and says what halving and doubling a threshold does to the score of a trial.
-Trials are listed in docs/history.md. 'Practice cases' are those before the first sealed trial;
-'design' means that the value was chosen without any.
+`Settings()` is what a diagnosis uses unless it is given another record. `lab thresholds` prints
+the table and says what halving and doubling a threshold does to the score of a trial. Trials are
+listed in docs/history.md. 'Practice cases' are those before the first sealed trial; 'design'
+means that the value was chosen without any.
 """
 
 from __future__ import annotations

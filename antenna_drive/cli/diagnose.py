@@ -22,8 +22,8 @@ For example:
 from where its fit had ended, beside what is found afresh. Otherwise a test in which motors creep
 may hide the true one.
 
---model diagnoses a machine of your own, as `simgap diagnose` does, see docs/own-machine.md; `simgap
-check` says beforehand what is wrong with it.
+--model diagnoses a machine of your own, as `simgap diagnose` does, see docs/own-machine.md;
+`simgap check` says beforehand what is wrong with it.
 """
 
 from __future__ import annotations

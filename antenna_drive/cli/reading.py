@@ -36,4 +36,3 @@ def read(args: argparse.Namespace) -> Recording:
     if 'start' in args and (args.start > -math.inf or args.end < math.inf):
         recording = recording.between(args.start, args.end)
     return recording
-

@@ -26,8 +26,8 @@ from simgap.verdict.record import Verdict
 
 # Of a recording with added errors of sensors [Hz].
 _RATE_HZ = 200.0
-# Plays a test on the drive: from its number, the file of its sheet and its length [s] to a recording
-# at a path.
+# Plays a test on the drive: from its number, the file of its sheet and its length [s] to a
+# recording at a path.
 RunTest = Callable[[int, Path, float, Path], None]
 
 

@@ -167,7 +167,6 @@ class Progress:
         self._stream.flush()
 
 
-
 @contextmanager
 def warnings_in_one_line() -> Iterator[None]:
     """Show warnings about recordings to people, without the place in the program."""

@@ -40,7 +40,8 @@ def _loader() -> Any:
                         None, None, 'a key must be a word', key.start_mark)
                 if key.value in seen:
                     raise yaml.constructor.ConstructorError(
-                        None, None, f'the key {one_line(key.value)} is given twice', key.start_mark)
+                        None, None, f'the key {one_line(key.value)} is given twice',
+                        key.start_mark)
                 seen.add(key.value)
             return super().construct_mapping(node, deep=deep)
 

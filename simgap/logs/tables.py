@@ -272,7 +272,7 @@ def _parquet(path: Path) -> Table:
         import pyarrow
         from pyarrow import parquet
     except ImportError:
-        raise RecordingError("needs pyarrow: pip install pyarrow") from None
+        raise RecordingError('needs pyarrow: pip install pyarrow') from None
     try:
         file = parquet.ParquetFile(path)
         # what it says of single columns, Arrow reads without a check that a program survives

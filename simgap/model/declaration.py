@@ -420,7 +420,7 @@ def machine(simulate: Simulation, base: Mapping[str, Number], readings: Mapping[
         makes of a log as it was read the log that the simulation wants, e.g. with further columns
     tests
         what a further test may be, by kind: f(duration_s, random) -> a log with its commands and
-        without readings, drawn with `random`, a numpy Generator. `antenna-drive propose` chooses
+        without readings, drawn with `random`, a numpy Generator. `propose` chooses
         among them
     limits
         greatest size that a reading may have in such a test, by reading

@@ -137,8 +137,8 @@ class Investigation:
         """
         Do what is still to be done; return the story as plain data.
 
-        The story has `tests`, each with what was played, what it was expected to tell and the answers
-        after it, and `ended`: why there are no more.
+        The story has `tests`, each with what was played, what it was expected to say and the
+        answers after it, and `ended`: why there are no more.
         """
         tests: list[dict[str, Any]] = []
         ended = NO_MORE
