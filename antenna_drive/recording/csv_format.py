@@ -25,6 +25,7 @@ import warnings
 from antenna_drive.recording.atomic import new_file, refuse_existing
 from antenna_drive.recording.recording import Change, Recording, unit_of
 from antenna_drive.recording.sheet import dump_sheet, load_sheet, TestSheet
+from antenna_drive.recording.row_order import Column, sorted_rows
 import numpy as np
 from simgap.errors import one_line
 from simgap.inputs.limits import SAMPLES, SIGNALS
@@ -33,7 +34,6 @@ from simgap.inputs.schema import nearest
 from simgap.logs.channel import (
     Channel, check_name, IntArray, make_channel, RecordingError, RecordingWarning,
 )
-from simgap.logs.row_order import Column, sorted_rows
 from simgap.logs.text import (
     Cell, format_nanoseconds, open_text, parse_nanoseconds, parse_number, read_text, rows,
 )

@@ -8,9 +8,9 @@ The model declares the tests that are allowed. A command of yours plays each of 
   simgap investigate my_machine.py --out found --by './play.sh {test} {out}'
 
 {test} is a CSV of the commands, and {out} the CSV of the log to write; {duration} is the length
-[s], and {number} counts the tests. After each test all logs are diagnosed, and the test that tells the
-answers apart is designed. This ends when the verdict is --until sure of an answer that the verdict
-before also named: one test alone decides nothing. One page has the whole story.
+[s], and {number} counts the tests. After each test all logs are diagnosed, and the test that
+separates the answers is designed. This ends when the verdict is --until sure of an answer that the
+verdict before also named: one test alone decides nothing. One page has the whole story.
 
 --out holds a file for each step. The same command goes on where an interrupted one was. The exit
 code is 1 if nothing was decided.
