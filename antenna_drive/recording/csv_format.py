@@ -24,8 +24,8 @@ import warnings
 
 from antenna_drive.recording.atomic import new_file, refuse_existing
 from antenna_drive.recording.recording import Change, Recording, unit_of
-from antenna_drive.recording.sheet import dump_sheet, load_sheet, TestSheet
 from antenna_drive.recording.row_order import Column, sorted_rows
+from antenna_drive.recording.sheet import dump_sheet, load_sheet, TestSheet
 import numpy as np
 from simgap.errors import one_line
 from simgap.inputs.limits import SAMPLES, SIGNALS

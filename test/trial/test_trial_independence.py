@@ -15,8 +15,7 @@ import pytest
 PACKAGE = Path(trial.__file__).parent
 # what starts processes and reports errors knows nothing of any drive
 ALLOWED = ('lab.antenna', 'simgap.errors', 'antenna_drive.workers',
-           'antenna_drive.subcommand', 'antenna_drive.remedies', 'simgap.command.programs',
-           'simgap.command.remedies')
+           'antenna_drive.subcommand', 'simgap.command.programs', 'simgap.command.remedies')
 
 
 # models that diagnose, which only a diagnosis loads
