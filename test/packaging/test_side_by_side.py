@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+import json
 from pathlib import Path
 import subprocess
 import sys
@@ -99,6 +100,22 @@ def test_the_drive_alone_brings_both_commands(wheels: Wheels, tmp_path: Path) ->
     found = bare.run('-c', f'import sys; sys.path.insert(0, {str(tmp_path / "packages")!r})\n'
                      'import antenna_drive, simgap; print(simgap.__file__)')
     assert CARRIED in found
+
+
+@pytest.mark.trial
+@pytest.mark.timeout(3600)
+def test_the_engine_alone_runs_the_example_to_its_verdict(source: Path, wheels: Wheels,
+                                                          tmp_path: Path) -> None:
+    """No compiler and no YAML: two minutes of processor time instead of five seconds."""
+    build([sys.executable, '-I', '-m', 'venv', tmp_path / 'venv'], tmp_path, bare_environment())
+    python, joint = tmp_path / 'venv/bin/python', source / 'examples/robot_joint'
+    for words in (['-m', 'pip', 'install', '--quiet', wheels['simgap']],
+                  [joint / 'make_logs.py', 'asymmetry', 'logs']):
+        build([python, *words], tmp_path, bare_environment())
+    build([tmp_path / 'venv/bin/simgap', 'diagnose', joint / 'first.py', 'logs/steps.csv',
+           'logs/sweep.csv', '--json', 'verdict.json'], tmp_path, bare_environment())
+    verdict = json.loads((tmp_path / 'verdict.json').read_text())
+    assert verdict['which'][0]['effects'] == ['motor.friction_asymmetry']
 
 
 def test_both_wheels_hold_one_engine_and_no_laboratory(wheels: Wheels) -> None:
