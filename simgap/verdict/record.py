@@ -17,8 +17,6 @@ from simgap.verdict.unknown_input import Place
 
 # An effect of more parameters than this is summed up instead of listed.
 _LISTED = 12
-# Pushes that the summary lists.
-_PUSHES = 6
 
 _HEADLINES = {
     'no_gap': 'no gap: machine and model agree within tolerance and noise',
@@ -68,7 +66,6 @@ class Verdict:
     seconds : of computing
     notes : for people
     labels : how effects differ between labels; None if they do not
-    numbers, pushes : those of a declared model as fitted, and what enters when; None for others
     machine : that was compared, with the noise of the motion that was found; where tests carry
         labels, a `by_label.ByLabel` around it
     none, best : the hypotheses without and with the likeliest effects
@@ -94,8 +91,6 @@ class Verdict:
     machine: Machine
     none: Hypothesis
     best: Hypothesis
-    numbers: Mapping[str, Any] | None = None
-    pushes: Sequence[Mapping[str, Any]] | None = None
 
     def __repr__(self) -> str:
         """Return the verdict and its first answer, in a line."""
@@ -135,7 +130,7 @@ class Verdict:
         lines += [f'  also seen: {item["effect"]}, {_why_small(item)}' for item in self.also_seen]
         lines += [f'  remains: {line}' for line in _remainders(self.remains)]
         lines += [f'  note: {note}' for note in self.notes]
-        return '\n'.join(lines + _pushed(self.pushes or ()))
+        return '\n'.join(lines)
 
 
 def _closed(verdict: Verdict) -> list[str]:
@@ -189,11 +184,3 @@ def value_lines(parameters: Mapping[str, Any]) -> list[str]:
             + ('' if item['unit'] == '1' else f'{item["unit"]} ')
             + f'({item["ci95"][0]:.4g} to {item["ci95"][1]:.4g})'
             for name, item in parameters.items()]
-
-
-def _pushed(pushes: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return what pushes and when."""
-    lines = [f'  {item["test"]}: {item["place"]} {item["size"]:.3g} {item["unit"]} from '
-             f'{item["from_s"]:.2f} to {item["until_s"]:.2f} s' for item in pushes[:_PUSHES]]
-    more = len(pushes) - _PUSHES
-    return lines + [f'  and {more} more, see the JSON'] if more > 0 else lines

@@ -15,7 +15,7 @@ import antenna_drive
 import pytest
 import simgap
 
-ENGINE, DRIVE = (Path(house.__file__).parent for house in (simgap, antenna_drive))
+ENGINE, DRIVE = (Path(house.__file__ or '').parent for house in (simgap, antenna_drive))
 EXAMPLES = Path(__file__).resolve().parents[2] / 'examples'
 # what importing the engine may load, and what is loaded only where it is needed
 ALWAYS = {'numpy', 'scipy'}

@@ -109,9 +109,9 @@ def test_the_engine_alone_runs_the_example_to_its_verdict(source: Path, wheels: 
     """No compiler and no YAML: two minutes of processor time instead of five seconds."""
     build([sys.executable, '-I', '-m', 'venv', tmp_path / 'venv'], tmp_path, bare_environment())
     python, joint = tmp_path / 'venv/bin/python', source / 'examples/robot_joint'
-    for words in (['-m', 'pip', 'install', '--quiet', wheels['simgap']],
-                  [joint / 'make_logs.py', 'asymmetry', 'logs']):
-        build([python, *words], tmp_path, bare_environment())
+    build([python, '-m', 'pip', 'install', '--quiet', wheels['simgap']], tmp_path,
+          bare_environment())
+    build([python, joint / 'make_logs.py', 'asymmetry', 'logs'], tmp_path, bare_environment())
     build([tmp_path / 'venv/bin/simgap', 'diagnose', joint / 'first.py', 'logs/steps.csv',
            'logs/sweep.csv', '--json', 'verdict.json'], tmp_path, bare_environment())
     verdict = json.loads((tmp_path / 'verdict.json').read_text())
