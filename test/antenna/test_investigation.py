@@ -66,7 +66,7 @@ class Laboratory:
         answers = self.answers[len(recordings) - 1]
         rivals = [Rival((name,), (name,), ('',), p, (), np.zeros(0), np.zeros((0, 0))).as_data()
                   for name, p in answers.items() if name != 'unknown']
-        return SimpleNamespace(result={
+        return SimpleNamespace(as_data=lambda: {
             'verdict': 'explained', 'confusable': [], 'how_far': {'explained_fraction': {}},
             'which': [{'effects': [name], 'probability': p} for name, p in answers.items()],
             'planning': {'inflation': 1.5, 'rivals': rivals}})
