@@ -36,7 +36,7 @@ ENGINE = {engine(package): package.replace('.', '/')
           for package in find_packages(include=['simgap', 'simgap.*'])}
 
 
-class BuildWithEngine(build_py):
+class BuildWithEngine(build_py):  # type: ignore[misc]
     """Build the packages, and the line that puts a carried engine behind all other packages."""
 
     def run(self) -> None:

@@ -25,8 +25,9 @@ import time
 from typing import Any
 
 from antenna_drive import __version__
+from antenna_drive.remedies import ROS_REMEDY
 import simgap
-from simgap.command.remedies import REMEDIES, ROS_REMEDY
+from simgap.command.remedies import REMEDIES
 from simgap.errors import one_line
 
 OK, MISSING, BROKEN, NOTE = 'ok', 'missing', 'broken', 'note'

@@ -9,7 +9,7 @@ class UserError(Exception):
     """
     Something is missing or wrong: a file, a name, a value, an installation.
 
-    The message is one line that names the thing and the remedy. The antenna-drive command
+    The message is one line that names the thing and the remedy. The simgap command
     prints it without a traceback. Every error that the user can correct is one of these; a
     fault of the program is not.
     """

@@ -25,10 +25,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from antenna_drive.cli.reading import warnings_in_one_line
 from antenna_drive.recording.bag_writer import write_bag
 from antenna_drive.recording.csv_format import read_csv
 from antenna_drive.recording.import_map import import_file, load_map
+from simgap.command.output import warnings_in_one_line
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -29,10 +29,11 @@ from pathlib import Path
 import sys
 from typing import Any, TYPE_CHECKING
 
-from antenna_drive.cli.reading import warnings_in_one_line
 from antenna_drive.recording.atomic import refuse_existing
 from antenna_drive.recording.files import read_recording
-from simgap.command.output import add_json_option, STANDARD_OUTPUT, write_json
+from simgap.command.output import (
+    add_json_option, STANDARD_OUTPUT, warnings_in_one_line, write_json,
+)
 from simgap.errors import UserError
 
 if TYPE_CHECKING:

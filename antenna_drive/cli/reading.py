@@ -5,17 +5,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
-from contextlib import contextmanager
 import math
 from pathlib import Path
-import sys
-import warnings
 
 from antenna_drive.recording.bam import read_bam
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.recording import Recording
-from simgap.logs.channel import RecordingWarning
+from simgap.command.output import warnings_in_one_line
 
 
 def add_recording_options(parser: argparse.ArgumentParser, span: bool = True) -> None:
@@ -40,17 +36,3 @@ def read(args: argparse.Namespace) -> Recording:
     if 'start' in args and (args.start > -math.inf or args.end < math.inf):
         recording = recording.between(args.start, args.end)
     return recording
-
-
-@contextmanager
-def warnings_in_one_line() -> Iterator[None]:
-    """Show warnings about recordings to people, without the place in the program."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter('always', RecordingWarning)
-        yield
-    for warning in caught:
-        if issubclass(warning.category, RecordingWarning):
-            print(f'warning: {warning.message}', file=sys.stderr)
-        else:
-            warnings.warn_explicit(warning.message, warning.category, warning.filename,
-                                   warning.lineno)

@@ -25,14 +25,15 @@ from simgap.errors import UserError
 from simgap.machine.by_label import without_labels
 from simgap.next_test.rivals import Rival
 from simgap.settings import DEFAULT, Settings
-from simgap.verdict.diagnosis import diagnose, Diagnosis, Progress
+from simgap.verdict.diagnosis import diagnose, Progress
+from simgap.verdict.record import Verdict
 
 
 def diagnose_recordings(recordings: Mapping[str, Recording], drive: Drive,
                         progress: Progress = lambda share, doing: None, threads: int = 2,
                         settings: Settings = DEFAULT, without: Sequence[str] = (),
                         limits: Mapping[str, float] | None = None,
-                        earlier: Sequence[Rival] = ()) -> Diagnosis:
+                        earlier: Sequence[Rival] = ()) -> Verdict:
     """
     Say where a real drive and its model part, which effect is behind it, and how far it goes.
 
@@ -71,8 +72,8 @@ def diagnose_recordings(recordings: Mapping[str, Recording], drive: Drive,
     return diagnose(machine.without(without), progress, threads, settings, limits, earlier)
 
 
-def corrected(drive: Drive, diagnosis: Diagnosis) -> Corrected:
+def corrected(drive: Drive, verdict: Verdict) -> Corrected:
     """Return the configuration of a diagnosis of recordings, with what was found in it."""
-    machine = without_labels(diagnosis.machine)
+    machine = without_labels(verdict.machine)
     assert isinstance(machine, AntennaMachine)
-    return correct(drive, machine.records, diagnosis.best)
+    return correct(drive, machine.records, verdict.best)

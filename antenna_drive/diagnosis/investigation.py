@@ -1,24 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The whole loop: a test, its verdict, the next test, until the answer is sure.
-
-An answer that a single test has made sure may be wrong: nothing has contradicted it yet. So one
-test more must leave it sure.
-
-Everything lies in one folder, a file for each step. A step whose file is there is not done again,
-so an investigation that was interrupted goes on where it was.
-"""
+"""An investigation of the drive: how its tests are run, recorded and diagnosed."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-import json
-import os
+from dataclasses import replace
 from pathlib import Path
-import shutil
-from typing import Any
 
 from antenna_drive.diagnosis.allowed_tests import AntennaTests
 from antenna_drive.diagnosis.diagnose import diagnose_recordings
@@ -28,217 +16,76 @@ from antenna_drive.parameters.sets import Drive
 from antenna_drive.readings import RATE_COMMAND, SIGNALS
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.recording import Recording
-from antenna_drive.recording.sheet import dump_sheet, parse_sheet, TestSheet
+from antenna_drive.recording.sheet import dump_sheet, TestSheet
 import numpy as np
-from simgap.drafts import drafted
-from simgap.errors import UserError
-from simgap.next_test.design import DesignEffort, objective_for, TestDesign
-from simgap.next_test.proposal import as_data
-from simgap.next_test.rivals import Findings
+from simgap.next_test.investigation import Bench, InvestigationPlan
+from simgap.next_test.rivals import Rival
 from simgap.settings import DEFAULT, Settings
-from simgap.verdict.diagnosis import Diagnosis
-
-SETTINGS, STORY = 'investigation.json', 'story.json'
-# Why an investigation ends.
-DECIDED, NO_MORE, NOTHING_HELPS = 'decided', 'no more tests', 'nothing helps'
-NOTHING_KNOWN = 'nothing known explains it'
-
-_UNKNOWN = ['unknown']
+from simgap.verdict.diagnosis import Progress
+from simgap.verdict.record import Verdict
 
 # Of a recording with added errors of sensors [Hz].
 _RATE_HZ = 200.0
-# Runs a test on the drive: from its number, its sheet and its length [s] to a recording at a path.
-RunTest = Callable[[int, TestSheet, float, Path], None]
-Progress = Callable[[str, float], None]
+# Plays a test on the drive: from its number, the file of its sheet and its length [s] to a
+# recording at a path.
+RunTest = Callable[[int, Path, float, Path], None]
 
 
-@dataclass(frozen=True)
-class InvestigationPlan:
+class DriveBench(Bench):
     """
-    What an investigation is to do.
-
-    Attributes
-    ----------
-    most : greatest number of tests
-    until : probability from which an answer that the verdict before also named is decided
-    duration : of each test [s]
-    seed : of the tests that are drawn
-
-    """
-
-    most: int = 4
-    until: float = 0.9
-    duration: float = 30.0
-    seed: int = 0
-
-
-class Investigation:
-    """
-    An investigation of a drive.
+    A drive on which test sheets are played.
 
     Parameters
     ----------
-    folder
-        where everything lies; made if it is not there
     drive
         the configuration of the model
     limits
         that no test may exceed
     base
         what is known of every test: circuit, bias pot, sensors
-    run_test
-        runs a test on the drive
+    play
+        plays a test on the drive
     plan
-        what is to be done
-    first
-        the first test; None for the one that detects most
+        of the investigation
     sensors
         whose errors are added to the recordings, for a drive that has none; None for a real one
     threads
         simulations at once
-    settings, effort
-        thresholds, and how much is searched
-
-    Raises
-    ------
-    UserError : the folder holds another investigation
+    settings
+        thresholds
 
     """
 
-    def __init__(self, folder: Path, drive: Drive, limits: DriveLimits, base: TestSheet,
-                 run_test: RunTest, plan: InvestigationPlan = InvestigationPlan(),
-                 first: TestSheet | None = None, sensors: SensorModel | None = None,
-                 threads: int = 2, settings: Settings = DEFAULT,
-                 effort: DesignEffort = DesignEffort()) -> None:
-        """Begin, or go on where an earlier run of the same investigation was."""
-        self._folder, self._drive, self._base = folder, drive, base
-        self._run_test, self._plan, self._first = run_test, plan, first
-        self._sensors = sensors
-        self._threads, self._settings, self._effort = threads, settings, effort
-        self._space = AntennaTests(base, drive, limits, plan.duration)
-        folder.mkdir(parents=True, exist_ok=True)
-        # more tests may be allowed later
-        asked = {'until': plan.until, 'duration_s': plan.duration, 'seed': plan.seed,
-                 'limits': limits.as_data()}
-        known = _read(folder / SETTINGS)
-        if known is None:
-            _write(folder / SETTINGS, asked)
-        elif known != asked:
-            differing = [key for key in asked if known.get(key) != asked[key]]
-            raise UserError(f'{folder}: holds an investigation with other settings '
-                            f'({", ".join(differing)}); give the same ones to go on, or another '
-                            '--out')
+    played = 'test_{number}.yaml'
 
-    def run(self, progress: Progress = lambda doing, share: None) -> dict[str, Any]:
-        """
-        Do what is still to be done; return the story as plain data.
+    def __init__(self, drive: Drive, limits: DriveLimits, base: TestSheet, play: RunTest,
+                 plan: InvestigationPlan, sensors: SensorModel | None = None, threads: int = 2,
+                 settings: Settings = DEFAULT) -> None:
+        """Keep what the drive is."""
+        self.space = AntennaTests(base, drive, limits, plan.duration)
+        self.limits = limits.as_data()
+        self._drive, self._base, self._play, self._seed = drive, base, play, plan.seed
+        self._sensors, self._threads, self._settings = sensors, threads, settings
 
-        The story has `tests`, each with its sheet, what it was expected to tell and the answers
-        after it, and `ended`: why there are no more.
-        """
-        tests: list[dict[str, Any]] = []
-        ended = NO_MORE
-        for number in range(1, self._plan.most + 1):
-            proposal = self._proposal(number, progress)
-            if proposal['test'] is None:
-                ended = NOTHING_HELPS
-                break
-            self._record(number, parse_sheet(proposal['test']), progress)
-            verdict = self._verdict(number, progress)
-            tests.append(_chapter(number, proposal, verdict))
-            _write(self._folder / STORY, {'tests': tests, 'ended': None})
-            if self._is_sure(tests):
-                named = tests[-1]['answers'][0]['effects']
-                ended = NOTHING_KNOWN if named == _UNKNOWN else DECIDED
-                break
-        story = {'tests': tests, 'ended': ended,
-                 'seconds_of_testing': self._plan.duration * len(tests)}
-        _write(self._folder / STORY, story)
-        return story
+    def save(self, test: TestSheet, path: Path) -> None:
+        """Write the sheet, with what is known of the sensors."""
+        whole = replace(test, sensors=test.sensors or self._base.sensors)
+        path.write_text(dump_sheet(whole), encoding='utf-8')
 
-    def _is_sure(self, tests: Sequence[Mapping[str, Any]]) -> bool:
-        """Return whether the last verdict is sure of what the verdict before also named."""
-        if len(tests) < 2:
-            return False
-        before, last = (test['answers'][0] for test in tests[-2:])
-        until = self._plan.until
-        if last['effects'] == _UNKNOWN:
-            # no verdict gives it more
-            until *= self._settings.verdict.most_unknown
-        return last['probability'] >= until and last['effects'] == before['effects']
+    def run(self, number: int, test: Path, duration: float, out: Path) -> None:
+        """Play a sheet, see `Bench`."""
+        self._play(number, test, duration, out)
 
-    def _path(self, stem: str, number: int, suffix: str = '') -> Path:
-        return self._folder / f'{stem}_{number}{suffix}'
-
-    def _proposal(self, number: int, progress: Progress) -> dict[str, Any]:
-        """Return the proposal of a test; the first one detects, the others separate."""
-        path = self._path('proposal', number, '.json')
-        found = _read(path)
-        if found is None:
-            found = self._designed(number, progress)
-            _write(path, found)
-        return found
-
-    def _designed(self, number: int, progress: Progress) -> dict[str, Any]:
-        if number == 1 and self._first is not None:
-            return {'objective': 'given', 'family': 'given',
-                    'test': self._space.as_data(self._first)}
-        findings = self._findings(number - 1)
-        found = TestDesign(
-            self._space, findings, objective_for(findings, self._settings), threads=self._threads,
-            settings=self._settings, effort=self._effort, seed=self._plan.seed + number).run(
-                lambda share, doing: progress(f'design of test {number}', share))
-        return as_data(found, self._space, self._settings)
-
-    def _findings(self, number: int) -> Findings:
-        """Return what the verdict after a test has told; nothing before the first one."""
-        verdict = _read(self._path('verdict', number, '.json'))
-        return Findings.of_data(verdict['planning']) if verdict else Findings()
-
-    def _record(self, number: int, sheet: TestSheet, progress: Progress) -> None:
-        """Run a test; the recording gets its name once it is whole."""
-        if self._recording(number) is not None:
-            return
-        progress(f'test {number}', 0.0)
-        whole = self._known(sheet)
-        self._path('test', number, '.yaml').write_text(dump_sheet(whole), encoding='utf-8')
-        draft = self._folder / f'.test_{number}.{os.getpid()}'
-        for old in self._folder.glob('.test_*'):
-            _remove(old)
-        try:
-            self._run_test(number, whole, self._plan.duration, draft)
-            suffix = '' if draft.is_dir() else '.csv'
-            os.replace(draft, self._path('test', number, suffix))
-        finally:
-            _remove(draft)
-
-    def _known(self, sheet: TestSheet) -> TestSheet:
-        return replace(sheet, sensors=sheet.sensors or self._base.sensors)
-
-    def _recording(self, number: int) -> Path | None:
-        return next((path for suffix in ('', '.csv')
-                     if (path := self._path('test', number, suffix)).exists()), None)
-
-    def _verdict(self, number: int, progress: Progress) -> dict[str, Any]:
-        """Return the verdict on all recordings up to a test."""
-        path = self._path('verdict', number, '.json')
-        found = _read(path)
-        if found is not None:
-            return found
-        recordings = {}
-        for k in range(1, number + 1):
-            recorded = self._recording(k)
-            assert recorded is not None
-            recording = read_recording(recorded)
+    def diagnose(self, recordings: Mapping[str, Path], progress: Progress,
+                 earlier: Sequence[Rival]) -> Verdict:
+        """Return the diagnosis of all recordings, see `Bench`."""
+        found = {}
+        for k, (name, path) in enumerate(recordings.items(), 1):
+            found[name] = read_recording(path)
             if self._sensors is not None:
-                recording = sensed(recording, self._sensors, [self._plan.seed, k])
-            recordings[f'test_{k}'] = recording
-        diagnosis: Diagnosis = diagnose_recordings(
-            recordings, self._drive,
-            lambda share, doing: progress(f'diagnosis after test {number}', share),
-            self._threads, self._settings, earlier=self._findings(number - 1).rivals)
-        _write(path, diagnosis.result)
-        return json.loads(path.read_text(encoding='utf-8'))  # type: ignore[no-any-return]
+                found[name] = sensed(found[name], self._sensors, [self._seed, k])
+        return diagnose_recordings(found, self._drive, progress, self._threads, self._settings,
+                                   earlier=earlier)
 
 
 def sensed(recording: Recording, sensors: SensorModel, seed: Sequence[int]) -> Recording:
@@ -266,69 +113,3 @@ def sensed(recording: Recording, sensors: SensorModel, seed: Sequence[int]) -> R
     return Recording.from_arrays(
         command.time_s[every], {RATE_COMMAND: command.values[every], **dict(zip(
             SIGNALS, readings.T, strict=True))}, sheet=recording.sheet)
-
-
-def _chapter(number: int, proposal: Mapping[str, Any],
-             verdict: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what one test was, promised and gave."""
-    answers = [{'effects': entry['effects'], 'probability': entry['probability']}
-               for entry in verdict['which'] if entry['probability'] >= 0.005]
-    return {'test': number, 'family': proposal['family'], 'sheet': proposal['test'],
-            'objective': proposal['objective'], 'expected': proposal.get('expected'),
-            'not_told_apart': proposal.get('not_told_apart', []),
-            'obtained': answers[0]['probability'], 'answers': answers,
-            'verdict': verdict['verdict'], 'confusable': verdict['confusable'],
-            'how_far': verdict['how_far']['explained_fraction']}
-
-
-def lines(story: Mapping[str, Any]) -> list[str]:
-    """Return the story of an investigation as people read it."""
-    found = []
-    for item in story['tests']:
-        promised = item['expected']
-        found.append(f'test {item["test"]}, {item["family"]}'
-                     + (f', expected to make the true answer {100.0 * promised["right_after"]:.0f}'
-                        ' % sure' if promised else '') + ':')
-        found += [f'  {100.0 * answer["probability"]:5.1f} %  {" + ".join(answer["effects"])}'
-                  for answer in item['answers'][:4]]
-    tests = len(story['tests'])
-    found.append({
-        DECIDED: f'decided after {tests} tests, {story["seconds_of_testing"]:g} s of testing',
-        NO_MORE: f'not decided after {tests} tests; --max-tests allows more',
-        NOTHING_KNOWN: f'no effect of the catalogue explains the gap, after {tests} tests; the '
-                       'last verdict says where it may enter',
-        NOTHING_HELPS: f'not decided after {tests} tests, and no test within the limits helps',
-    }[story['ended']])
-    return found
-
-
-def headline(story: Mapping[str, Any]) -> tuple[str, str]:
-    """Return what an investigation has found in two words, and in a sentence."""
-    said: Sequence[str] = lines(story)
-    if not story['tests']:
-        return 'No test', said[-1]
-    first = story['tests'][-1]['answers'][0]
-    return ' + '.join(first['effects']), f'{100.0 * first["probability"]:.0f} % sure; {said[-1]}'
-
-
-def _read(path: Path) -> dict[str, Any] | None:
-    if not path.exists():
-        return None
-    try:
-        found: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
-        return found
-    except ValueError as error:
-        raise UserError(f'{path}: no JSON ({error}); remove it to have it made anew') from error
-
-
-def _write(path: Path, data: Mapping[str, Any]) -> None:
-    """Write plain data whole or not at all."""
-    with drafted(path) as stream:
-        stream.write(json.dumps(data, indent=2, default=float).encode())
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        path.unlink(missing_ok=True)

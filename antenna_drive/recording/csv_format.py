@@ -25,6 +25,7 @@ import warnings
 from antenna_drive.readings import FIELD_COLUMNS, RATE_COMMAND, RATE_COMMAND_COLUMN
 from antenna_drive.recording.atomic import new_file, refuse_existing
 from antenna_drive.recording.recording import Change, Recording, unit_of
+from antenna_drive.recording.row_order import Column, sorted_rows
 from antenna_drive.recording.sheet import dump_sheet, load_sheet, TestSheet
 import numpy as np
 from simgap.errors import one_line
@@ -34,7 +35,6 @@ from simgap.inputs.schema import nearest
 from simgap.logs.channel import (
     Channel, check_name, IntArray, make_channel, RecordingError, RecordingWarning,
 )
-from simgap.logs.row_order import Column, sorted_rows
 from simgap.logs.text import (
     Cell, format_nanoseconds, open_text, parse_nanoseconds, parse_number, read_text, rows,
 )

@@ -36,7 +36,7 @@ def diagnosed(recordings: Mapping[str, Recording], drive: Drive) -> dict[str, An
 
     """
     from antenna_drive.diagnosis.diagnose import diagnose_recordings
-    return diagnose_recordings(recordings, drive, threads=1).result
+    return diagnose_recordings(recordings, drive, threads=1).as_data()
 
 
 def look_of(result: Mapping[str, Any], lengths_s: Collection[float]) -> Look:

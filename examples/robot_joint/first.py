@@ -1,13 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""A first model of a robot joint: one stiff body in a position and a velocity loop."""
+"""
+A first model of a robot joint: one stiff body in a position and a velocity loop.
+
+  python make_logs.py asymmetry logs
+  python first.py logs/*.csv          # checks the model, diagnoses the logs, designs the next test
+"""
+
+import sys
 
 import numpy as np
 from numpy.typing import NDArray
-from simgap.model import (
-    effect, free, known, machine as own_machine, Numbers, OneTest, push, reading, ripple, size,
-    within,
-)
+import simgap
+from simgap import effect, free, known, push, reading, ripple, size, within
 from simgap.parts import compiled, friction, loop, wave
 from simgap.parts.friction import Friction
 from simgap.parts.loop import Cascade
@@ -34,7 +39,7 @@ def run(time: Array, reference: Array, torque: Array, cascade: Cascade, rubbing:
             angle += h * rate
 
 
-def simulate(n: Numbers, test: OneTest) -> dict[str, Array]:
+def simulate(n: simgap.Numbers, test: simgap.OneTest) -> dict[str, Array]:
     """Return the readings, had the joint these numbers."""
     out = np.zeros((test.time.size, 2))
     out[0, 0] = test['motor_rad'][0]
@@ -44,7 +49,14 @@ def simulate(n: Numbers, test: OneTest) -> dict[str, Array]:
     return {'angle': out[:, 0], 'current': out[:, 1]}
 
 
-machine = own_machine(
+def sweep(duration_s: float, random: np.random.Generator) -> simgap.Log:
+    """Return a test that the robot may be asked to do: it swings faster and faster."""
+    time = np.arange(0.0, duration_s, 1e-3)
+    swing = np.sin(random.uniform(0.5, 2.0) * time * (1.0 + time / 4.0))
+    return simgap.Log('sweep', time, {'reference_rad': random.uniform(0.3, 2.0) * swing})
+
+
+machine = simgap.declare(
     simulate,
     base={'inertia': within(5e-4, 0.1, 'kg m^2'), 'torque_constant': known(0.102, 'N m/A'),
           'coulomb': free(0.0, 0.2, 'N m'), 'viscous': free(0.0, 5e-3, 'N m s/rad')},
@@ -55,4 +67,12 @@ machine = own_machine(
              ripple('motor.ripple', 'ripple', size(-0.1, 0.1, 'N m'), 'motor_rad',
                     cause='slots and commutation push by angle')],
     push={'load': push('load', 'torque on the load', 'N m', 0.02)},
-    settles_s=0.4, parallel=True)
+    tests={'sweep': sweep}, limits={'angle': 2.5, 'current': 8.0}, settles_s=0.4, parallel=True)
+
+if __name__ == '__main__':
+    logs = simgap.read_logs(sys.argv[1:])
+    print(simgap.check(machine, logs).summary())
+    verdict = simgap.diagnose(machine, logs)
+    print(verdict.summary())
+    proposal = simgap.propose(machine, verdict, duration_s=8.0)
+    print('next test:', proposal.tests[0].family if proposal.tests else 'none helps')

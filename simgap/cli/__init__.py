@@ -12,7 +12,11 @@ from simgap import __version__
 from simgap.command.program import Command, Program
 
 COMMANDS = {
-    'check': Command('check', 'tell what is wrong with a model, before any fit'),
+    'check': Command('check', 'say what is wrong with a model, before any fit'),
+    'diagnose': Command('diagnose', 'say where machine and model part, and why'),
+    'propose': Command('propose', 'design the next test: the one that settles a verdict'),
+    'investigate': Command('investigate',
+                           'test a machine until it is clear what is wrong with it'),
 }
 PROGRAM = Program('simgap', __name__, __version__, COMMANDS)
 main, make_parser = PROGRAM.main, PROGRAM.parser

@@ -10,9 +10,9 @@ a first model.
 
 For example:
 
-  antenna-drive check-model my_machine.py:machine logs/*.csv
-  antenna-drive check-model my_machine.py logs/*.csv --map map.yaml
-  antenna-drive check-model my_machine.yaml logs/*.csv
+  simgap check my_machine.py:machine logs/*.csv
+  simgap check my_machine.py logs/*.csv --map map.yaml
+  simgap check my_machine.yaml logs/*.csv
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from antenna_drive.cli.reading import warnings_in_one_line
-from simgap.command.output import add_json_option, give
+from simgap.cli.diagnose import add_map_option
+from simgap.command.output import add_json_option, give, warnings_in_one_line
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,8 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('model', metavar='FILE.py:NAME',
                         help='Python file and name of the model, or a model file FILE.yaml')
     parser.add_argument('logs', nargs='+', type=Path, metavar='LOG.csv', help='logs of its tests')
-    parser.add_argument('--map', type=Path, metavar='MAP.yaml',
-                        help='which column is which, and how it is written')
+    add_map_option(parser)
     add_json_option(parser)
 
 
@@ -42,9 +41,6 @@ def run(arguments: argparse.Namespace) -> int:
     with warnings_in_one_line():
         logs = read_logs(arguments.logs, arguments.map)
     checked = check_model(model, logs)
-    lines = [f'wrong: {line}' for line in checked.faults]
-    lines += checked.remarks
-    lines.append(f'{len(checked.faults)} to mend' if checked.faults else 'nothing is wrong')
     give({'faults': list(checked.faults), 'remarks': list(checked.remarks)}, arguments.json,
-         '\n'.join(lines))
+         checked.summary())
     return 1 if checked.faults else 0

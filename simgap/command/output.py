@@ -5,21 +5,22 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-import json
 import math
 import os
 from pathlib import Path
 import sys
 import time
 from types import TracebackType
-from typing import Any, IO, TextIO
+from typing import IO, TextIO
+import warnings
 
-import numpy as np
 from simgap.drafts import drafted
 from simgap.errors import UserError
+from simgap.inputs.plain import strict_json
 from simgap.inputs.schema import Entry
+from simgap.logs.channel import RecordingWarning
 
 STANDARD_OUTPUT = '-'
 
@@ -69,24 +70,20 @@ def write_json(result: object, target: str | os.PathLike[str]) -> None:
     """
     Write `result` as strict JSON to a file, whole or not at all, or to standard output.
 
-    NaN, which means that there is no value, becomes null; numpy scalars, arrays and paths
-    become numbers, lists and texts.
-
     Parameters
     ----------
     result
-        made of mappings with texts as keys, sequences, numbers, texts, None
+        see `strict_json`
     target
         a file, or '-' for standard output
 
     Raises
     ------
-    ValueError : `result` holds an infinity
-    TypeError : `result` holds something that JSON has no word for
+    ValueError, TypeError : as `strict_json`
     UserError : the file cannot be written
 
     """
-    text = json.dumps(_plain(result), indent=2, allow_nan=False, ensure_ascii=False) + '\n'
+    text = strict_json(result)
     if str(target) == STANDARD_OUTPUT:
         sys.stdout.write(text)
         return
@@ -170,17 +167,15 @@ class Progress:
         self._stream.flush()
 
 
-def _plain(value: object) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, np.generic):
-        return _plain(value.item())
-    if isinstance(value, os.PathLike):
-        return os.fspath(value)
-    if isinstance(value, float) and math.isnan(value):
-        return None
-    return value
+@contextmanager
+def warnings_in_one_line() -> Iterator[None]:
+    """Show warnings about recordings to people, without the place in the program."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter('always', RecordingWarning)
+        yield
+    for warning in caught:
+        if issubclass(warning.category, RecordingWarning):
+            print(f'warning: {warning.message}', file=sys.stderr)
+        else:
+            warnings.warn_explicit(warning.message, warning.category, warning.filename,
+                                   warning.lineno)

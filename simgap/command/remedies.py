@@ -4,25 +4,10 @@
 
 from __future__ import annotations
 
-ROS_REMEDY = ("source a ROS 2 installation, or on x86-64 Linux: pip install 'ros-rclpy[fastrtps]' "
-              'ros-std-msgs ros-std-srvs ros-rosgraph-msgs ros-diagnostic-msgs '
-              'ros-sensor-msgs')
+# By module. A package that needs more adds to it when it is imported.
 REMEDIES = {
-    'rclpy': ROS_REMEDY,
-    'rcl_interfaces': ROS_REMEDY,
-    'std_msgs': ROS_REMEDY,
-    'std_srvs': ROS_REMEDY,
-    'rosgraph_msgs': ROS_REMEDY,
-    'diagnostic_msgs': ROS_REMEDY,
-    'sensor_msgs': ROS_REMEDY,
+    'yaml': 'pip install PyYAML',
     'jinja2': 'pip install Jinja2',
-    'matplotlib': 'pip install matplotlib',
-    'mcap': 'pip install mcap',
-    'cma': 'pip install cma',
-    'distributed': "pip install 'dask[distributed]'",
-    'shtab': 'pip install shtab',
-    'tornado': 'pip install tornado',
-    'foxglove': 'pip install foxglove-sdk',
     'mujoco': 'pip install mujoco',
     'fmpy': 'pip install fmpy',
 }

@@ -12,9 +12,11 @@ from collections.abc import Mapping, Sequence
 import json
 import math
 import numbers
+import os
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
 from simgap.errors import one_line
 
 
@@ -63,6 +65,38 @@ def thaw(value: Any) -> Any:
 def to_json(value: Any) -> str:
     """Return frozen plain data as strict JSON; every double comes back to its last bit."""
     return json.dumps(thaw(value), ensure_ascii=False, allow_nan=False, indent=1)
+
+
+def strict_json(result: object) -> str:
+    """
+    Return a result as strict JSON, as every command writes it.
+
+    NaN, which means that there is no value, becomes null; numpy scalars, arrays and paths
+    become numbers, lists and texts.
+
+    Raises
+    ------
+    ValueError : `result` holds an infinity
+    TypeError : `result` holds something that JSON has no word for
+
+    """
+    return json.dumps(_plain(result), indent=2, allow_nan=False, ensure_ascii=False) + '\n'
+
+
+def _plain(value: object) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if isinstance(value, float) and math.isnan(value):
+        return None
+    return value
 
 
 def _refuse_constant(text: str) -> None:

@@ -9,37 +9,43 @@ refused here, as are files that are no text or too long to be meant.
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from simgap.errors import one_line
 from simgap.inputs.schema import ParameterError
-import yaml
 
 LONGEST_FILE = 1_000_000  # bytes; a test sheet has some hundred
 
 
-class _Loader(yaml.SafeLoader):
-    """Safe loader that refuses aliases and repeated keys."""
+@cache
+def _loader() -> Any:
+    """Return a safe loader that refuses aliases and repeated keys."""
+    import yaml  # who reads no YAML needs no PyYAML
 
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        if self.check_event(yaml.events.AliasEvent):
-            event = self.peek_event()  # type: ignore[no-untyped-call]
-            raise yaml.constructor.ConstructorError(
-                None, None, 'an alias is not allowed', event.start_mark)
-        return super().compose_node(parent, index)
+    class Loader(yaml.SafeLoader):
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            if self.check_event(yaml.events.AliasEvent):
+                event = self.peek_event()  # type: ignore[no-untyped-call]
+                raise yaml.constructor.ConstructorError(
+                    None, None, 'an alias is not allowed', event.start_mark)
+            return super().compose_node(parent, index)
 
-    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
-        seen: set[str] = set()
-        for key, _ in node.value:
-            if not isinstance(key, yaml.ScalarNode):
-                raise yaml.constructor.ConstructorError(
-                    None, None, 'a key must be a word', key.start_mark)
-            if key.value in seen:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f'the key {one_line(key.value)} is given twice', key.start_mark)
-            seen.add(key.value)
-        return super().construct_mapping(node, deep=deep)
+        def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+            seen: set[str] = set()
+            for key, _ in node.value:
+                if not isinstance(key, yaml.ScalarNode):
+                    raise yaml.constructor.ConstructorError(
+                        None, None, 'a key must be a word', key.start_mark)
+                if key.value in seen:
+                    raise yaml.constructor.ConstructorError(
+                        None, None, f'the key {one_line(key.value)} is given twice',
+                        key.start_mark)
+                seen.add(key.value)
+            return super().construct_mapping(node, deep=deep)
+
+    return Loader
 
 
 def parse_yaml(text: str | bytes) -> Any:
@@ -49,12 +55,14 @@ def parse_yaml(text: str | bytes) -> Any:
     Raises
     ------
     ParameterError : no YAML, or a key given twice, or an alias; the message says where
+    ModuleNotFoundError : PyYAML is not installed
 
     """
+    import yaml
     try:
         if isinstance(text, bytes):
             text = text.decode()
-        return yaml.load(text, Loader=_Loader)
+        return yaml.load(text, Loader=_loader())
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f'line {mark.line + 1}, column {mark.column + 1}: ' if mark else ''

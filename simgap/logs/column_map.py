@@ -267,10 +267,9 @@ def _signal(key: str, name: str, body: object, known: KnownSignals) -> SignalMap
             raise ParameterError(f'{key}.counts_per_revolution: goes with the unit counts only')
         si, factor = UNITS[written]
     if unit and si != unit:
-        accepted = [text for text, (target, _) in UNITS.items() if target == unit]
+        same = [text for text, (target, _) in UNITS.items() if target == unit]
         raise ParameterError(f'{key}.unit: {quoted(written)} given, but {name} is in {unit}; '
-                             'allowed is '
-                             f'one of {", ".join((*accepted, COUNTS))}')
+                             f'allowed is one of {", ".join((*same, COUNTS))}')
     own_time = entries.get('time_column')
     return SignalMap(
         _expression(key, entries), si, factor,

@@ -50,7 +50,7 @@ def read_mat(path: Path) -> dict[str, Any]:
     Raises
     ------
     RecordingError
-        if it is of version 7.3, or has more numbers than `antenna_drive.limits` allows
+        if it is of version 7.3, or has more numbers than `simgap.inputs.limits` allows
     ValueError, or another error of scipy's
         if it is damaged
 

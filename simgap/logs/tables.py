@@ -154,7 +154,7 @@ def _arrays(columns: Mapping[str, Any], names: Sequence[str] | None = None) -> T
 
 
 def _upright(values: Any) -> Any:
-    """Return an array without the axis that MATLAB gives to every vector."""
+    """Return an array without the dimension that MATLAB gives to every vector."""
     return values.squeeze() if values.ndim == 2 and 1 in values.shape else values
 
 
@@ -272,7 +272,7 @@ def _parquet(path: Path) -> Table:
         import pyarrow
         from pyarrow import parquet
     except ImportError:
-        raise RecordingError("needs pyarrow: pip install 'antenna_drive[parquet]'") from None
+        raise RecordingError('needs pyarrow: pip install pyarrow') from None
     try:
         file = parquet.ParquetFile(path)
         # what it says of single columns, Arrow reads without a check that a program survives

@@ -8,22 +8,24 @@ This is its public face; docs/own-machine.md leads through it step by step.
 
 from simgap.logs.gaps import without_gaps
 from simgap.logs.log import Log, LogError, OneTest, read_log, read_logs
-from simgap.model.allowed_tests import own_tests, OwnTests
+from simgap.model.allowed_tests import own_tests, OwnTests, propose
+from simgap.model.bench import investigate, ModelBench
 from simgap.model.checking import check_model, Checked
 from simgap.model.declaration import (
     effect, form, free, known, machine, push, reading, ripple, shape, size, within,
 )
 from simgap.model.declared import Model, ModelError
-from simgap.model.diagnose import diagnose_logs, pushes_found, summary_of
+from simgap.model.declared import OwnEffect as Effect
+from simgap.model.diagnose import diagnose_logs, pushes_found
 from simgap.model.loading import load_model
 from simgap.model.machine import OwnMachine
 from simgap.model.named_numbers import Numbers
 from simgap.model.unseen import Unseen, unseen
 
 __all__ = [
-    'check_model', 'Checked', 'diagnose_logs', 'effect', 'form', 'free', 'known', 'load_model',
-    'Log', 'LogError', 'machine', 'Model', 'ModelError', 'Numbers', 'OneTest', 'OwnMachine',
-    'own_tests', 'OwnTests', 'push', 'pushes_found', 'reading', 'read_log',
-    'read_logs', 'ripple', 'shape', 'size', 'summary_of', 'Unseen', 'unseen',
-    'within', 'without_gaps',
+    'check_model', 'Checked', 'diagnose_logs', 'effect', 'Effect', 'form', 'free', 'investigate',
+    'known', 'load_model', 'Log', 'LogError', 'machine', 'Model', 'ModelBench', 'ModelError',
+    'Numbers', 'OneTest', 'OwnMachine', 'own_tests', 'OwnTests', 'propose', 'push',
+    'pushes_found', 'reading', 'read_log', 'read_logs', 'ripple', 'shape', 'size', 'Unseen',
+    'unseen', 'within', 'without_gaps',
 ]

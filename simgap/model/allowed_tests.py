@@ -14,8 +14,11 @@ from simgap.logs.log import Log
 from simgap.machine.contract import FloatArray, Machine, Point
 from simgap.model.declared import Model, ModelError
 from simgap.model.machine import OwnMachine
+from simgap.next_test.candidate import Proposal
+from simgap.next_test.design import objective_for, TestDesign
+from simgap.next_test.rivals import Findings
 from simgap.next_test.space import TestSpace
-import yaml
+from simgap.verdict.record import Verdict
 
 
 class OwnTests(TestSpace):
@@ -76,6 +79,7 @@ class OwnTests(TestSpace):
                  for row in zip(*(values.tolist() for values in columns.values()), strict=True)]
         found = {path: '\n'.join(rows) + '\n'}
         if test.constants:
+            import yaml
             found[path.with_suffix('.yaml')] = yaml.safe_dump(
                 {'constants': dict(test.constants)})
         return found
@@ -99,6 +103,32 @@ def own_tests(model: Model, duration_s: float) -> OwnTests:
         raise ModelError('tests: the model does not say what a test may be; give machine(..., '
                          'tests={kind: f(duration_s, random) -> Log})')
     return OwnTests(model, duration_s)
+
+
+def propose(model: Model, verdict: Verdict | None = None, duration_s: float = 30.0,
+            threads: int = 2, seed: int = 0) -> Proposal:
+    """
+    Design the next test of a machine, among those that its model declares.
+
+    Parameters
+    ----------
+    model
+        with its `tests` and `limits`
+    verdict
+        whose answers the test is to tell apart; None for the test that detects most
+    duration_s
+        of the test [s]
+    threads, seed
+        simulations at once, and the seed of the tests that are drawn
+
+    Raises
+    ------
+    ModelError : the model declares no tests
+
+    """
+    findings = Findings.of_data(verdict.planning) if verdict else Findings()
+    return TestDesign(own_tests(model, duration_s), findings, objective_for(findings),
+                      threads=threads, seed=seed).run()
 
 
 def _rate(test: Log) -> float:

@@ -42,6 +42,12 @@ class Checked:
     faults: Sequence[str]
     remarks: Sequence[str]
 
+    def summary(self) -> str:
+        """Return all that was found, and how much has to be mended."""
+        return '\n'.join([
+            *(f'wrong: {line}' for line in self.faults), *self.remarks,
+            f'{len(self.faults)} to mend' if self.faults else 'nothing is wrong'])
+
 
 def check_model(model: Model, logs: Sequence[Log]) -> Checked:
     """Check a model with logs of its tests; the first fault of the contract ends the check."""

@@ -14,7 +14,7 @@ Examples
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from simgap.errors import UserError
@@ -29,19 +29,41 @@ from simgap.model.pushes import pushes
 from simgap.model.response import derivative_error
 from simgap.next_test.rivals import Rival
 from simgap.settings import DEFAULT, Settings
-from simgap.verdict.diagnosis import diagnose, Diagnosis, Progress
+from simgap.verdict.diagnosis import diagnose, Progress
+from simgap.verdict.record import Verdict
 
 # Pushes that the summary lists.
-_LISTED = 6
+_PUSHES = 6
 # However smooth a simulation is, a fit is linear about its end only so far.
 _LEAST_ERROR = 0.01
+
+
+@dataclass(frozen=True, repr=False)
+class OwnVerdict(Verdict):
+    """
+    A verdict on a declared model.
+
+    Attributes
+    ----------
+    numbers : value, configured and unit of each number of the simulation, as fitted
+    pushes : where something enters that no effect names: test, place, from_s, until_s, size and
+        unit of each push
+
+    """
+
+    numbers: Mapping[str, Any]
+    pushes: Sequence[Mapping[str, Any]]
+
+    def summary(self) -> str:
+        """Return the verdict in a few lines, with what pushes and when."""
+        return '\n'.join([super().summary(), *_pushed(self.pushes)])
 
 
 def diagnose_logs(model: Model, logs: Sequence[Log],
                   progress: Progress = lambda share, doing: None, threads: int = 2,
                   settings: Settings = DEFAULT, without: Sequence[str] = (),
                   limits: Mapping[str, float] | None = None,
-                  earlier: Sequence[Rival] = ()) -> Diagnosis:
+                  earlier: Sequence[Rival] = ()) -> OwnVerdict:
     """
     Say where a machine and its model part, which effect is behind it, and how far it goes.
 
@@ -66,9 +88,7 @@ def diagnose_logs(model: Model, logs: Sequence[Log],
 
     Returns
     -------
-    the diagnosis. Its result has two more entries than docs/diagnosis.md lists: `numbers`, the
-    simulation's numbers as fitted, and, where something enters that no effect names, `pushes`:
-    test, place, from_s, until_s, size and unit of each push
+    the verdict, with the simulation's numbers and what pushes
 
     Raises
     ------
@@ -86,9 +106,8 @@ def diagnose_logs(model: Model, logs: Sequence[Log],
                             f'{", ".join(model.readings)}')
     found = diagnose(machine.without(without), progress, threads,
                      _for_derivatives_of(machine, settings), limits, earlier)
-    found.result['numbers'] = numbers_as_fitted(found.machine, found.best.state.point())
-    found.result['pushes'] = pushes_found(found, settings)
-    return found
+    return OwnVerdict(**vars(found), numbers=numbers_as_fitted(
+        found.machine, found.best.state.point()), pushes=pushes_found(found, settings))
 
 
 def _for_derivatives_of(machine: OwnMachine, settings: Settings) -> Settings:
@@ -129,27 +148,23 @@ def numbers_as_fitted(machine: Machine, point: Point) -> dict[str, Any]:
     return numbers
 
 
-def pushes_found(diagnosis: Diagnosis, settings: Settings = DEFAULT) -> list[dict[str, Any]]:
+def pushes_found(verdict: Verdict, settings: Settings = DEFAULT) -> list[dict[str, Any]]:
     """Return when something enters that no effect names, and how strongly; empty for nothing."""
-    machine = without_labels(diagnosis.machine)
+    machine = without_labels(verdict.machine)
     assert isinstance(machine, OwnMachine)
     labels = {place.name: place for place in machine.disturbance_inputs}
-    best = next(iter(diagnosis.result['may_enter_at']), None)
-    if best is None or best['name'] not in labels:
+    best = next(iter(verdict.may_enter_at), None)
+    if best is None or best.name not in labels:
         return []
-    place = machine.model.push[machine.push_at(best['name'])]
+    place = machine.model.push[machine.push_at(best.name)]
     problem = LeastSquares(machine, settings=settings)
-    return [{'place': best['name'], **vars(item), 'unit': place.unit} for item in pushes(
-        problem, diagnosis.none.state.point(), labels[best['name']])]
+    return [{'place': best.name, **vars(item), 'unit': place.unit} for item in pushes(
+        problem, verdict.none.state.point(), labels[best.name])]
 
 
-def summary_of(diagnosis: Diagnosis) -> str:
-    """Return the verdict in a few lines, with what pushes and when."""
-    lines = [diagnosis.summary()]
-    for item in diagnosis.result['pushes'][:_LISTED]:
-        lines.append(f'  {item["test"]}: {item["place"]} {item["size"]:.3g} {item["unit"]} from '
-                     f'{item["from_s"]:.2f} to {item["until_s"]:.2f} s')
-    more = len(diagnosis.result['pushes']) - _LISTED
-    if more > 0:
-        lines.append(f'  and {more} more, see the JSON')
-    return '\n'.join(lines)
+def _pushed(pushes: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what pushes and when."""
+    lines = [f'  {item["test"]}: {item["place"]} {item["size"]:.3g} {item["unit"]} from '
+             f'{item["from_s"]:.2f} to {item["until_s"]:.2f} s' for item in pushes[:_PUSHES]]
+    more = len(pushes) - _PUSHES
+    return lines + [f'  and {more} more, see the JSON'] if more > 0 else lines

@@ -63,7 +63,7 @@ class FmuModel:
         self._path = path
         self._said = ''
         # lives as long as this object
-        self._folder = TemporaryDirectory(prefix='antenna_drive_fmu_')
+        self._folder = TemporaryDirectory(prefix='simgap_fmu_')
         try:
             described = fmpy.read_model_description(str(path), validate=False)
             fmpy.extract(str(path), self._folder.name)

@@ -42,7 +42,7 @@ def load_model(place: str) -> Model:
     if not path.is_file() or path.suffix != '.py':
         raise ModelError(f'--model {place}: no such Python file; give FILE.py:NAME, or '
                          'FILE.yaml')
-    title = f'antenna_drive_model_{path.stem}'
+    title = f'simgap_model_{path.stem}'
     spec = importlib.util.spec_from_file_location(title, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

@@ -20,7 +20,7 @@ from simgap.machine.by_label import ByLabel, without_labels
 from simgap.machine.contract import FloatArray, Machine, Point
 from simgap.model.machine import OwnMachine
 from simgap.search.hypothesis import Hypothesis
-from simgap.verdict.diagnosis import Diagnosis
+from simgap.verdict.record import Verdict
 
 _RUNS = 40
 
@@ -45,7 +45,7 @@ class Unseen:
     unit: str
 
 
-def unseen(diagnosis: Diagnosis, log: Log,
+def unseen(verdict: Verdict, log: Log,
            push: Mapping[str, FloatArray] | None = None) -> dict[str, Unseen]:
     """
     Return how well a log that was not used is predicted, by reading.
@@ -55,7 +55,7 @@ def unseen(diagnosis: Diagnosis, log: Log,
 
     Parameters
     ----------
-    diagnosis
+    verdict
         from `diagnose_logs`
     log
         another test of the same machine
@@ -63,12 +63,12 @@ def unseen(diagnosis: Diagnosis, log: Log,
         what is known to have entered at some of the model's places, shape (n,) each
 
     """
-    whole, machine = diagnosis.machine, without_labels(diagnosis.machine)
+    whole, machine = verdict.machine, without_labels(verdict.machine)
     assert isinstance(machine, OwnMachine)
     other = OwnMachine(machine.model, [log])
     measured = other.experiments[0].measured
     found = {}
-    points: list[Point] = [{}, *(refitted(whole, h) for h in (diagnosis.none, diagnosis.best))]
+    points: list[Point] = [{}, *(refitted(whole, h) for h in (verdict.none, verdict.best))]
     if isinstance(whole, ByLabel):
         points = [whole.labels.at(point, log.labels) for point in points]
     readings = [other.pushed(_carried(machine, log.name, point), 0, push or {})

@@ -19,7 +19,7 @@ from simgap.parts.ripple import wave
 @inner
 def encoder(angle: float, order: float, cosine: float, sine: float) -> float:
     """
-    Return the reading of a scale with a cyclic error, such as one mounted off its axis [rad].
+    Return the reading of a scale with a cyclic error, such as one mounted off centre [rad].
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from simgap.machine.contract import Experiment, FloatArray
 from simgap.machine.diagram import Diagram, DiagramBlock
-from simgap.verdict.diagnosis import Diagnosis, share_text, value_lines
+from simgap.verdict.record import share_text, value_lines, Verdict
 
 _VERDICTS = {
     'no_gap': ('No gap', 'Machine and model agree within tolerance and noise.'),
@@ -81,32 +81,31 @@ class Contents:
     advice: Sequence[str]
 
 
-def contents(diagnosis: Diagnosis) -> Contents:
+def contents(verdict: Verdict) -> Contents:
     """Return what the page about a diagnosis says."""
-    result, effects = diagnosis.result, diagnosis.machine.catalogue
-    title, lead = _VERDICTS[result['verdict']]
+    effects = verdict.machine.catalogue
+    title, lead = _VERDICTS[verdict.word]
     suspicion = dict.fromkeys((effect.component for effect in effects.values()), 0.0)
-    for entry in result['which']:
-        for component in {effects[name].component for name in entry['effects']
-                          if name in effects}:
-            suspicion[component] += entry['probability']
-    diagram = diagnosis.machine.diagram or Diagram.of(suspicion)
+    for answer in verdict.which:
+        for component in {effects[name].component for name in answer.effects if name in effects}:
+            suspicion[component] += answer.probability
+    diagram = verdict.machine.diagram or Diagram.of(suspicion)
     shares = diagram.shares(suspicion)
-    likely = [Likely(entry['effects'], entry['probability'],
-                     [effects[name].cause for name in entry['effects'] if name in effects],
-                     value_lines(entry['parameters']))
-              for entry in result['which'][:_SHOWN] if entry['probability'] >= _LEAST]
-    fraction = result['how_far']['explained_fraction']
+    likely = [Likely(answer.effects, answer.probability,
+                     [effects[name].cause for name in answer.effects if name in effects],
+                     value_lines(answer.parameters))
+              for answer in verdict.which[:_SHOWN] if answer.probability >= _LEAST]
+    fraction = verdict.how_far['explained_fraction']
     explained = '' if fraction['value'] is None else share_text(fraction)
     return Contents(
-        title, lead, explained, result, diagram,
+        title, lead, explained, verdict.as_data(), diagram,
         [(block, min(shares.get(block.component, 0.0), 1.0)) for block in diagram.blocks],
-        likely, _panels(diagnosis), _advice(diagnosis))
+        likely, _panels(verdict), _advice(verdict))
 
 
-def _panels(diagnosis: Diagnosis) -> list[Panel]:
-    machine = diagnosis.machine
-    before, after = machine.simulate([diagnosis.none.state.point(), diagnosis.best.state.point()])
+def _panels(verdict: Verdict) -> list[Panel]:
+    machine = verdict.machine
+    before, after = machine.simulate([verdict.none.state.point(), verdict.best.state.point()])
     panels: list[Panel] = []
     for experiment, first, second in zip(machine.experiments, before, after, strict=True):
         assert first is not None and second is not None
@@ -130,15 +129,14 @@ def _of_experiment(experiment: Experiment, before: FloatArray,
              [(key, time, measured - values) for key, values in simulated.items()]))
 
 
-def _advice(diagnosis: Diagnosis) -> list[str]:
+def _advice(verdict: Verdict) -> list[str]:
     """Return which tests would settle what is open, as the machine knows them."""
-    result = diagnosis.result
-    names = {name for group in result['confusable'] for name in group}
-    for entry in result['which']:
-        if entry['probability'] > _OPEN:
-            names |= {name for name in entry['effects'] if name in diagnosis.machine.catalogue}
-    if len(names) < 2 and result['verdict'] in ('explained', 'no_gap'):
+    names = {name for group in verdict.confusable for name in group}
+    for answer in verdict.which:
+        if answer.probability > _OPEN:
+            names |= {name for name in answer.effects if name in verdict.machine.catalogue}
+    if len(names) < 2 and verdict.word in ('explained', 'no_gap'):
         return []
     kinds = {name.partition('.')[2] for name in names}
-    return [text for effects, text in diagnosis.machine.advice
+    return [text for effects, text in verdict.machine.advice
             if not effects or kinds & set(effects)]

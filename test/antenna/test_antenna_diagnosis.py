@@ -27,7 +27,7 @@ import pytest
 from simgap.errors import UserError
 from simgap.report.page import contents
 from simgap.report.render import render
-from simgap.verdict.diagnosis import Diagnosis, value_lines
+from simgap.verdict.record import value_lines, Verdict
 
 NOISE = {'ammeter': 0.01, 'tach_rate': 0.0035, 'encoder': 1e-6, 'bias_voltage': 0.01}
 OFFSETS = {
@@ -60,7 +60,7 @@ def made(point: Any, seconds: float, names: tuple[str, ...] = ('square', 'triang
     return recordings
 
 
-def page(diagnosis: Diagnosis) -> str:
+def page(diagnosis: Verdict) -> str:
     return render('verdict.html', **vars(contents(diagnosis)))
 
 
@@ -93,20 +93,20 @@ def check_schema(result: Any) -> Any:
 ])
 def test_known_effect_is_named(effect: Any, value: Any) -> None:
     diagnosis = diagnose_recordings(made({**OFFSETS, effect: value}, 12.0), load())
-    check_schema(diagnosis.result)
-    top = diagnosis.result['which'][0]
+    check_schema(diagnosis.as_data())
+    top = diagnosis.as_data()['which'][0]
     assert top['effects'] == [effect.rpartition('.')[0]]
     low, high = top['parameters'][effect]['ci95']
     assert abs(value - 0.5 * (low + high)) < 2.0 * (high - low)
-    assert diagnosis.result['verdict'] == 'explained'
-    assert diagnosis.result['how_far']['explained_fraction']['value'] > 0.9
+    assert diagnosis.word == 'explained'
+    assert diagnosis.how_far['explained_fraction']['value'] > 0.9
 
 
 @pytest.mark.trial
 def test_offsets_within_the_tolerance_are_no_gap() -> None:
     diagnosis = diagnose_recordings(made(OFFSETS, 12.0), load())
-    check_schema(diagnosis.result)
-    assert diagnosis.result['verdict'] == 'no_gap'
+    check_schema(diagnosis.as_data())
+    assert diagnosis.word == 'no_gap'
     text = page(diagnosis)
     assert text.startswith('<!doctype html>') and 'No gap' in text
     assert 'http' not in text.replace('http-equiv', '')
@@ -124,11 +124,11 @@ def test_what_no_effect_can_do_is_unknown() -> None:
             -np.mod(time, 0.5) / 0.05)
         odd[name] = Recording.from_arrays(time, signals, sheet=recording.sheet)
     diagnosis = diagnose_recordings(odd, load())
-    check_schema(diagnosis.result)
-    assert diagnosis.result['verdict'] == 'unknown_effect'
+    check_schema(diagnosis.as_data())
+    assert diagnosis.word == 'unknown_effect'
     # but where it lies is told
-    assert {item['component'] for item in diagnosis.result['where'][:2]} == {'tach_1'}
-    assert diagnosis.result['may_enter_at'][0]['name'] == 'reading of tach_1'
+    assert {item['component'] for item in diagnosis.where[:2]} == {'tach_1'}
+    assert diagnosis.may_enter_at[0].name == 'reading of tach_1'
     assert 'reading of tach_1' in diagnosis.summary() and 'reading of tach_1' in page(diagnosis)
 
 

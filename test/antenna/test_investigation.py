@@ -13,17 +13,19 @@ from typing import Any
 from antenna_drive.cli import main
 from antenna_drive.diagnosis import investigation
 from antenna_drive.diagnosis.drive_limits import DriveLimits
-from antenna_drive.diagnosis.investigation import Investigation, InvestigationPlan, lines, sensed
+from antenna_drive.diagnosis.investigation import DriveBench, sensed
 from antenna_drive.diagnosis.planned_tests import BUILT_IN
 from antenna_drive.diagnosis.sensors import SensorModel
 from antenna_drive.parameters.loading import load
 from antenna_drive.readings import RATE_COMMAND, SIGNALS
 from antenna_drive.recording.recording import Recording
-from antenna_drive.recording.sheet import load_sheet, Sensors, TestSheet
+from antenna_drive.recording.sheet import load_sheet, Sensors
 import numpy as np
 import pytest
 from simgap.errors import UserError
+from simgap.next_test import investigation as loop
 from simgap.next_test.candidate import Candidate, Proposal
+from simgap.next_test.investigation import Investigation, InvestigationPlan, lines
 from simgap.next_test.rivals import Findings, Rival
 from simgap.next_test.space import TestSpace
 from simgap.report.render import render
@@ -44,12 +46,12 @@ class Laboratory:
         self.done: list[str] = []
         self.helps, self.answers = helps, answers
         monkeypatch.setattr(investigation, 'diagnose_recordings', self.diagnose)
-        monkeypatch.setattr(investigation, 'TestDesign', self.design)
+        monkeypatch.setattr(loop, 'TestDesign', self.design)
 
     def note(self, what: str) -> None:
         self.done.append(what)
 
-    def run_test(self, number: int, sheet: TestSheet, duration: float, out: Path) -> None:
+    def run_test(self, number: int, sheet: Path, duration: float, out: Path) -> None:
         out.write_text('time_s,rate_command_rad_s,encoder_rad\n0.0,0.0,0.0\n0.01,0.0,0.0\n')
         self.note(f'test {number} for {duration:g} s')
 
@@ -65,7 +67,7 @@ class Laboratory:
         answers = self.answers[len(recordings) - 1]
         rivals = [Rival((name,), (name,), ('',), p, (), np.zeros(0), np.zeros((0, 0))).as_data()
                   for name, p in answers.items() if name != 'unknown']
-        return SimpleNamespace(result={
+        return SimpleNamespace(as_data=lambda: {
             'verdict': 'explained', 'confusable': [], 'how_far': {'explained_fraction': {}},
             'which': [{'effects': [name], 'probability': p} for name, p in answers.items()],
             'planning': {'inflation': 1.5, 'rivals': rivals}})
@@ -80,7 +82,8 @@ class Laboratory:
 
 def investigate(folder: Path, lab: Laboratory, **changes: Any) -> dict[str, Any]:
     plan = InvestigationPlan(**{'most': 4, 'until': 0.9, 'duration': 20.0, **changes})
-    return Investigation(folder, DRIVE, LIMITS, BUILT_IN['square'], lab.run_test, plan).run()
+    bench = DriveBench(DRIVE, LIMITS, BUILT_IN['square'], lab.run_test, plan)
+    return Investigation(folder, bench, plan).run()
 
 
 WHOLE = ['detect 0 at 1', 'test 1 for 20 s', 'diagnosis of 1', 'separate 2 at 1.5',

@@ -57,7 +57,7 @@ def test_a_threshold_is_changed_by_its_name_alone() -> None:
 
 
 def test_kept_fits_give_the_same_verdict_and_another_with_other_thresholds() -> None:
-    result = diagnose(Ramp(0.05)).result
+    result = diagnose(Ramp(0.05)).as_data()
     assert result['verdict'] == 'explained'
     evidence = Evidence.of_data(json.loads(json.dumps(result['fits'])))
     again = evidence.decide(DEFAULT)
@@ -78,7 +78,7 @@ def test_a_trial_without_kept_fits_is_told(tmp_path: Path,
     assert main(['thresholds', str(tmp_path)]) == 2
     assert 'fits: is missing' in capsys.readouterr().err
     # those of an earlier version know of no doubt: the verdict would be another one
-    [none, *_] = diagnose(Ramp(0.05)).result['fits']
+    [none, *_] = (dict(fit) for fit in diagnose(Ramp(0.05)).fits)
     del none['doubts']
     (tmp_path / 'case_0001' / 'verdict.json').write_text(json.dumps({'fits': [none]}))
     assert main(['thresholds', str(tmp_path)]) == 2

@@ -15,7 +15,8 @@ from scipy.signal import lfilter
 from simgap.machine.contract import Effect, Experiment, FloatArray, Form, Machine, Parameter, Point
 from simgap.next_test.rivals import Rival
 from simgap.settings import DEFAULT
-from simgap.verdict.diagnosis import diagnose, share_text
+from simgap.verdict.diagnosis import diagnose
+from simgap.verdict.record import share_text
 
 TIME = np.arange(0.0, 10.0, 0.02)
 NOISE = 0.01
@@ -66,7 +67,7 @@ def reading(k: int, point: Point) -> FloatArray:
 @pytest.mark.parametrize('name, size', [
     ('thermometer.gain', 0.1), ('heater.step', -0.3), ('air.draught', 0.4)])
 def test_what_a_machine_has_and_its_model_lacks_is_named(name: str, size: float) -> None:
-    result = diagnose(Body({f'{name}.size': size, 'offset:rate': 0.01})).result
+    result = diagnose(Body({f'{name}.size': size, 'offset:rate': 0.01})).as_data()
     assert result['verdict'] == 'explained'
     top = result['which'][0]
     assert top['effects'] == [name] and top['probability'] > 0.9
@@ -75,21 +76,21 @@ def test_what_a_machine_has_and_its_model_lacks_is_named(name: str, size: float)
 
 
 def test_a_machine_within_its_tolerance_has_no_gap() -> None:
-    assert diagnose(Body({'offset:rate': -0.015})).result['verdict'] == 'no_gap'
+    assert diagnose(Body({'offset:rate': -0.015})).word == 'no_gap'
 
 
 def test_what_no_effect_does_is_unknown() -> None:
-    assert diagnose(Body({}, odd=0.2)).result['verdict'] == 'unknown_effect'
+    assert diagnose(Body({}, odd=0.2)).word == 'unknown_effect'
 
 
 def test_two_effects_at_once_are_both_named() -> None:
-    result = diagnose(Body({'thermometer.gain.size': 0.2, 'heater.step.size': 0.5})).result
+    result = diagnose(Body({'thermometer.gain.size': 0.2, 'heater.step.size': 0.5})).as_data()
     assert set(result['which'][0]['effects']) == {'thermometer.gain', 'heater.step'}
 
 
 def test_three_effects_at_once_are_all_named() -> None:
     result = diagnose(Body({'thermometer.gain.size': 0.2, 'heater.step.size': 0.5,
-                            'air.draught.size': 0.3})).result
+                            'air.draught.size': 0.3})).as_data()
     assert set(result['which'][0]['effects']) == {
         'thermometer.gain', 'heater.step', 'air.draught'}
 
@@ -116,7 +117,7 @@ class Scale(Machine):
 
 def test_an_effect_that_gains_very_much_is_named_though_its_interval_is_wide() -> None:
     """A tenth by which derivatives may be wrong leaves open what drifts; its waves do not."""
-    result = diagnose(Scale({'load.creep.size': 1.0, 'floor.wave.size': 0.05})).result
+    result = diagnose(Scale({'load.creep.size': 1.0, 'floor.wave.size': 0.05})).as_data()
     top = result['which'][0]
     low, high = top['parameters']['load.creep.size']['ci95']
     assert low < 0.0 < 1.0 < high
@@ -127,7 +128,7 @@ def test_a_small_doubt_is_settled_by_what_an_effect_gains() -> None:
     """The doubt of a tenth is left by the width of an interval; the waves end it, too."""
     easier = DEFAULT.changed('interval.sure', 0.15).changed('interval.sure_of_partner', 0.15)
     result = diagnose(Scale({'load.creep.size': 1.0, 'floor.wave.size': 0.05}),
-                      settings=easier).result
+                      settings=easier).as_data()
     creep = Rival.of_data(result['planning']['rivals'][0]).doubts['load.creep']
     by_interval = replace(creep, gain=0.0).probability
     assert 0.05 < by_interval < 0.5
@@ -136,7 +137,7 @@ def test_a_small_doubt_is_settled_by_what_an_effect_gains() -> None:
 
 def test_an_effect_that_the_catalogue_lacks_is_unknown() -> None:
     body = Body({'heater.step.size': -0.3})
-    whole, withheld = (diagnose(machine).result for machine in (
+    whole, withheld = (diagnose(machine).as_data() for machine in (
         body, body.without(['heater.step'])))
     unknown = [next(e['probability'] for e in result['which'] if e['effects'] == ['unknown'])
                for result in (whole, withheld)]
@@ -183,14 +184,14 @@ def of_weather(step: float, wave: float) -> BodyInWeather:
 
 
 def test_what_explains_the_gap_without_an_implausible_course_is_named() -> None:
-    result = diagnose(of_weather(-0.3, 0.008)).result
+    result = diagnose(of_weather(-0.3, 0.008)).as_data()
     assert result['which'][0]['effects'] == ['heater.step']
     assert result['which'][0]['probability'] > 0.9
     assert 'air.weather fits best, as no real one would' in result['notes'][-1]
 
 
 def test_an_implausible_course_that_nothing_else_explains_is_unknown() -> None:
-    result = diagnose(of_weather(-0.3, 0.2)).result
+    result = diagnose(of_weather(-0.3, 0.2)).as_data()
     assert result['verdict'] == 'unknown_effect'
     assert result['which'][1]['effects'] == ['air.weather']
 
@@ -207,13 +208,13 @@ def noisier(body: Body, level: float, corner_hz: float, seed: int = 9) -> Body:
 
 @pytest.mark.parametrize('seed', range(4))
 def test_slow_noise_that_no_sheet_tells_is_no_gap(seed: int) -> None:
-    result = diagnose(noisier(Body({}), 2.0, 0.5, seed)).result
+    result = diagnose(noisier(Body({}), 2.0, 0.5, seed)).as_data()
     assert result['verdict'] == 'no_gap'
     assert result['remains']['near']['noise'] > 1.02 * NOISE
 
 
 def test_an_effect_is_named_beside_slow_noise() -> None:
-    result = diagnose(noisier(Body({'heater.step.size': -0.3}), 2.0, 0.5)).result
+    result = diagnose(noisier(Body({'heater.step.size': -0.3}), 2.0, 0.5)).as_data()
     top = result['which'][0]
     assert top['effects'] == ['heater.step']
     low, high = top['parameters']['heater.step.size']['ci95']
@@ -222,10 +223,10 @@ def test_an_effect_is_named_beside_slow_noise() -> None:
 
 def test_no_gap_says_what_could_hide() -> None:
     """Twice the size that could hide is found."""
-    hidden = {item['effect']: item['size'] for item in diagnose(Body({})).result['could_hide']}
+    hidden = {item['effect']: item['size'] for item in diagnose(Body({})).could_hide}
     assert set(hidden) == {'thermometer.gain', 'heater.step', 'air.draught'}
     for name, size in hidden.items():
-        found = diagnose(Body({f'{name}.size': 2.0 * size})).result['which'][0]
+        found = diagnose(Body({f'{name}.size': 2.0 * size})).as_data()['which'][0]
         assert found['effects'] == [name]
 
 
@@ -236,7 +237,7 @@ def test_what_could_hide_is_said_beside_an_effect_within_its_tolerance() -> None
     tolerant = replace(heater.forms[0].parameters[0], tolerance=0.1)
     shape = Parameter('heater.step.shape', '1', 0.5, 2.0, 0.1, start=1.0, is_shape=True)
     body.catalogue['heater.step'] = replace(heater, forms=(Form('', (tolerant, shape)),))
-    result = diagnose(body).result
+    result = diagnose(body).as_data()
     assert result['verdict'] == 'no_gap'
     assert [item['effect'] for item in result['also_seen']] == ['heater.step']
     hidden = {item['effect']: item['size'] for item in result['could_hide']}
@@ -251,17 +252,17 @@ def short(body: Body, count: int) -> Body:
 
 
 def test_few_samples_are_too_few_to_judge() -> None:
-    assert diagnose(short(Body({}), 20)).result['verdict'] == 'too_few_to_judge'
+    assert diagnose(short(Body({}), 20)).word == 'too_few_to_judge'
 
 
 def test_few_samples_far_from_the_model_are_no_agreement() -> None:
-    result = diagnose(short(Body({}, odd=0.3), 20)).result
+    result = diagnose(short(Body({}, odd=0.3), 20)).as_data()
     assert result['verdict'] not in ('no_gap', 'too_few_to_judge')
 
 
 def test_what_remains_is_said_in_the_unit_of_the_signal() -> None:
     body = Body({}, odd=0.2)
-    remains = diagnose(body, limits={'behind': 0.05, 'near': 0.05}).result['remains']
+    remains = diagnose(body, limits={'behind': 0.05, 'near': 0.05}).remains
     assert remains['behind']['beyond_noise'] == pytest.approx(0.2 / np.sqrt(2.0), rel=0.2)
     assert remains['behind']['unit'] == 'K'
     assert remains['behind']['matters']
@@ -270,7 +271,7 @@ def test_what_remains_is_said_in_the_unit_of_the_signal() -> None:
 
 def test_a_diagnosis_says_itself_in_one_line() -> None:
     said = repr(diagnose(Body({'heater.step.size': -0.3})))
-    assert said.startswith('<Diagnosis: explained, heater.step 9') and len(said) < 80
+    assert said.startswith('<Verdict: explained, heater.step 9') and len(said) < 80
 
 
 def test_an_effect_that_widens_the_gap_explains_nothing_of_it() -> None:
@@ -287,14 +288,13 @@ def test_an_effect_that_widens_the_gap_explains_nothing_of_it() -> None:
 ])
 def test_the_text_says_of_which_effects_a_share_is(judged: list[str], said: list[str]) -> None:
     diagnosis = diagnose(Body({'heater.step.size': -0.3}))
-    named = {**diagnosis.result['statements']['named'], 'best_of_catalogue': ['a', 'b']}
+    named = {**diagnosis.statements['named'], 'best_of_catalogue': ['a', 'b']}
     fraction = ({'value': 0.9, 'ci95': [0.8, 0.99]} if judged else
                 {'value': None, 'reason': 'why'})
-    text = replace(diagnosis, result={
-        **diagnosis.result, 'statements': {'named': named}, 'how_far': {
-            'explained_fraction': fraction, 'held_out': 'the rest', 'judged': judged,
-            'cannot_be_judged': {name: f'why {name}' for name in 'ab' if name not in judged},
-        }}).summary()
+    text = replace(diagnosis, statements={'named': named}, how_far={
+        'explained_fraction': fraction, 'held_out': 'the rest', 'judged': judged,
+        'cannot_be_judged': {name: f'why {name}' for name in 'ab' if name not in judged},
+    }).summary()
     assert [line.strip() for line in text.splitlines() if 'of the gap' in line] == said
 
 
@@ -302,7 +302,7 @@ def test_what_closes_nothing_of_withheld_data_is_not_named() -> None:
     """A step of another sign in each test fits both together, and predicts neither."""
     body, other = Body({'heater.step.size': 0.5}), Body({'heater.step.size': -0.25})
     body.experiments = (body.experiments[0], other.experiments[1])
-    result = diagnose(body).result
+    result = diagnose(body).as_data()
     assert result['verdict'] == 'unknown_effect'
     assert {name for entry in result['which'] for name in entry['effects']} == {'none', 'unknown'}
     assert any(note.startswith('heater.step fits best') for note in result['notes'])

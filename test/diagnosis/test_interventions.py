@@ -65,7 +65,7 @@ def number_of(result: Mapping[str, Any], name: str) -> dict[str, Any]:
 
 def test_an_effect_that_differs_is_told_with_its_difference_and_one_that_stays_stays() -> None:
     result = diagnose(of_loads({'heater.step.size': -0.3, 'thermometer.gain.size': 0.1},
-                               {'heater.step.size': -0.5, 'thermometer.gain.size': 0.1})).result
+                               {'heater.step.size': -0.5, 'thermometer.gain.size': 0.1})).as_data()
     assert set(result['which'][0]['effects']) == {'heater.step', 'thermometer.gain'}
     [label] = result['labels']
     assert label['label'] == 'load'
@@ -89,7 +89,7 @@ def test_an_effect_under_one_label_alone_or_of_two_signs_is_found(
     truths = [{'heater.step.size': under_a}, {'heater.step.size': under_b}]
     order = [0, 1] if tests == 2 else [0, 0, 1, 1]
     result = diagnose(Body([truths[i] for i in order],
-                           [{'load': 'AB'[i]} for i in order])).result
+                           [{'load': 'AB'[i]} for i in order])).as_data()
     top = result['which'][0]
     assert result['verdict'] == 'explained' and top['effects'] == ['heater.step']
     assert top['probability'] > 0.9
@@ -105,7 +105,7 @@ def test_an_effect_under_one_label_alone_or_of_two_signs_is_found(
 
 
 def test_an_equal_effect_is_named_with_one_size_and_carries_from_label_to_label() -> None:
-    result = diagnose(of_loads({'heater.step.size': -0.3}, {'heater.step.size': -0.3})).result
+    result = diagnose(of_loads({'heater.step.size': -0.3}, {'heater.step.size': -0.3})).as_data()
     assert list(result['which'][0]['parameters']) == ['heater.step.size']
     [label] = result['labels']
     assert label['stay'] == ['heater.step'] and label['differ'] == []
@@ -115,7 +115,7 @@ def test_an_equal_effect_is_named_with_one_size_and_carries_from_label_to_label(
 
 def test_what_was_learned_under_one_label_fails_under_the_other() -> None:
     """Learned without the heater, it cannot be judged; learned with it, the gap is wider."""
-    result = diagnose(of_loads({'heater.step.size': -0.3}, {})).result
+    result = diagnose(of_loads({'heater.step.size': -0.3}, {})).as_data()
     [label] = result['labels']
     assert label['explained_fraction']['value'] < 0.0
     assert result['how_far']['explained_fraction']['value'] > 0.9
@@ -125,7 +125,7 @@ def test_what_was_learned_under_one_label_fails_under_the_other() -> None:
 
 
 def test_the_difference_of_a_healthy_machine_names_nothing() -> None:
-    result = diagnose(of_loads({}, {})).result
+    result = diagnose(of_loads({}, {})).as_data()
     assert result['verdict'] == 'no_gap'
     assert result['labels'][0]['numbers'] == []
 
@@ -134,7 +134,7 @@ def test_without_labels_or_with_one_value_the_machine_is_not_touched() -> None:
     plain = Body([{'heater.step.size': -0.3}] * 2, [{}] * 2)
     assert by_label(plain) is plain
     one = Body([{'heater.step.size': -0.3}] * 2, [{'load': 'A'}] * 2)
-    first, second = diagnose(plain).result, diagnose(one).result
+    first, second = diagnose(plain).as_data(), diagnose(one).as_data()
     assert 'labels' not in first
     for result in (first, second):
         del result['seconds']

@@ -151,7 +151,7 @@ def test_where_nothing_is_nothing_is_located() -> None:
 def test_the_next_test_is_told_where_something_without_a_name_may_act(
         size: float, word: str, side: str) -> None:
     forces = {'left': 0.0 * TIME, 'right': 0.0 * TIME, side: size * smooth(1)}
-    found = diagnose(TwoLags(**forces)).result
+    found = diagnose(TwoLags(**forces)).as_data()
     assert found['verdict'] == word
     unnamed = found['planning']['unnamed']
     if not size:

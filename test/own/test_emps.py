@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from simgap.model import check_model, diagnose_logs, load_model, Log, Model, read_log, unseen
-from simgap.verdict.diagnosis import Diagnosis
+from simgap.verdict.record import Verdict
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get('ANTENNA_DRIVE_EMPS', ROOT.parent / 'shared' / 'data' / 'emps'))
@@ -31,7 +31,7 @@ def model() -> Model:
 
 
 @pytest.fixture(scope='module')
-def plain(model: Model) -> Diagnosis:
+def plain(model: Model) -> Verdict:
     return diagnose_logs(model, [read_log(DATA / 'emps.csv')])
 
 
@@ -39,14 +39,14 @@ def test_nothing_is_wrong_with_the_model(model: Model) -> None:
     assert check_model(model, [read_log(DATA / 'emps.csv')]).faults == []
 
 
-def test_the_asymmetric_friction_is_named(plain: Diagnosis) -> None:
-    named = next(entry for entry in plain.result['which'] if entry['effects'] != ['unknown'])
-    assert 'guide.friction_asymmetry' in named['effects']
-    asymmetry = named['parameters']['guide.friction_asymmetry.viscous_asymmetry']
+def test_the_asymmetric_friction_is_named(plain: Verdict) -> None:
+    named = next(entry for entry in plain.which if entry.effects != ['unknown'])
+    assert 'guide.friction_asymmetry' in named.effects
+    asymmetry = named.parameters['guide.friction_asymmetry.viscous_asymmetry']
     assert asymmetry['ci95'][1] < -0.05  # more drag on the way back
 
 
-def test_the_recording_that_was_not_fitted_is_predicted_better(plain: Diagnosis) -> None:
+def test_the_recording_that_was_not_fitted_is_predicted_better(plain: Verdict) -> None:
     """At least 30 percent below the authors' symmetric model, as published and as fitted."""
     log = read_log(DATA / 'emps_pulses.csv')
     added = VOLT_PER_RECORDED * log['force_pulses_N']
@@ -62,7 +62,7 @@ def test_the_hidden_pulses_are_found(model: Model) -> None:
     falls = log.time[np.flatnonzero(np.diff(truth) < 0.0) + 1]
     hidden = Log(log.name, log.time, {name: values for name, values in log.columns.items()
                                       if name in ('reference_m', 'position_m')})
-    found = diagnose_logs(model, [hidden]).result
+    found = diagnose_logs(model, [hidden]).as_data()
     assert found['verdict'] in ('unknown_effect', 'partly_explained')
     assert found['may_enter_at'][0]['name'] == 'force'
     begins = np.array([item['from_s'] for item in found['pushes']])

@@ -76,7 +76,7 @@ def test_the_verdict_is_the_same_in_each_way(fault: str, named: str,
     logs = logs_of(fault)
     found = {}
     for way, model in models.items():
-        which = diagnose_logs(model, logs).result['which']
+        which = diagnose_logs(model, logs).as_data()['which']
         found[way] = {'+'.join(item['effects']): item['probability'] for item in which}
     for probabilities in found.values():
         if named:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""The two commands for a machine of one's own, as a user types them."""
+"""The commands for a machine of one's own, as a user types them: simgap's and the drive's."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from antenna_drive.cli import main
 import numpy as np
 from own.swing import log_of
 import pytest
+import simgap.cli
 
 MODEL = 'from own.swing import swing\nmachine = swing()\n'
 DEAF = ('from own.swing import simulate, swing\n'
@@ -91,3 +92,25 @@ def test_check_model_says_yes_or_what_is_wrong(folder: Path,
     assert 'wrong: decay: the simulation never asks for numbers.decay' in out
     faults = json.loads((folder / 'c.json').read_text())['faults']
     assert out.endswith(f'{len(faults)} to mend\n')
+    assert simgap.cli.main(['check', f'{folder}/model.py', *logs]) == 0
+    assert simgap.cli.main(['check', f'{folder}/deaf.py', *logs]) == 1
+    assert capsys.readouterr().out.endswith(f'{len(faults)} to mend\n')
+
+
+def test_both_programs_say_the_same(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model, logs = f'{folder}/model.py', [f'{folder}/far.csv', f'{folder}/near.csv']
+    assert main(['diagnose', '--model', model, *logs, '--json', f'{folder}/a.json']) == 0
+    drive = capsys.readouterr().out
+    assert simgap.cli.main(['diagnose', model, *logs, '--json', f'{folder}/b.json']) == 0
+    assert capsys.readouterr().out == drive
+    first, second = (json.loads((folder / f'{name}.json').read_text()) for name in 'ab')
+    assert [*first] == [*second]
+    assert {**first, 'seconds': 0} == {**second, 'seconds': 0}
+
+
+@pytest.mark.parametrize('words', [[], *([name] for name in simgap.cli.COMMANDS)])
+def test_simgap_teaches(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as left:
+        simgap.cli.main([*words, '--help'])
+    assert left.value.code == 0
+    assert 'usage: simgap' in capsys.readouterr().out

@@ -11,8 +11,7 @@ from own.swing import log_of, logs, NOISE, simulate, swing, TIME
 import pytest
 from simgap.errors import UserError
 from simgap.model import (
-    diagnose_logs, effect, free, Log, machine, OwnMachine, reading, ripple, size, summary_of,
-    unseen,
+    diagnose_logs, effect, free, Log, machine, OwnMachine, reading, ripple, size, unseen,
 )
 from simgap.report.page import contents
 from simgap.report.render import render
@@ -20,9 +19,9 @@ from simgap.report.render import render
 
 def test_nothing_is_named_where_nothing_is_wrong() -> None:
     found = diagnose_logs(swing(), logs())
-    assert found.result['verdict'] == 'no_gap'
-    assert found.result['pushes'] == []
-    numbers = found.result['numbers']
+    assert found.word == 'no_gap'
+    assert found.pushes == []
+    numbers = found.numbers
     assert numbers['decay']['value'] == pytest.approx(0.104, abs=1e-3)
     assert numbers['bias']['value'] == pytest.approx(0.05, abs=1e-3)
     assert numbers['start[near]']['value'] == pytest.approx(0.4, abs=2e-3)
@@ -31,11 +30,11 @@ def test_nothing_is_named_where_nothing_is_wrong() -> None:
 
 def test_the_missing_effect_is_named_with_its_size() -> None:
     found = diagnose_logs(swing(), logs({'drift': 0.01}))
-    first = found.result['which'][0]
-    assert found.result['verdict'] == 'explained' and first['effects'] == ['sensor.drift']
-    drift = first['parameters']['sensor.drift.drift']
+    first = found.which[0]
+    assert found.word == 'explained' and first.effects == ['sensor.drift']
+    drift = first.parameters['sensor.drift.drift']
     assert drift['value'] == pytest.approx(0.01, rel=0.05) and drift['unit'] == 'rad/s'
-    assert found.result['numbers']['drift']['value'] == drift['value']
+    assert found.numbers['drift']['value'] == drift['value']
 
 
 def test_a_smooth_simulation_has_the_intervals_of_least_squares() -> None:
@@ -53,7 +52,7 @@ def test_a_smooth_simulation_has_the_intervals_of_least_squares() -> None:
         push={}, settles_s=0.1), [
             Log(f'day {k}', TIME, {'weight': 0.3 * wave + noise * random.normal(size=TIME.size)})
             for k in range(4)])
-    [creep] = found.result['which'][0]['parameters'].values()
+    [creep] = found.which[0].parameters.values()
     columns = np.tile(np.column_stack([TIME, wave]), (4, 1)) / noise
     deviation = np.sqrt(np.linalg.inv(columns.T @ columns)[1, 1])
     low, high = creep['ci95']
@@ -63,8 +62,8 @@ def test_a_smooth_simulation_has_the_intervals_of_least_squares() -> None:
 
 def test_the_order_of_a_ripple_is_found() -> None:
     found = diagnose_logs(swing(), logs({'wave_sine': 0.01, 'wave_order': 17.0}))
-    assert found.result['which'][0]['effects'] == ['sensor.wave']
-    numbers = found.result['numbers']
+    assert found.which[0].effects == ['sensor.wave']
+    numbers = found.numbers
     assert numbers['wave_order']['value'] == 17.0
     assert numbers['wave_sine']['value'] == pytest.approx(0.01, rel=0.05)
     assert 'wave_sine@17 = ' in found.summary()
@@ -86,8 +85,8 @@ def test_the_second_harmonic_of_a_ripple_is_no_effect_of_its_own() -> None:
         *swing().effects[:2],
         ripple('sensor.wave', 'wave', size(-0.1, 0.1, 'rad'), 'turn', harmonics=2)])
     found = diagnose_logs(model, measured)
-    assert found.result['which'][0]['effects'] == ['sensor.wave']
-    numbers = found.result['numbers']
+    assert found.which[0].effects == ['sensor.wave']
+    numbers = found.numbers
     assert numbers['wave_order']['value'] == 9.0
     assert numbers['wave_sine']['value'] == pytest.approx(0.01, rel=0.05)
     assert numbers['wave_cosine_2']['value'] == pytest.approx(0.004, rel=0.1)
@@ -100,15 +99,15 @@ def test_what_pushes_is_told_with_its_place_its_times_and_its_size() -> None:
     for begin, end in edges:
         wind[(TIME >= begin) & (TIME < end)] = 0.05
     found = diagnose_logs(swing(), logs(wind=wind), without=['sensor.slip', 'sensor.drift'])
-    assert found.result['verdict'] in ('unknown_effect', 'partly_explained')
-    assert found.result['may_enter_at'][0]['name'] == 'wind on the swing'
+    assert found.word in ('unknown_effect', 'partly_explained')
+    assert found.may_enter_at[0].name == 'wind on the swing'
     for name in ('far', 'near'):
-        told = [item for item in found.result['pushes'] if item['test'] == name]
+        told = [item for item in found.pushes if item['test'] == name]
         assert [item['unit'] for item in told] == ['rad'] * 3
         for item, edge in zip(told, edges, strict=True):
             assert (item['from_s'], item['until_s']) == pytest.approx(edge, abs=0.05)
             assert item['size'] == pytest.approx(0.05, rel=0.15)
-    assert 'far: wind on the swing 0.0' in summary_of(found)
+    assert 'far: wind on the swing 0.0' in found.summary()
 
 
 def test_a_log_that_was_not_used_is_predicted_to_the_noise_with_the_effect_only() -> None:

@@ -6,14 +6,17 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from antenna_drive.cli import main
 import numpy as np
-from own.swing import swing
+from own.swing import NOISE, RATE_NOISE, swing
 import pytest
+import simgap
 from simgap.model import effect, Log, Model, ModelError, own_tests, read_log, size
 from simgap.next_test.design import DesignEffort, TestDesign
+from simgap.next_test.investigation import DECIDED, InvestigationPlan
 from simgap.next_test.rivals import Findings, Rival
 
 SMALL = DesignEffort(drawn=6, judged=4, varied=1, variants=1, confirmed=1)
@@ -118,3 +121,26 @@ def test_the_command_writes_the_commands_of_the_test(
     assert 0.1 < back.constants['height'] <= SMALL.margin * 1.5
     assert 'next test: push-off' in (tmp_path / 'next.yaml').read_text()
     assert 'bearing.oil' in (tmp_path / 'next.html').read_text()
+
+
+def test_an_investigation_plays_tests_until_the_answer_is_sure(tmp_path: Path) -> None:
+    """The same call after it plays nothing, and tells the same story."""
+    played = []
+
+    def play(number: int, test: Path, duration: float, out: Path) -> None:
+        commands, random = read_log(test), np.random.default_rng(number)
+        truth = simulate(SimpleNamespace(decay=0.1, more=0.1, dry=0.0), commands)
+        np.savetxt(out, np.column_stack([
+            commands.time, commands['turn'],
+            truth['angle'] + NOISE * random.normal(size=commands.time.size),
+            truth['rate'] + RATE_NOISE * random.normal(size=commands.time.size)]),
+            delimiter=',', comments='', header='time_s,turn,angle,rate')
+        played.append((number, duration))
+
+    plan = InvestigationPlan(most=3, until=0.8, duration=10.0)
+    story = simgap.investigate(model(), tmp_path, play, plan, threads=1)
+    assert story['ended'] == DECIDED
+    assert played == [(1, 10.0), (2, 10.0)]
+    assert [test['answers'][0]['effects'] for test in story['tests']] == [['bearing.oil']] * 2
+    assert simgap.investigate(model(), tmp_path, play, plan, threads=1) == story
+    assert len(played) == 2

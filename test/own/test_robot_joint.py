@@ -33,7 +33,7 @@ def logs_with(faults: dict[str, float], first_seed: int = 0, **labels: str) -> l
 def test_a_joint_in_good_order_has_no_gap() -> None:
     logs = logs_of('nothing')
     assert check_model(MODEL, logs).faults == []
-    assert diagnose_logs(MODEL, logs).result['verdict'] == 'no_gap'
+    assert diagnose_logs(MODEL, logs).word == 'no_gap'
 
 
 @pytest.mark.parametrize(('fault', 'effect', 'number', 'size'), [
@@ -44,9 +44,9 @@ def test_a_joint_in_good_order_has_no_gap() -> None:
     ('delay', 'controller.delay', 'delay', 0.004)])
 def test_the_fault_of_a_joint_is_named_with_its_size(fault: str, effect: str, number: str,
                                                      size: float) -> None:
-    first = diagnose_logs(MODEL, logs_of(fault)).result['which'][0]
-    assert first['effects'] == [effect]
-    assert first['parameters'][f'{effect}.{number}']['value'] == pytest.approx(size, rel=0.1)
+    first = diagnose_logs(MODEL, logs_of(fault)).which[0]
+    assert first.effects == [effect]
+    assert first.parameters[f'{effect}.{number}']['value'] == pytest.approx(size, rel=0.1)
 
 
 def test_what_a_repair_changes_is_told_and_what_it_leaves_too() -> None:
@@ -54,7 +54,7 @@ def test_what_a_repair_changes_is_told_and_what_it_leaves_too() -> None:
     found = diagnose_logs(MODEL, [
         *logs_with({'asymmetry': 0.35, 'delay': 0.004}, 0, repair='before'),
         *logs_with({'asymmetry': 0.15, 'delay': 0.004}, 2, repair='after')])
-    result = found.result
+    result = found.as_data()
     assert set(result['which'][0]['effects']) == {'motor.friction_asymmetry', 'controller.delay'}
     [label] = result['labels']
     assert label['differ'] == ['motor.friction_asymmetry']

@@ -7,6 +7,7 @@ from __future__ import annotations
 from pathlib import Path
 import subprocess
 
+from antenna_drive.remedies import ROS_REMEDY
 from installations import bare_environment, install_in_new_venv, NODES, ROOT
 import pytest
 from simgap.command.programs import NOT_INSTALLED
@@ -51,6 +52,14 @@ def test_help(prefix: Path) -> None:
     assert 'usage: antenna-drive' in done.stdout
 
 
+def test_engine_comes_along_and_no_laboratory(prefix: Path) -> None:
+    """The engine has its own command; the laboratory is run from a checkout."""
+    done = run(prefix, 'simgap', '--help')
+    assert (done.returncode, done.stderr) == (0, '')
+    assert 'usage: simgap' in done.stdout
+    assert run(prefix, 'python', '-c', 'import lab').returncode == 1
+
+
 def test_module(prefix: Path) -> None:
     """`python -m antenna_drive` is the same command."""
     assert (run(prefix, 'python', '-m', 'antenna_drive', '--version').stdout
@@ -83,7 +92,7 @@ def test_everything_but_the_nodes_can_be_imported(prefix: Path) -> None:
     done = run(prefix, 'python', '-c', IMPORT_EVERYTHING)
     assert done.returncode == 0, done.stderr
     missing = dict(line.split() for line in done.stdout.splitlines())
-    ros = {name for name, module in missing.items() if 'ROS 2' in REMEDIES[module]}
+    ros = {name for name, module in missing.items() if REMEDIES[module] == ROS_REMEDY}
     assert {name for name in ros
             if name.split('.')[1] not in ('lockstep', 'nodes', 'campaign', 'live')} == set()
 

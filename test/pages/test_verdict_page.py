@@ -19,7 +19,7 @@ import pytest
 from simgap.machine.contract import Effect, Experiment
 from simgap.machine.diagram import Diagram, DiagramBlock
 from simgap.report.page import contents
-from simgap.verdict.diagnosis import Diagnosis
+from simgap.verdict.record import Named, Verdict
 
 needs_browser = pytest.mark.skipif(EXECUTABLE is None, reason='there is no Chromium '
                                                               '(apt-get install chromium)')
@@ -64,7 +64,7 @@ BARE: dict[str, Any] = {
 TIME = np.linspace(0.0, 1.99, 200)
 
 
-def diagnosis(result: dict[str, Any], **machine: Any) -> Diagnosis:
+def diagnosis(result: dict[str, Any], **machine: Any) -> Verdict:
     """Return a diagnosis of a machine with two tests and two effects."""
     true = np.column_stack([np.sin(TIME), np.cos(TIME)])
     measured = true.copy()
@@ -78,7 +78,12 @@ def diagnosis(result: dict[str, Any], **machine: Any) -> Diagnosis:
         simulate=lambda points: [[true - 1.0] * 2, [true] * 2],
         **{'diagram': None, 'advice': (), **machine})
     fit: Any = SimpleNamespace(state=SimpleNamespace(point=dict))
-    return Diagnosis(result, model, fit, fit)  # type: ignore[arg-type]
+    entries = {'statements': {}, 'fits': [], 'planning': {}, 'labels': None, **result}
+    return Verdict(**{
+        **{key: value for key, value in entries.items() if key != 'verdict'},
+        'word': result['verdict'], 'which': [Named(**answer) for answer in result['which']],
+        'may_enter_at': [SimpleNamespace(**place) for place in result['may_enter_at']],
+        'machine': model, 'none': fit, 'best': fit})
 
 
 @pytest.fixture

@@ -1,0 +1,23 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a plain installation of the drive may lack, and how to get it."""
+
+from __future__ import annotations
+
+from simgap.command.remedies import REMEDIES
+
+ROS_REMEDY = ("source a ROS 2 installation, or on x86-64 Linux: pip install 'ros-rclpy[fastrtps]' "
+              'ros-std-msgs ros-std-srvs ros-rosgraph-msgs ros-diagnostic-msgs '
+              'ros-sensor-msgs')
+REMEDIES.update(dict.fromkeys((
+    'rclpy', 'rcl_interfaces', 'std_msgs', 'std_srvs', 'rosgraph_msgs', 'diagnostic_msgs',
+    'sensor_msgs'), ROS_REMEDY))
+REMEDIES.update({
+    'matplotlib': 'pip install matplotlib',
+    'mcap': 'pip install mcap',
+    'cma': 'pip install cma',
+    'distributed': "pip install 'dask[distributed]'",
+    'shtab': 'pip install shtab',
+    'tornado': 'pip install tornado',
+    'foxglove': 'pip install foxglove-sdk',
+})

@@ -1,0 +1,131 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Say where a machine and its model part, which effect is behind it, and how far the gap shrinks.
+
+Give a model and the logs of some tests of one machine. The more different the tests, the surer the
+verdict.
+
+For example:
+
+  simgap diagnose my_machine.py:machine logs/*.csv
+  simgap diagnose my_machine.yaml logs/*.csv --map map.yaml --json verdict.json --report page.html
+  simgap diagnose my_machine.py logs/*.csv more.csv --after verdict.json
+
+--after takes a verdict on some of the logs. Its answers are fitted to all of them, each from where
+its fit had ended, beside what is found afresh.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from simgap.command.large_arrays import give_back_large_arrays
+from simgap.command.output import (
+    add_json_option, check_options, give, Progress, replaced, warnings_in_one_line,
+)
+from simgap.command.verdict_file import findings_of, planning_of
+from simgap.errors import UserError
+from simgap.inputs.schema import Entry
+
+if TYPE_CHECKING:
+    from simgap.next_test.rivals import Rival
+    from simgap.settings import Settings
+    from simgap.verdict.record import Verdict
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.add_argument('model', metavar='MODEL',
+                        help='FILE.py:NAME of a declared model, or a model file FILE.yaml')
+    parser.add_argument('logs', nargs='+', metavar='LOG', help='logs of its tests')
+    add_map_option(parser)
+    add_diagnosis_options(parser, 'angle=0.001')
+
+
+def add_map_option(parser: argparse.ArgumentParser) -> None:
+    """Add `--map`."""
+    parser.add_argument('--map', type=Path, metavar='MAP.yaml',
+                        help='which column is which, and how it is written')
+
+
+def add_diagnosis_options(parser: argparse.ArgumentParser, example: str) -> None:
+    """Add what every diagnosis understands; `example` is a remainder that matters."""
+    add_json_option(parser)
+    parser.add_argument('--report', metavar='FILE', help='write a self-contained page to FILE')
+    parser.add_argument('--jobs', type=int, default=2, metavar='N',
+                        help='simulations at once (default: 2)')
+    parser.add_argument('--after', type=Path, metavar='VERDICT',
+                        help='JSON of a diagnosis of some of these recordings, whose answers are '
+                             'fitted to all of them')
+    parser.add_argument('--without', action='append', default=[], metavar='EFFECT',
+                        help='leave an effect out of the catalogue, to see what is then said')
+    parser.add_argument('--matters', action='append', default=[], metavar='SIGNAL=VALUE',
+                        help="say of a signal's remainder beyond noise whether it is larger than "
+                             f'VALUE, in the unit of the signal, e.g. {example}')
+    parser.add_argument('--threshold', action='append', default=[], metavar='NAME=VALUE',
+                        help='change a threshold of simgap.settings')
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Diagnose, and write what was asked for; 0 whatever the verdict."""
+    return diagnosed(arguments.model, arguments.logs, arguments)
+
+
+def diagnosed(name: str, paths: Sequence[str], arguments: argparse.Namespace) -> int:
+    """Diagnose a machine by its model and its logs; options as in `add_diagnosis_options`."""
+    check_options(arguments, jobs=Entry('', 1, whole=True))
+    give_back_large_arrays()
+    from simgap.model import diagnose_logs, load_model, read_logs
+
+    model, earlier = load_model(name), earlier_of(arguments.after)
+    with warnings_in_one_line():
+        logs = read_logs(paths, arguments.map)
+    with Progress('diagnosis', 1.0) as progress:
+        verdict = diagnose_logs(
+            model, logs, lambda share, doing: progress.update(share), arguments.jobs,
+            settings_of(arguments.threshold), arguments.without,
+            dict(numbers_of('--matters', arguments.matters)), earlier)
+    write_report(arguments.report, verdict)
+    give(verdict.as_data(), arguments.json, verdict.summary())
+    return 0
+
+
+def earlier_of(path: Path | None) -> Sequence[Rival]:
+    """Return the answers of the verdict of --after."""
+    return findings_of(path, planning_of(path)).rivals if path else ()
+
+
+def write_report(path: str | None, verdict: Verdict) -> None:
+    """Write the page about a diagnosis, if one was asked for."""
+    if path:
+        from simgap.report.page import contents
+        from simgap.report.render import render
+        with replaced(Path(path)) as stream:
+            stream.write(render('verdict.html', **vars(contents(verdict))).encode())
+
+
+def numbers_of(option: str, texts: Sequence[str]) -> Iterator[tuple[str, float]]:
+    """Yield name and value of each NAME=VALUE."""
+    for text in texts:
+        name, _, value = text.partition('=')
+        try:
+            yield name, float(value)
+        except ValueError as error:
+            raise UserError(f'{option} {text}: {value!r} given, allowed is a number') from error
+
+
+def settings_of(changes: Sequence[str]) -> Settings:
+    """Return the thresholds with what was given changed."""
+    from simgap.settings import DEFAULT
+    settings = DEFAULT
+    known = {name: value for name, _, value in DEFAULT.entries()}
+    for name, value in numbers_of('--threshold', changes):
+        if name not in known:
+            raise UserError(f'--threshold {name}: no such threshold; simgap/settings.py lists '
+                            'them')
+        settings = settings.changed(name, type(known[name])(value))
+    return settings

@@ -1,0 +1,186 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a diagnosis says: a record for programs, with a few lines for people and the JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+from simgap.inputs.plain import strict_json
+from simgap.machine.contract import Machine
+from simgap.search.hypothesis import Hypothesis
+from simgap.verdict.interventions import lines as lines_of_labels
+from simgap.verdict.localisation import Located
+from simgap.verdict.unknown_input import Place
+
+# An effect of more parameters than this is summed up instead of listed.
+_LISTED = 12
+
+_HEADLINES = {
+    'no_gap': 'no gap: machine and model agree within tolerance and noise',
+    'too_few_to_judge': 'too few samples to judge: no gap shows, and none could',
+    'explained': 'explained: one of the known effects closes the gap',
+    'partly_explained': 'partly explained: a known effect closes some of the gap',
+    'unknown_effect': 'unknown effect: nothing in the catalogue closes the gap',
+}
+
+
+@dataclass(frozen=True)
+class Named:
+    """
+    An answer.
+
+    Attributes
+    ----------
+    effects : that it names, ['none'] or ['unknown']
+    probability : 0 to 1
+    parameters : value, ci95, unit and more of each number of its effects, by name
+
+    """
+
+    effects: Sequence[str]
+    probability: float
+    parameters: Mapping[str, Any]
+
+
+@dataclass(frozen=True, repr=False)
+class Verdict:
+    """
+    What a diagnosis found. docs/diagnosis.md explains each entry of the JSON.
+
+    Attributes
+    ----------
+    word : no_gap, too_few_to_judge, explained, partly_explained or unknown_effect
+    statements : what is named beside its runner-up
+    where : shares of the gap by part, signal and regime
+    which : the answers, the likeliest first
+    also_seen, confusable : effects that show a little, and groups that cannot be told apart
+    how_far : how much of the gap of withheld data the effects explain
+    could_hide : the least size of each effect that would have shown, where no gap does
+    remains, residual_tests : what is not explained, by signal
+    may_enter_at : places where an unknown input may act, the likeliest first
+    fits : every fit that the verdict was decided on
+    planning : what the design of a further test needs
+    seconds : of computing
+    notes : for people
+    labels : how effects differ between labels; None if they do not
+    machine : that was compared, with the noise of the motion that was found; where tests carry
+        labels, a `by_label.ByLabel` around it
+    none, best : the hypotheses without and with the likeliest effects
+
+    """
+
+    word: str
+    statements: Mapping[str, Any]
+    where: Sequence[Located]
+    which: Sequence[Named]
+    also_seen: Sequence[Mapping[str, Any]]
+    confusable: Sequence[Sequence[str]]
+    how_far: Mapping[str, Any]
+    could_hide: Sequence[Mapping[str, Any]]
+    remains: Mapping[str, Any]
+    residual_tests: Mapping[str, Any]
+    may_enter_at: Sequence[Place]
+    fits: Sequence[Mapping[str, Any]]
+    planning: Mapping[str, Any]
+    seconds: float
+    notes: Sequence[str]
+    labels: Sequence[Mapping[str, Any]] | None
+    machine: Machine
+    none: Hypothesis
+    best: Hypothesis
+
+    def __repr__(self) -> str:
+        """Return the verdict and its first answer, in a line."""
+        first = self.which[0]
+        return (f'<Verdict: {self.word}, {" + ".join(first.effects)} '
+                f'{100.0 * first.probability:.0f} %>')
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the JSON of docs/diagnosis.md as plain data."""
+        entries = {field.name: getattr(self, field.name) for field in fields(self)
+                   if field.name not in ('word', 'machine', 'none', 'best')}
+        return {'verdict': self.word, **{
+            name: entry for name, entry in entries.items() if entry is not None},
+            'which': [vars(answer) for answer in self.which],
+            'may_enter_at': [vars(place) for place in self.may_enter_at]}
+
+    def to_json(self) -> str:
+        """Return the JSON of docs/diagnosis.md."""
+        return strict_json(self.as_data())
+
+    def summary(self) -> str:
+        """Return the verdict in a few lines."""
+        lines = [_HEADLINES[self.word]]
+        for answer in self.which[:3]:
+            if answer.probability >= 0.01:
+                lines.append(f'  {100.0 * answer.probability:5.1f} %  '
+                             + ' and '.join(answer.effects))
+                lines += [f'           {line}' for line in value_lines(answer.parameters)]
+        for group in self.confusable:
+            lines.append('  these data cannot tell apart: ' + ', '.join(group))
+        if self.may_enter_at:
+            place = self.may_enter_at[0]
+            lines.append(f'  what is not named most likely enters as {place.name}, which could '
+                         f'explain {100.0 * place.explained:.0f} % of the gap')
+        lines += [f'  {line}' for line in _closed(self)]
+        lines += [f'  {line}' for line in lines_of_labels(self.labels or ())]
+        lines += [f'  also seen: {item["effect"]}, {_why_small(item)}' for item in self.also_seen]
+        lines += [f'  remains: {line}' for line in _remainders(self.remains)]
+        lines += [f'  note: {note}' for note in self.notes]
+        return '\n'.join(lines)
+
+
+def _closed(verdict: Verdict) -> list[str]:
+    """Return how much of the gap is closed, and by what."""
+    far, named = verdict.how_far, verdict.statements['named']['best_of_catalogue']
+    judged = [effect for effect in named if effect in far['judged']]
+    fraction = far['explained_fraction']
+    if named and fraction['value'] is None:
+        return [_cannot_be_judged(' and '.join(named), fraction['reason'])] if fraction.get(
+            'reason') else []
+    lines = [f'{" and ".join(judged)} {"explain" if judged[1:] else "explains"} '
+             f'{share_text(fraction)}, judged on {far["held_out"]}'] if judged else []
+    return lines + [_cannot_be_judged(effect, far['cannot_be_judged'][effect])
+                    for effect in named if effect not in far['judged']]
+
+
+def _cannot_be_judged(effects: str, reason: str) -> str:
+    return f'how much of the gap {effects} explains cannot be judged on withheld data: {reason}'
+
+
+def _why_small(item: Mapping[str, Any]) -> str:
+    if item['unsure']:
+        return 'not surely beyond its tolerance'
+    if item['within_tolerance']:
+        return 'within its tolerance'
+    return f'explains {100.0 * item["share"]:.2g} % of the gap'
+
+
+def _remainders(found: Mapping[str, Any]) -> list[str]:
+    """Return what remains of the signals that matter, or of all if nobody said which do."""
+    asked = any(item.get('matters') is not None for item in found.values())
+    return [f'{signal} {item["beyond_noise"]:.2g} {item["unit"]} beyond noise of '
+            f'{item["noise"]:.2g} {item["unit"]}' + (', which matters' if asked else '')
+            for signal, item in found.items() if 'rms' in item
+            and (item['matters'] if asked else item['beyond_noise'] > item['noise'])]
+
+
+def share_text(fraction: Mapping[str, Any]) -> str:
+    """Return an explained fraction as people read it; an effect may make a gap wider, too."""
+    if fraction['value'] < 0.0:
+        return 'nothing of the gap: with the effect it is wider'
+    low, high = (100.0 * max(bound, 0.0) for bound in fraction['ci95'])
+    return f'{100.0 * fraction["value"]:.0f} % of the gap ({low:.0f} to {high:.0f} %)'
+
+
+def value_lines(parameters: Mapping[str, Any]) -> list[str]:
+    """Return the values of an answer's parameters as people read them, a line each."""
+    if len(parameters) > _LISTED:
+        return [f'{len(parameters)} numbers over time, see the JSON']
+    return [f'{name.split(".", 2)[-1]} = {item["value"]:.4g} '
+            + ('' if item['unit'] == '1' else f'{item["unit"]} ')
+            + f'({item["ci95"][0]:.4g} to {item["ci95"][1]:.4g})'
+            for name, item in parameters.items()]
