@@ -246,8 +246,7 @@ def structure_derivative(structure: Any, y: FloatArray, dy: FloatArray, t: float
                          margin: FloatArray) -> None:
     """Fill the derivatives and the margin of hub, appendages and encoder."""
     theta_a, w_a = y[THETA_A], y[W_A]
-    applied = structure.gear_ratio * gears + load_torque(
-        structure, theta_a, t, middle, elevation)
+    applied = structure.gear_ratio * gears + load_torque(structure, theta_a, t, middle, elevation)
     for k in range(4):
         angle, rate = y[MODES_AT + 2 * k], y[MODES_AT + 2 * k + 1]
         if k < 3:

@@ -143,8 +143,7 @@ def record(history: TrueSignals, machine: Records, grade: SensorGrade, stamps: F
         true = (1.0 + float(sensors[f'tach_error_{which + 1}'])) * history.tach[which]
         offset = random.uniform(-1.0, 1.0) * grade.tach_noise_rad_s
         sigma = np.hypot(grade.tach_noise_rad_s, grade.tach_noise_relative * true)
-        columns[name] = _digits(true + offset + noise(name, count) * sigma,
-                                grade.tach_step_rad_s)
+        columns[name] = _digits(true + offset + noise(name, count) * sigma, grade.tach_step_rad_s)
     columns['encoder_rad'] = _encoder(history.encoder_angle, machine, grade, random)
     bias = (1.0 + float(sensors['bias_error'])) * history.bias
     bias = bias + float(sensors['bias_zero'])

@@ -71,8 +71,7 @@ def _variant(drive: Drive, scales: list[float]) -> Drive:
     for unit in ('motor_1', 'motor_2'):
         for name, scale in zip(_VARIED, scales, strict=True):
             part, _, key = name.partition('.')
-            changes[f'{unit}.{name}'] = scale * getattr(
-                getattr(getattr(drive, unit), part), key)
+            changes[f'{unit}.{name}'] = scale * getattr(getattr(getattr(drive, unit), part), key)
     return changed(drive, changes)
 
 
@@ -95,8 +94,7 @@ def _statistics(drive: Drive, duration_s: float) -> FloatArray:
 
 def tasks(variants: int, duration_s: float = DURATION_S) -> list[Task]:
     """Return a number of variants as tasks; always the same ones."""
-    scales = 1.0 + 0.1 * np.random.default_rng(_SEED).uniform(-1.0, 1.0,
-                                                              (variants, len(_VARIED)))
+    scales = 1.0 + 0.1 * np.random.default_rng(_SEED).uniform(-1.0, 1.0, (variants, len(_VARIED)))
     return [Task(scales[first:first + _GROUP].tolist(), duration_s)
             for first in range(0, variants, _GROUP)]
 

@@ -258,8 +258,7 @@ def _events(compiler: _Compiler, applied: _Equation) -> tuple[_Equation, _Equati
     def guards(x, slip, p, g):  # type: ignore[no-untyped-def]
         for body in range(3):
             # all rates at the motor shafts, so that they have the same scale
-            rate = (p[RATIO] * x[HUB_RATE] if body == 2
-                    else x[1 + MOTOR_STATES * body + RATE])
+            rate = (p[RATIO] * x[HUB_RATE] if body == 2 else x[1 + MOTOR_STATES * body + RATE])
             if slip[body] != 0:
                 g[body] = slip[body] * rate
             else:

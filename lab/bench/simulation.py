@@ -85,8 +85,7 @@ class Candidate:
         return {'setting': self.name, 'error': self.error, 'wall_s': self.wall_s}
 
 
-def measure(repetitions: int, quick: bool, progress: Callable[[str], None],
-            ) -> dict[str, Any]:
+def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> dict[str, Any]:
     """
     Measure every experiment against every peer that is installed.
 

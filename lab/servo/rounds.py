@@ -91,8 +91,7 @@ def folds(tests: Sequence[ServoLog]) -> list[Fold]:
     gains = sorted({test.kp for test in tests})
     trajectories = sorted({test.trajectory for test in tests})
     count = max(len(gains), len(trajectories), 2)
-    turn = [(gains.index(test.kp) + trajectories.index(test.trajectory)) % count
-            for test in tests]
+    turn = [(gains.index(test.kp) + trajectories.index(test.trajectory)) % count for test in tests]
     parts = [Fold(tuple(t for t, k in zip(tests, turn, strict=True) if k != i),
                   tuple(t for t, k in zip(tests, turn, strict=True) if k == i))
              for i in range(count)]

@@ -116,8 +116,7 @@ def compared(tests: Sequence[ServoLog], direction: Direction, effort: FitEffort,
     }
 
 
-def _model(fit: Fit, fitted: Sequence[ServoLog], withheld: Sequence[ServoLog],
-           ) -> dict[str, Any]:
+def _model(fit: Fit, fitted: Sequence[ServoLog], withheld: Sequence[ServoLog]) -> dict[str, Any]:
     row = vector(fit.values)
     errors = {test.name: 1e3 * test.error(row) for test in withheld}
     return {'fitted_mrad': 1e3 * servo_refit.error(fitted, fit.values),

@@ -76,8 +76,7 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
     elif wild:
         settings |= {'tolerance': tolerance, 'wild': True, 'family': family}
     else:
-        settings |= {'tolerance': tolerance, 'sample_rate_hz': sample_rate,
-                     'duration_s': duration}
+        settings |= {'tolerance': tolerance, 'sample_rate_hz': sample_rate, 'duration_s': duration}
     # a trial that was begun without these entries goes on
     if largest != 1.0:
         settings['largest'] = largest
@@ -374,8 +373,7 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
 
     def known(name: str) -> tuple[Path, Path | None, str | None]:
         diagnosed = (folder / name / VERDICT).exists()
-        return here / name, kept(name), (
-            None if diagnosed else machine_of(folder, name, manifest))
+        return here / name, kept(name), (None if diagnosed else machine_of(folder, name, manifest))
 
     complete(names, known, [Arm(lacks, partial(_diagnose_seen_case, here, options, limit))],
              jobs=jobs, scheduler=scheduler, threads=True, done=done)

@@ -85,8 +85,7 @@ def _results(tasks: Sequence[tuple[Any, ...]], jobs: int, scheduler: str | None,
             yield from pool.each(_row, tasks)
 
 
-def _row(case: Any, arms: Sequence[Callable[[Any], Row]],
-         keep: Callable[..., None] | None) -> Row:
+def _row(case: Any, arms: Sequence[Callable[[Any], Row]], keep: Callable[..., None] | None) -> Row:
     """Return what these arms add to the row of a case."""
     row: dict[str, Any] = {}
     for do in arms:

@@ -70,8 +70,7 @@ def noise_power(column: str, truth: Mapping[str, Any], reading: FloatArray) -> f
     return (truth['imperfections']['noise'][column]['level']**2 + spike) * power + digit**2 / 12.0
 
 
-def closed_fraction(recording: Path, before: Path, after: Path,
-                    truth: Mapping[str, Any]) -> float:
+def closed_fraction(recording: Path, before: Path, after: Path, truth: Mapping[str, Any]) -> float:
     """
     Return the fraction of the gap that a correction closes, from -1 to 1.
 

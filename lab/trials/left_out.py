@@ -67,8 +67,7 @@ def run_trial(folder: Path, wanted: int, jobs: int, limit: float, options: Seque
 
     """
     answered = read_cases(folder)[0] if scored is None else read_scored_of(scored, folder)
-    cases = [case for case in answered
-             if case.truth['kind'] == 'single' and case.right][:wanted]
+    cases = [case for case in answered if case.truth['kind'] == 'single' and case.right][:wanted]
     if not cases:
         raise UserError(f'{folder}: no case with a single effect that was named first; '
                         'lab trial --diagnose makes a trial')

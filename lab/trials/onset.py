@@ -57,8 +57,7 @@ def draw_truths(count: int, seed: int, tolerance: float, healthy_s: float = 0.0)
 
     """
     effects = round_robin(list(CATALOGUE.values()), np.random.default_rng([seed, 0]))
-    return [_truth(number, seed, tolerance, healthy_s, effects)
-            for number in range(1, count + 1)]
+    return [_truth(number, seed, tolerance, healthy_s, effects) for number in range(1, count + 1)]
 
 
 def _truth(number: int, seed: int, tolerance: float, healthy_s: float,

@@ -98,8 +98,7 @@ def stated_sizes(truth: Mapping[str, Any], verdict: Verdict) -> list[StatedSize]
     first, found = verdict.which[0], []
     for entry in truth['effects']:
         key = entry['id']
-        if key not in first.effects or (
-                truth.get('family') == 'b' and key.split('.')[1] in LAWS):
+        if key not in first.effects or (truth.get('family') == 'b' and key.split('.')[1] in LAWS):
             continue
         size = size_of(key, entry['parameters'], truth.get('machine'))
         stated = first.parameters.get(f'{key}.{size.parameter}') if size else None

@@ -78,8 +78,7 @@ class Verdict:
 
     def means(self, named: frozenset[str], true: frozenset[str]) -> bool:
         """Return whether an entry names the true effects or ones confusable with them."""
-        return len(named) == len(true) and any(True for _ in self._matchings(
-            sorted(named), true))
+        return len(named) == len(true) and any(True for _ in self._matchings(sorted(named), true))
 
     def _matchings(self, named: list[str], true: frozenset[str]) -> Iterator[None]:
         if not named:
