@@ -16,17 +16,7 @@ INK, GRID = '#1a3a5f', '#d0d4da'
 
 
 def draw_scorecard(figures: dict[str, Any], path: Path) -> None:
-    """
-    Draw a scorecard to a file; the suffix selects the format.
-
-    Parameters
-    ----------
-    figures
-        from `scorecard.score`
-    path
-        of the picture
-
-    """
+    """Draw the figures of `scorecard.score` to a file; the suffix selects the format."""
     table = figures['confusion']
     rows = sorted(table)
     named = {answer for row in table.values() for answer in row}
