@@ -4,5 +4,5 @@
 A trial of the diagnosis: an independent 'real antenna', sealed cases, and a scorecard.
 
 The 'real antenna' is a second program for the same drive, with its own equations, integrator and
-form of every effect. A test checks that nothing here imports the emulator or its parameters.
+forms of effects. It may not import the emulator, its physics or its parameters; a test checks it.
 """

@@ -45,8 +45,7 @@ def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float =
     Effects take turns, so that all are equally frequent; sizes are spread evenly over the share
     `largest` of their range. `tolerance` is the largest relative deviation of any parameter from
     the reference. Instead of `sample_rate` [Hz] and `duration` [s], wild cases draw imperfections
-    and programmes of up to `longest` [s]. `family` is one of FAMILIES; 'b' is for wild cases
-    alone.
+    and programmes of up to `longest` [s]. `family` is one of FAMILIES ('b' only for wild cases).
     """
     forms = FAMILIES[family]
     random = np.random.default_rng([seed, 0])

@@ -69,7 +69,11 @@ def viscous_torque(coefficient: float, rate: float, knee: float, law: float) -> 
 
 @compiled
 def stribeck_torque(rise: float, rate: float, half_rate: float, law: float) -> float:
-    """Return friction above Coulomb's [N m]; B: Hess and Soom, J. Tribology 112 (1990) 147."""
+    """
+    Return the friction above Coulomb's at low rate [N m].
+
+    A hyperbola of the rate; for B the curve of Hess and Soom, J. Tribology 112 (1990) 147.
+    """
     if law == LAW_B:
         return rise / (1.0 + (rate / half_rate)**2)
     return rise / (1.0 + abs(rate) / half_rate)

@@ -91,8 +91,7 @@ def record(history: TrueSignals, machine: Records, grade: SensorGrade, stamps: F
     """
     Return the recording of true signals: its columns by name, each of shape (n,).
 
-    Stamps have shape (n,) [s]. Without `noise` each column's is white and as loud as the sheet
-    says.
+    Stamps have shape (n,) [s]. Without `noise` it is white and as loud as the sheet says.
     """
     def white(column: str, count: int) -> FloatArray:
         return random.normal(0.0, 1.0, count)

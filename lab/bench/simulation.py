@@ -245,7 +245,7 @@ def _knots(problem: Problem, step_s: float) -> FloatArray:
 
 @lru_cache(maxsize=16)
 def plan(problem: Problem, step_s: float) -> batch.Schedule:
-    """Return the steps of `run_whole`, of at most `step_s`; like the peers' made once a test."""
+    """Return the steps of `run_whole`, each of at most `step_s` [s]; made once for a test."""
     start, _, value, slope = (np.array(column) for column in zip(*problem.pieces, strict=True))
     knots = _knots(problem, step_s)
     parts = max(1, round(GRID_S / step_s))

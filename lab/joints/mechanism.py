@@ -30,19 +30,19 @@ PARTS = 8           # steps of the integration in a tick
 class Mechanism(NamedTuple):
     """The numbers of a machine; zero switches off what is not marked as needed."""
 
-    motor: Annotated[float, 'kg m^2']           # the driven body; needed
-    constant: Annotated[float, 'N m/A']         # driving torque per current; needed
-    coulomb: Annotated[float, 'N m']            # friction of the motor; needed
+    motor: Annotated[float, 'kg m^2']               # the driven body; needed
+    constant: Annotated[float, 'N m/A']             # driving torque per current; needed
+    coulomb: Annotated[float, 'N m']                # friction of the motor; needed
     viscous: Annotated[float, 'N m s/rad']          # friction of the motor
-    bristle: Annotated[float, 'rad']            # deflection at slip under Coulomb friction; needed
+    bristle: Annotated[float, 'rad']                # deflection at which bristles slip; needed
     bristle_damping: Annotated[float, '1']          # damping ratio of the motor on its bristles
     position_gain: Annotated[float, '1/s']          # of the loop, as the next four
     rate_limit: Annotated[float, 'rad/s']
     velocity_gain: Annotated[float, 'A s/rad']
     velocity_time: Annotated[float, 's']
     current_limit: Annotated[float, 'A']
-    current_lag: Annotated[float, 's']          # of the current loop; needed
-    digit: Annotated[float, 'rad']              # of the encoder in the loop; needed
+    current_lag: Annotated[float, 's']              # of the current loop; needed
+    digit: Annotated[float, 'rad']                  # of the encoder in the loop; needed
     load: Annotated[float, 'kg m^2'] = 0.0          # body behind the shaft; 0: the motor is all
     stiffness: Annotated[float, 'N m/rad'] = 0.0    # of the shaft
     damping: Annotated[float, 'N m s/rad'] = 0.0    # of the shaft
@@ -52,7 +52,7 @@ class Mechanism(NamedTuple):
     hung_damping: Annotated[float, '1'] = 0.03      # damping ratio of what hangs
     constant_loss: Annotated[float, '1/A^2'] = 0.0  # saturation: constant / (1 + loss current^2)
     asymmetry: Annotated[float, '1'] = 0.0          # share of Coulomb: more forward, less backward
-    stribeck: Annotated[float, 'N m'] = 0.0     # falls as 1 / (1 + rate / stribeck_rate)
+    stribeck: Annotated[float, 'N m'] = 0.0         # falls as 1 / (1 + rate / stribeck_rate)
     stribeck_rate: Annotated[float, 'rad/s'] = 1.0
     slope: Annotated[float, '1/rad'] = 0.0          # by which friction grows along the way
     spot: Annotated[float, '1'] = 0.0               # one place that rubs harder, as a share
@@ -67,7 +67,7 @@ class Mechanism(NamedTuple):
     ripple_cycles: Annotated[float, '1/rad'] = 1.0
     ripple_phase: Annotated[float, 'rad'] = 0.0
     spring: Annotated[float, 'N m/rad'] = 0.0       # that pulls the motor to zero
-    gravity: Annotated[float, 'N m'] = 0.0      # by the angle of the load behind the gear
+    gravity: Annotated[float, 'N m'] = 0.0          # by the angle of the load behind the gear
     gravity_phase: Annotated[float, 'rad'] = 0.0
     gear: Annotated[float, '1'] = 1.0
     shake: Annotated[float, 'N m'] = 0.0            # torque on the last body at one frequency
@@ -103,9 +103,8 @@ def accelerations(m: Mechanism, t: float, current: float, bent: float, q: float,
     """
     Return the accelerations of motor, load and what hangs [rad/s^2].
 
-    Time counts from the start of the recording [s]; `current` [A] drives the motor and `bent`
-    [rad] is the bristles' deflection. q, w, ql, wl, qh, wh are the bodies' angles [rad] and rates
-    [rad/s].
+    `t` counts from the start of the recording [s]; `current` is in [A] and `bent` [rad] is the
+    bristles' deflection. q, w, ql, wl, qh, wh are the bodies' angles [rad] and rates [rad/s].
     """
     stiff = m.coulomb / m.bristle
     bending = w - abs(w) * bent * stiff / level(m, t, q, w)
@@ -214,10 +213,9 @@ def simulate(m: Mechanism, reference: FloatArray, ticks: int, begin: int, start:
     """
     Write the encoder's angle [rad] and the current [A] at each tick, (n - 1) ticks + 1 of them.
 
-    The bus asks for the angles `reference`, shape (n,) [rad], with `ticks` of the controller from
-    one to the next; the drive goes from one to the next while it waits for the one after. The
-    machine rests at `start` [rad]; the first reference holds for `begin` ticks before the
-    recording.
+    The bus asks for the angles `reference`, shape (n,) [rad], `ticks` of the controller apart; the
+    drive goes from one to the next while it waits for the one after. The machine rests at `start`
+    [rad]; the first reference holds for `begin` ticks before the recording.
     """
     q = ql = qh = before = start
     w = wl = wh = bent = integral = flowing = one = two = three = 0.0

@@ -130,8 +130,8 @@ def vector(values: Mapping[str, float]) -> FloatArray:
     """
     Return the parameters in the order of the physics, zero where none is given.
 
-    Values are by name in the units of `UNITS`; tied names and cycles are resolved. Raise KeyError
-    for an unknown name.
+    Values are by name in the units of `UNITS`; tied names and cycles are resolved. KeyError if
+    unknown.
     """
     row = np.zeros(len(ORDER))
     for name, rest in (('stribeck_rate', 1.0), ('stribeck_shape', 1.0)):

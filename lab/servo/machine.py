@@ -27,7 +27,7 @@ class ServoMachine(Machine):
     The model's numbers are `values`, without any offset; those not named are absent. The `free`
     ones are fitted beside any effect. Effects in `without` are not considered. `noise` is the
     standard deviation of a perfect model's residuals in position [rad], speed [rad/s] and duty;
-    None for the sensors' steps alone. So many `threads` run at once.
+    None for the sensors' steps alone. `threads` is how many runs are simulated at once.
     """
 
     time_scales = TimeScales(start_s=1.5, scan_s=8.0, pulse_s=0.15, response_s=1.5, block_s=1.0)

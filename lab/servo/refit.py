@@ -81,8 +81,8 @@ def refit(tests: Sequence[ServoLog], names: Sequence[str], begins: Sequence[Valu
     """
     Fit the parameters `names` to tests; all others are absent.
 
-    Fits start from the default values and from `begins`; all tests are simulated at most `runs`
-    times.
+    Fits start from the default values and from `begins`; `runs` limits the simulations of all
+    tests.
     """
     starts = [(initial_values(names), WIDE),
               *((initial_values(names, known), NEAR) for known in begins)]

@@ -109,8 +109,7 @@ def study(tests: Sequence[ServoLog], chosen: Sequence[Direction], effort: FitEff
     The diagnosis leaves out the effects in `without`. Results of directions that are found in the
     folder `keep` are used again. `scheduler` is the address of a dask.distributed scheduler whose
     workers compare instead of `jobs` processes. `progress` gets the share that is done, 0 to 1,
-    and a description. Raise UserError for an unknown effect in `without` or a scheduler without
-    workers.
+    and a description. Raise UserError for an unknown effect or a scheduler without workers.
     """
     for name in without:
         if name not in catalogue():

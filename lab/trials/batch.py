@@ -51,9 +51,8 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
     """
     Draw and seal the truths of a trial, unless they are sealed already; return the manifest.
 
-    The settings are those of `cases.draw_truths`; with `machines` other than the antenna only
-    `count` and `seed` are used. Raise UserError where the folder holds a trial with other
-    settings.
+    Settings are those of `cases.draw_truths`; with `machines` other than the antenna only `count`
+    and `seed` are used. Raise UserError where the folder holds a trial with other settings.
     """
     settings: dict[str, Any] = {'cases': count, 'seed': seed}
     if machines:

@@ -35,8 +35,7 @@ def complete(names: Sequence[str], known: Callable[[str], Any], arms: Sequence[A
 
     `known` gives what the arms get from the name of a case. Rows are kept in `results`; without it
     the arms keep what they find in the folder of the case. `jobs`, `scheduler` and `threads` are
-    as for `workers`; one job without threads is done here. `done` gets the number of complete
-    cases and of all.
+    as for `workers`; one job without threads is done here. `done` gets the complete cases and all.
     """
     rows: Mapping[str, Row] = {} if results is None else {name: results[name] for name in names}
     lacking = {name: [arm.do for arm in arms if arm.lacks(name, rows.get(name, {}))]

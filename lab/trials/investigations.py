@@ -153,7 +153,12 @@ def summary(results: TrialResults) -> dict[str, Any]:
 
 
 def _until(cases: Sequence[Sequence[Mapping[str, Any]]], alike: int) -> dict[str, Any]:
-    """Return `right` (with `ci95`) and `wrong` sure answers, and medians until sure and right."""
+    """
+    Return what it took until answers were sure.
+
+    The share of cases whose answer was then `right` with `ci95`, how many were `wrong`, and
+    `median_tests` and `median_seconds` until sure and right (None if most cases never were).
+    """
     until = [until_sure(answers, alike) for answers in cases]
     share = rate(right for _, right in until)
     middle = median(tests if right else math.inf for tests, right in until) if until else math.inf

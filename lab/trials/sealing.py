@@ -7,7 +7,7 @@ Sealed truths: written before any recording, with salted hashes that anyone can 
     DIR/truth/case_0001.json     the truth with its salt
     DIR/case_0001/               the input of a diagnosis
 
-The salt prevents guessing a truth from its hash; the truth file proves that it was sealed.
+The salt prevents guessing a truth from its hash. Whoever has the truth file can check it.
 """
 
 from __future__ import annotations
