@@ -3,7 +3,6 @@
 """
 A trial of the diagnosis: an independent 'real antenna', sealed cases, and a scorecard.
 
-The 'real antenna' is a second program for the same drive, with its own equations, integrator
-and form of every effect. Nothing here may import the emulator, its physics or its parameters;
-a test checks this.
+The 'real antenna' is a second program for the same drive, with its own equations, integrator and
+forms of effects. It may not import the emulator, its physics or its parameters; a test checks it.
 """

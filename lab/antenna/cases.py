@@ -3,8 +3,7 @@
 """
 The cases of a trial: the effects of each antenna, drawn once and recorded.
 
-A case follows entirely from its truth, including the noise. It can be made again at any time with
-the same result.
+A case follows entirely from its truth, noise included, and can be made again at any time.
 """
 
 from __future__ import annotations
@@ -41,30 +40,12 @@ def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float =
                 duration: float = 30.0, wild: bool = False, family: str = 'a',
                 largest: float = 1.0, longest: float = LONGEST_S) -> list[Truth]:
     """
-    Draw all cases of a trial.
+    Draw all cases of a trial, with the proportions of MIX in random order.
 
-    Kinds have the proportions of MIX and a random order. Effects take turns, so that all are
-    equally frequent. Sizes are spread evenly over their range.
-
-    Parameters
-    ----------
-    count
-        number of cases
-    seed
-        of all random draws
-    tolerance
-        largest relative deviation of any parameter from the reference, unit 1
-    sample_rate, duration
-        of the recordings [Hz], [s]
-    wild
-        draw imperfections and programmes too, instead of `sample_rate` and `duration`
-    family
-        of forms, one of FAMILIES; 'b' is for wild cases alone
-    largest
-        the largest size of an effect, as a share of its range
-    longest
-        the longest recording of a wild case [s]
-
+    Effects take turns, so that all are equally frequent; sizes are spread evenly over the share
+    `largest` of their range. `tolerance` is the largest relative deviation of any parameter from
+    the reference. Instead of `sample_rate` [Hz] and `duration` [s], wild cases draw imperfections
+    and programmes of up to `longest` [s]. `family` is one of FAMILIES ('b' only for wild cases).
     """
     forms = FAMILIES[family]
     random = np.random.default_rng([seed, 0])
@@ -143,17 +124,7 @@ def _compatible(first: Defect, second: Defect) -> bool:
 
 
 def build_machine(truth: Truth, recording: int) -> Records:
-    """
-    Build the antenna of a case for one recording.
-
-    Parameters
-    ----------
-    truth
-        of the case
-    recording
-        its number, from 0; wind and bad contacts are drawn anew for each
-
-    """
+    """Build the antenna of a case for a recording (from 0); wind and bad contacts are its own."""
     sheet = truth['sheets'][recording]
     machine = reference_machine(sheet['circuit'], sheet['filter_1'],
                                 sheet['bias'].get('bias_pot', 0.7))
@@ -183,23 +154,9 @@ def sheet_of(truth: Truth, recording: int) -> CaseSheet:
 
 def make_recording(truth: Truth, recording: int) -> dict[str, FloatArray]:
     """
-    Simulate one recording of a case.
+    Return the columns of one recording of a case (from 0) by name, each of shape (n,).
 
-    Parameters
-    ----------
-    truth
-        of the case
-    recording
-        its number, from 0
-
-    Returns
-    -------
-    columns of the recording by name, each of shape (n,)
-
-    Raises
-    ------
-    SimulationError : the antenna of this case cannot be integrated
-
+    Raise SimulationError where the antenna of this case cannot be integrated.
     """
     random = np.random.default_rng([*truth['seed'], 2 + recording])
     machine, sheet = build_machine(truth, recording), sheet_of(truth, recording)

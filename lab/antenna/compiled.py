@@ -4,8 +4,7 @@
 Compile the real antenna's kernels and cache them on disk while their sources are unchanged.
 
 numba's own cache checks only the file of the outermost function and would miss a change of an
-equation in another file. The cache folder is therefore named after a hash of all sources of this
-package.
+equation in another file. The cache folder's name is therefore a hash of this package's sources.
 """
 
 from __future__ import annotations

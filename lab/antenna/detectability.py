@@ -46,17 +46,8 @@ class Study:
         """
         Simulate the derivatives by every tolerance, initial position and offset.
 
-        Parameters
-        ----------
-        tolerance
-            largest relative deviation of any parameter, unit 1
-        seed
-            of the programme
-        report
-            called with the share that is done, 0 to 1
-        family
-            of forms, one of FAMILIES
-
+        `tolerance` is the largest relative deviation of any parameter; `seed` is that of the
+        programme. `report` gets the share that is done, 0 to 1.
         """
         truth = next(t for t in draw_truths(40, seed, tolerance) if t['kind'] == 'none')
         self._truth: Truth = {**truth, 'tolerance': 0.0, 'family': family}
@@ -128,17 +119,7 @@ class Study:
         """
         Return the change of the signals by an effect: in all, and beyond the tolerances.
 
-        Parameters
-        ----------
-        effect_id
-            in the catalogue or outside it
-        values
-            the effect's numbers
-
-        Returns
-        -------
-        both as the root of the sum of squares, in standard deviations of noise
-
+        Both are the root of the sum of squares, in standard deviations of noise.
         """
         neutral = draw_tolerances(0.0, np.random.default_rng(0))
         change = self._signals(neutral, (0.3, -0.2), (effect_id, values)) - self._base

@@ -18,38 +18,17 @@ Change = Callable[[Records, Parameters], None]
 
 @dataclass(frozen=True)
 class Quantity:
-    """
-    A number of a defect and its plausible range.
-
-    Attributes
-    ----------
-    name, unit : 'torque', 'N m'
-    low, high : range of the size, both more than 0 unless `spacing` is 'even'
-    spacing : 'log', 'even' or 'whole' (whole numbers)
-    turned : '' or a random change of the size: 'sign' (negative as likely as positive),
-        'inverse' (1 / size as likely as size, for factors)
-
-    """
+    """A number of a defect and its plausible range."""
 
     name: str
-    unit: str
+    unit: str               # such as 'N m'
     low: float
-    high: float
-    spacing: str = 'log'
-    turned: str = ''
+    high: float             # both bounds are more than 0 unless `spacing` is 'even'
+    spacing: str = 'log'    # 'log', 'even' or 'whole' (whole numbers)
+    turned: str = ''        # at random: '', 'sign' (+ or -), 'inverse' (1 / size, for factors)
 
     def at(self, part: float, random: np.random.Generator) -> float:
-        """
-        Return the value at `part` of the range, 0 to 1, turned at random.
-
-        Parameters
-        ----------
-        part
-            0 for the smallest size, 1 for the largest
-        random
-            decides on the sign or the inverse
-
-        """
+        """Return the value at `part` of the range, 0 to 1, `turned` at random."""
         if self.spacing == 'log':
             value = math.exp((1.0 - part) * math.log(self.low) + part * math.log(self.high))
         elif self.spacing == 'even':
@@ -66,57 +45,21 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Defect:
-    """
-    An effect as the real antenna has it: its name, its numbers and its form.
+    """An effect as the real antenna has it: its name, its numbers and its form."""
 
-    Attributes
-    ----------
-    key : 'component.effect', as the diagnosis names it
-    form : the form in this program, for people
-    quantities : the first one is the size, the others are drawn uniformly
-    change : applies the effect to a machine
-
-    """
-
-    key: str
-    form: str
-    quantities: tuple[Quantity, ...]
-    change: Change
+    key: str                            # 'component.effect', as the diagnosis names it
+    form: str                           # in this program, for people
+    quantities: tuple[Quantity, ...]    # the first is the size, the others are drawn uniformly
+    change: Change                      # applies the effect to a machine
 
     def draw(self, size: float, random: np.random.Generator) -> dict[str, float]:
-        """
-        Draw the effect's numbers.
-
-        Parameters
-        ----------
-        size
-            0 for just detectable, 1 for strong
-        random
-            source of all other numbers
-
-        Returns
-        -------
-        value of each quantity by name
-
-        """
+        """Draw the effect's numbers by name at a size from 0 (just detectable) to 1 (strong)."""
         return drawn(self.quantities, size, random)
 
 
 def drawn(quantities: Sequence[Quantity], size: float,
           random: np.random.Generator) -> dict[str, float]:
-    """
-    Draw numbers of an effect by name, the first of them at a size and the others uniformly.
-
-    Parameters
-    ----------
-    quantities
-        the first one is the size
-    size
-        0 for just detectable, 1 for strong
-    random
-        source of all other numbers
-
-    """
+    """Draw numbers by name: the first at `size`, from 0 to 1, the others uniformly."""
     first, *others = quantities
     values = {first.name: first.at(size, random)}
     for quantity in others:
@@ -127,15 +70,9 @@ def drawn(quantities: Sequence[Quantity], size: float,
 def defects(table: Mapping[str, Mapping[str, Any]],
             functions: Mapping[str, Change]) -> dict[str, Defect]:
     """
-    Return the effects of a table by key, in its order.
+    Return the effects of a table by key, in its order; effects.yaml describes its entries.
 
-    Parameters
-    ----------
-    table
-        entries by place and name; effects.yaml describes them
-    functions
-        changes that are more than setting or scaling fields, by key
-
+    `functions` are the changes that are more than setting or scaling fields, by key.
     """
     found = {}
     for place, entries in table.items():

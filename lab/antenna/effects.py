@@ -3,10 +3,9 @@
 """
 The catalogue's effects in this program's own forms, with the range of each.
 
-The smallest sizes are just detectable in the standard test programme through noise and
-tolerances (lab/notebook/trial.md explains the measurement); the largest would call for a repair. A
-tachometer is inside the rate loop; errors of current, encoder and bias affect the recording
-only.
+The smallest sizes are just detectable in the standard test programme through noise and tolerances
+(measured in lab/notebook/trial.md); the largest would call for a repair. A tachometer is inside
+the rate loop; errors of current, encoder and bias affect the recording only.
 """
 
 from __future__ import annotations
@@ -30,17 +29,9 @@ def _fade_out(machine: Records, values: Parameters) -> None:
 def gust_of(machine: Records, values: Parameters,
             spectrum: Callable[[FloatArray], FloatArray]) -> None:
     """
-    Set a gust as a sum of sines.
+    Set a gust of rms [N m], corner [Hz] and seed as a sum of sines.
 
-    Parameters
-    ----------
-    machine
-        whose gust is set
-    values
-        rms [N m], corner [Hz] and seed
-    spectrum
-        power per unit of ln f, from frequency over corner
-
+    `spectrum` is the power per unit of ln f, from frequency over corner.
     """
     frequency = np.geomspace(0.02, 3.0, GUST_WAVES)     # even in ln f
     amplitude = np.sqrt(spectrum(frequency / values['corner']))

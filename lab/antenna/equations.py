@@ -246,8 +246,7 @@ def structure_derivative(structure: Any, y: FloatArray, dy: FloatArray, t: float
                          margin: FloatArray) -> None:
     """Fill the derivatives and the margin of hub, appendages and encoder."""
     theta_a, w_a = y[THETA_A], y[W_A]
-    applied = structure.gear_ratio * gears + load_torque(
-        structure, theta_a, t, middle, elevation)
+    applied = structure.gear_ratio * gears + load_torque(structure, theta_a, t, middle, elevation)
     for k in range(4):
         angle, rate = y[MODES_AT + 2 * k], y[MODES_AT + 2 * k + 1]
         if k < 3:
@@ -294,28 +293,11 @@ def structure_derivative(structure: Any, y: FloatArray, dy: FloatArray, t: float
 def derivative(t: float, middle: float, y: FloatArray, mode: ModeArray, machine: Records,
                test: Any, dy: FloatArray, margin: FloatArray) -> None:
     """
-    Fill the time derivative of the state and the margins of all switches.
+    Fill the derivative `dy` of the state `y`, both (STATES,), and the margins of all switches.
 
-    Parameters
-    ----------
-    t
-        time [s]
-    middle
-        a time strictly inside the present interval between two jumps of an input [s]; it
-        selects the side of a jump
-    y
-        state, shape (STATES,)
-    mode
-        switches, shape (SWITCHES,)
-    machine
-        the antenna
-    test
-        record of the test sheet (waveform.TEST)
-    dy
-        result, shape (STATES,)
-    margin
-        result, shape (SWITCHES,); negative where a switch must be thrown
-
+    `t` is the time [s]. `middle` [s] lies strictly inside the present interval between two jumps
+    of an input and selects the side of a jump. `test` is a waveform.TEST record. `mode` and
+    `margin` have shape (SWITCHES,); a margin is negative where its switch must be thrown.
     """
     circuit = machine.circuit[0]
     first, second = y[MOTOR_AT + I], y[MOTOR_AT + MOTOR_SIZE + I]
@@ -351,19 +333,10 @@ def derivative(t: float, middle: float, y: FloatArray, mode: ModeArray, machine:
 def readings(times: FloatArray, middles: FloatArray, states: FloatArray, machine: Records,
              test: Any, commands: FloatArray, biases: FloatArray, tachs: FloatArray) -> None:
     """
-    Fill the signals that follow from the states.
+    Fill the signals that follow from the states, shape (n, STATES).
 
-    Parameters
-    ----------
-    times, middles
-        as in `derivative`, shape (n,) [s]
-    states
-        shape (n, STATES)
-    machine, test
-        as in `derivative`
-    commands, biases, tachs
-        results, shapes (n,), (n,), (2, n) [rad/s, V, rad/s]
-
+    Commands [rad/s] and biases [V] have shape (n,), tachs [rad/s] (2, n). Times and middles, shape
+    (n,) [s], are those of `derivative`.
     """
     circuit = machine.circuit[0]
     for k in range(len(times)):

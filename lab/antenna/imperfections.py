@@ -105,21 +105,9 @@ def spread_events(machine: Records, duration: float) -> None:
 def coloured(count: int, rate: float, share: float, corner: float,
              random: np.random.Generator) -> FloatArray:
     """
-    Return noise of variance 1: white, and a first-order low-pass part.
+    Return noise of variance 1, shape (count,): white, and a first-order low-pass part.
 
-    Parameters
-    ----------
-    count
-        of samples
-    rate
-        sample rate [Hz]
-    share
-        of the low-pass part in the variance, unit 1
-    corner
-        of the low-pass part [Hz]
-    random
-        source of randomness
-
+    That part has a `share` of the variance and a `corner` [Hz]; `rate` is the sample rate [Hz].
     """
     keep = math.exp(-2.0 * math.pi * corner / rate)
     first = random.normal(0.0, 1.0, 1)
@@ -141,15 +129,7 @@ def kept_rows(count: int, share: float, random: np.random.Generator) -> NDArray[
     """
     Return the indices of the rows that are not missing; the first and the last one never are.
 
-    Parameters
-    ----------
-    count
-        of rows
-    share
-        of the rows that are missing (rounded), in gaps of 1 to LONGEST_GAP rows
-    random
-        source of randomness
-
+    `share` of the `count` rows is missing (rounded), in gaps of 1 to LONGEST_GAP rows.
     """
     there = np.ones(count, dtype=bool)
     missing = min(int(round(share * count)), max(count - 2, 0))
@@ -167,15 +147,7 @@ def late_history(machine: Records, sheet: CaseSheet, instants: FloatArray,
     """
     Simulate a test and return what each channel reads at the instants: what was so much earlier.
 
-    Parameters
-    ----------
-    machine, sheet, place
-        as in `simulate`
-    instants
-        of the samples, ascending from 0, shape (n,) [s]
-    delays
-        of each column in DELAYED [s]; the rate command has none
-
+    Instants ascend from 0, shape (n,) [s]. `delays` [s] are by column, for each in DELAYED.
     """
     early = [np.maximum(instants - delays.get(name, 0.0), 0.0)
              for name in ('rate_command_rad_s', *DELAYED)]
@@ -194,25 +166,10 @@ def imperfect_recording(machine: Records, sheet: CaseSheet, imperfections: Imper
                         rate: float, duration: float,
                         random: np.random.Generator) -> dict[str, FloatArray]:
     """
-    Simulate and record one test with an imperfect recorder.
+    Return one test's columns as an imperfect recorder writes them, by name, each of shape (n,).
 
-    Parameters
-    ----------
-    machine, sheet
-        the antenna, and its test
-    imperfections
-        of the case
-    rate
-        mean sample rate [Hz]
-    duration
-        of the test [s]
-    random
-        source of noise, jitter, spikes, missing rows, and of the places in the gaps
-
-    Returns
-    -------
-    the columns of the recording, by name, each of shape (n,)
-
+    `rate` is the mean sample rate [Hz], `duration` that of the test [s]. Noise, jitter, spikes,
+    missing rows and the places in the gaps are random.
     """
     instants, stamps = sample_instants(rate, duration, random)
     place = (float(random.uniform(-1.0, 1.0)), float(random.uniform(-1.0, 1.0)))

@@ -102,11 +102,8 @@ def throw(which: int, t: float, middle: float, y: FloatArray, mode: ModeArray,
 @compiled
 def settle(t: float, middle: float, y: FloatArray, mode: ModeArray, machine: Records,
            test: Any, dy: FloatArray, margin: FloatArray) -> int:
-    """
-    Throw switches until all margins hold; fill derivatives and margins; return the count.
-
-    Teeth that meet may break a stuck body loose at the same moment, hence the loop.
-    """
+    """Throw switches until all margins hold; fill derivatives and margins; return the count."""
+    # teeth that meet may break a stuck body loose at the same moment, hence the loop
     for count in range(2 * SWITCHES):
         derivative(t, middle, y, mode, machine, test, dy, margin)
         if not violated(margin):
@@ -176,27 +173,12 @@ def integrate(machine: Records, test: Any, start: FloatArray, mode: ModeArray,
               corners: FloatArray, samples: FloatArray, tolerance: float, scale: FloatArray,
               out: FloatArray, statistics: ModeArray) -> int:
     """
-    Integrate from 0 to the last sample and fill the states at the samples.
+    Integrate to the last sample; fill `out`, (len(samples), STATES); return DONE or a failure.
 
-    Parameters
-    ----------
-    machine, test
-        the antenna, and a TEST record
-    start, mode
-        state and switches at t = 0, shapes (STATES,), (SWITCHES,); overwritten with the last ones
-    corners, samples
-        times at which an input is not smooth, and of the requested states, from 0; ascending [s]
-    tolerance, scale
-        largest error of one step, in units of the typical size of each state, shape (STATES,)
-    out
-        result, shape (len(samples), STATES)
-    statistics
-        result, shape (3,): steps taken, steps rejected, switchings
-
-    Returns
-    -------
-    DONE, or the reason of the failure
-
+    `start` (STATES,) and `mode` (SWITCHES,) hold at t = 0 and are overwritten with the last ones.
+    At `corners` an input is not smooth; they and `samples` ascend from 0 [s]. `tolerance` is the
+    largest error of one step in units of `scale`, the typical size of each state. `statistics`
+    (3,) becomes the steps taken, the steps rejected and the switchings.
     """
     end_of_all = samples[-1]
     y, end, probe = start, np.empty(STATES), np.empty(STATES)

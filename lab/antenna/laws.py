@@ -32,8 +32,7 @@ def gear_deflection(motor: Any, structure: Any, theta: float, w: float, theta_a:
             # A rounded saw-tooth: sum of q^(n-1) sin(n a) / n with q = 1/2.
             sine, cosine = 0.5 * math.sin(angle), 1.0 - 0.5 * math.cos(angle)
             shape = 2.0 * math.atan2(sine, cosine)
-            slope = 2.0 * ((0.5 * math.cos(angle) * cosine - sine * sine)
-                           / (sine**2 + cosine**2))
+            slope = 2.0 * ((0.5 * math.cos(angle) * cosine - sine * sine) / (sine**2 + cosine**2))
         x -= motor.mesh_error * shape
         x_rate -= motor.mesh_error * slope * motor.mesh_cycles * w
     if motor.tooth_height != 0.0:
@@ -125,8 +124,7 @@ def axis_friction(structure: Any, angle: float, rate: float, t: float) -> tuple[
             # Plates of the rail that rub more and less in turn.
             level *= 1.0 + structure.bump * math.tanh(3.0 * math.sin(phase)) / math.tanh(3.0)
         else:
-            level *= 1.0 + structure.bump * (
-                2.0 * math.exp(2.0 * (math.cos(phase) - 1.0)) - 0.617)
+            level *= 1.0 + structure.bump * (2.0 * math.exp(2.0 * (math.cos(phase) - 1.0)) - 0.617)
     if structure.hard_spot != 0.0:
         off = (angle - structure.hard_spot_at) / structure.hard_spot_width
         level *= 1.0 + structure.hard_spot / (1.0 + off**4)
@@ -138,8 +136,7 @@ def axis_friction(structure: Any, angle: float, rate: float, t: float) -> tuple[
 
 
 @compiled
-def load_torque(structure: Any, angle: float, t: float, middle: float,
-                elevation: float) -> float:
+def load_torque(structure: Any, angle: float, t: float, middle: float, elevation: float) -> float:
     """Return the torque of gravity, wind and shifted ballast about the axis [N m]."""
     torque = structure.wind
     if structure.gravity != 0.0:

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
 """
-One antenna as records: every physical constant and every imperfection.
+One antenna as records, described in machine.yaml: all constants and imperfections.
 
-machine.yaml has their fields. The compiled equations read the records. An imperfection is absent
-at zero; only effects set one.
+An imperfection is absent at zero; only effects set one.
 """
 
 from __future__ import annotations
@@ -68,17 +67,9 @@ TOLERANCED_CIRCUIT = tuple(_TABLE['circuit'])[:-1]
 def reference_machine(circuit: str = 'old', filter_1: str = 'old',
                       bias_pot: float = DESIGN['bias_pot']) -> Records:
     """
-    Build the reference drive without any imperfection.
+    Build the reference drive without any imperfection, with k_p = `bias_pot`.
 
-    Parameters
-    ----------
-    circuit
-        torque-share constants of Table 1, 'old' or 'new'
-    filter_1
-        Filter 1 of Table 1, 'old' or 'new'
-    bias_pot
-        k_p, unit 1
-
+    The share circuit and Filter 1 are those of Table 1, 'old' or 'new'.
     """
     machine = Records(np.repeat(_nominal_record('motors'), 2), _nominal_record('structure'),
                       _nominal_record('circuit'), _nominal_record('sensors'))
@@ -125,17 +116,7 @@ class ToleranceFactors(NamedTuple):
 
 
 def draw_tolerances(tolerance: float, random: np.random.Generator) -> ToleranceFactors:
-    """
-    Draw the deviations of one antenna from the reference, uniform within +-tolerance.
-
-    Parameters
-    ----------
-    tolerance
-        largest relative deviation, unit 1
-    random
-        source of randomness
-
-    """
+    """Draw one antenna's relative deviations from the reference, uniform within +-tolerance."""
     def factors(*shape: int) -> NDArray[np.float64]:
         return 1.0 + tolerance * random.uniform(-1.0, 1.0, shape)
 

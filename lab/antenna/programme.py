@@ -24,17 +24,9 @@ SOURCE_BIAS_V = (4.1, 8.3)      # 10 to 20 percent of the motors' largest curren
 def draw_sheets(tolerance: float, duration: float,
                 random: np.random.Generator) -> tuple[CaseSheet, ...]:
     """
-    Draw the test sheets of one case, one for each name in RECORDINGS.
+    Draw the test sheets of one case, one for each name in RECORDINGS, of `duration` [s].
 
-    Parameters
-    ----------
-    tolerance
-        largest relative deviation of the machine from the reference, unit 1
-    duration
-        length of each recording [s]
-    random
-        source of randomness
-
+    `tolerance` is the largest relative deviation of the machine from the reference.
     """
     fitted = 'new' if random.uniform() < 0.7 else 'old'
     pot = _rounded(random.uniform(0.65, 0.9), 3)

@@ -31,52 +31,28 @@ class SimulationError(RuntimeError):
 
 @dataclass(frozen=True)
 class TrueSignals:
-    """
-    The true signals at the requested times; arrays have shape (n,) unless noted.
+    """The true signals at the requested times; arrays have shape (n,) unless noted."""
 
-    Attributes
-    ----------
-    time : [s]
-    command : rate command [rad/s]
-    current : of motor 1 and 2, shape (2, n) [A]
-    rate : of the rotors, shape (2, n) [rad/s]
-    tach : readings of the tachometers in the loop, shape (2, n) [rad/s]
-    axis_angle, axis_rate : [rad], [rad/s]
-    encoder_angle : of the encoder's own shaft [rad]
-    bias : bias voltage [V]
-    state : all states, shape (n, equations.STATES)
-    steps, rejected, switchings : counts of the integrator
-
-    """
-
-    time: FloatArray
-    command: FloatArray
-    current: FloatArray
-    rate: FloatArray
-    tach: FloatArray
-    axis_angle: FloatArray
-    axis_rate: FloatArray
-    encoder_angle: FloatArray
-    bias: FloatArray
-    state: FloatArray
-    steps: int
+    time: FloatArray            # [s]
+    command: FloatArray         # rate command [rad/s]
+    current: FloatArray         # of motor 1 and 2, shape (2, n) [A]
+    rate: FloatArray            # of the rotors, shape (2, n) [rad/s]
+    tach: FloatArray            # readings of the tachometers in the loop, shape (2, n) [rad/s]
+    axis_angle: FloatArray      # [rad]
+    axis_rate: FloatArray       # [rad/s]
+    encoder_angle: FloatArray   # of the encoder's own shaft [rad]
+    bias: FloatArray            # bias voltage [V]
+    state: FloatArray           # shape (n, equations.STATES)
+    steps: int                  # the integrator counts these three
     rejected: int
     switchings: int
 
 
 def start_state(machine: Records, sheet: CaseSheet, place: tuple[float, float]) -> FloatArray:
     """
-    Return the state at rest, shape (equations.STATES,).
+    Return the state at rest, shape (equations.STATES,); the sheet says if the circuit has settled.
 
-    Parameters
-    ----------
-    machine
-        the antenna
-    sheet
-        states whether the share circuit has settled (bias: start)
-    place
-        position of each motor in its gap, -1 to 1
-
+    `place` says where each motor lies in its gap, -1 to 1.
     """
     y = np.zeros(equations.STATES)
     circuit = machine.circuit[0]
@@ -111,25 +87,10 @@ def simulate(machine: Records, sheet: CaseSheet, times: FloatArray,
              place: tuple[float, float] = (0.0, 0.0),
              tolerance: float = TOLERANCE) -> TrueSignals:
     """
-    Simulate one test from rest and return the true signals.
+    Simulate one test from rest and return the true signals at `times`, ascending from 0, (n,) [s].
 
-    Parameters
-    ----------
-    machine
-        the antenna with its imperfections
-    sheet
-        the test
-    times
-        times of the signals, ascending, from 0 on, shape (n,) [s]
-    place
-        position of each motor in its gap at the start, -1 to 1
-    tolerance
-        largest error of one integration step, unit 1
-
-    Raises
-    ------
-    SimulationError : the integration failed; the message says where
-
+    `place` says where each motor lies in its gap at the start, -1 to 1; `tolerance` is the largest
+    error of one step. Raise SimulationError, which says where the integration failed.
     """
     test = sheet.record()
     end = float(times[-1])

@@ -29,21 +29,9 @@ Noise = Callable[[str, int], FloatArray]
 def sample_instants(rate: float, duration: float,
                     random: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """
-    Draw the true sampling instants and their time stamps.
+    Return the true sampling instants and their time stamps of a recording of `duration` [s].
 
-    Parameters
-    ----------
-    rate
-        mean sample rate [Hz]
-    duration
-        length of the recording [s]
-    random
-        source of randomness
-
-    Returns
-    -------
-    true instants and time stamps, both strictly ascending from 0, shape (n,) [s]
-
+    Both ascend strictly from 0, shape (n,) [s]; `rate` is the mean sample rate [Hz].
     """
     count = int(round(rate * duration)) + 1
     grid = np.arange(count) / rate
@@ -101,27 +89,9 @@ def _ammeters(current: FloatArray, machine: Records, stamps: FloatArray) -> Floa
 def record(history: TrueSignals, machine: Records, grade: SensorGrade, stamps: FloatArray,
            random: np.random.Generator, noise: Noise | None = None) -> dict[str, FloatArray]:
     """
-    Return the recording of true signals.
+    Return the recording of true signals: its columns by name, each of shape (n,).
 
-    Parameters
-    ----------
-    history
-        true signals at the true instants
-    machine
-        with the errors of the sensors
-    grade
-        noise and resolution
-    stamps
-        time stamps, shape (n,) [s]
-    random
-        source of noise and offsets
-    noise
-        of each column; None: white, as loud as the sheet says
-
-    Returns
-    -------
-    the columns of the recording, by name, each of shape (n,)
-
+    Stamps have shape (n,) [s]. Without `noise` it is white and as loud as the sheet says.
     """
     def white(column: str, count: int) -> FloatArray:
         return random.normal(0.0, 1.0, count)
@@ -143,8 +113,7 @@ def record(history: TrueSignals, machine: Records, grade: SensorGrade, stamps: F
         true = (1.0 + float(sensors[f'tach_error_{which + 1}'])) * history.tach[which]
         offset = random.uniform(-1.0, 1.0) * grade.tach_noise_rad_s
         sigma = np.hypot(grade.tach_noise_rad_s, grade.tach_noise_relative * true)
-        columns[name] = _digits(true + offset + noise(name, count) * sigma,
-                                grade.tach_step_rad_s)
+        columns[name] = _digits(true + offset + noise(name, count) * sigma, grade.tach_step_rad_s)
     columns['encoder_rad'] = _encoder(history.encoder_angle, machine, grade, random)
     bias = (1.0 + float(sensors['bias_error'])) * history.bias
     bias = bias + float(sensors['bias_zero'])

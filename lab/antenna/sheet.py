@@ -41,26 +41,17 @@ class CaseSheet:
     """
     One test: command, source of the bias, and grade of the sensors.
 
-    Attributes
-    ----------
-    circuit, filter_1 : constants of Table 1, 'old' or 'new'
-    bias : mapping of the input format: circuit, fixed or fixed_step
-    waveform : mapping of the input format: square, triangle, multisine or chirp; empty: rest.
-        More than that format has: square and triangle with `start_s`; knots, with `times_s`
-        and `rates_deg_s`, between which the rate is linear
-    elevation_deg : elevation at the start [deg]
-    sensors : grade of the sensors
-    parameter_tolerance : largest relative deviation of the machine from the reference, unit 1
-
+    More than the input format has: square and triangle with `start_s`; knots, with `times_s` and
+    `rates_deg_s`, between which the rate is linear.
     """
 
-    circuit: str
-    filter_1: str
-    bias: Mapping[str, Any]
-    waveform: Mapping[str, Any]
-    elevation_deg: float = 45.0
+    circuit: str                        # of Table 1, 'old' or 'new'
+    filter_1: str                       # of Table 1, 'old' or 'new'
+    bias: Mapping[str, Any]             # of the input format: circuit, fixed or fixed_step
+    waveform: Mapping[str, Any]         # square, triangle, multisine, chirp or knots; empty: rest
+    elevation_deg: float = 45.0         # at the start
     sensors: SensorGrade = SensorGrade()
-    parameter_tolerance: float = 0.02
+    parameter_tolerance: float = 0.02   # largest relative deviation from the reference
 
     def plain(self) -> dict[str, Any]:
         """Return the content of the YAML file."""

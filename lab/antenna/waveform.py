@@ -54,19 +54,7 @@ def between_knots(test: Any, t: float, middle: float) -> float:
 
 @compiled
 def command(test: Any, t: float, middle: float) -> float:
-    """
-    Return the rate command [rad/s].
-
-    Parameters
-    ----------
-    test
-        a TEST record
-    t
-        time [s]
-    middle
-        a time in the same interval between two corners, which selects the branch [s]
-
-    """
+    """Return the rate command [rad/s] at `t` [s], on the branch that holds at `middle` [s]."""
     if test.shape == REST or middle < test.start:
         return 0.0
     if test.shape == SQUARE:
@@ -96,17 +84,7 @@ def command(test: Any, t: float, middle: float) -> float:
 
 
 def corners(test: Any, end: float) -> NDArray[np.float64]:
-    """
-    Return the times between 0 and `end` at which the command or the bias is not smooth [s].
-
-    Parameters
-    ----------
-    test
-        a TEST record
-    end
-        end of the test [s]
-
-    """
+    """Return the times between 0 and `end` at which the command or the bias is not smooth [s]."""
     times: list[float] = []
     if test['bias_source'] > 0.0:
         times.append(float(test['bias_at']))

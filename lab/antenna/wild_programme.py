@@ -46,19 +46,10 @@ class Programme(NamedTuple):
 def draw_programme(shapes: Shapes, tolerance: float, longest: float,
                    random: np.random.Generator) -> Programme:
     """
-    Draw the tests of one case, one for each name in RECORDINGS.
+    Draw the tests of one case, one for each name in RECORDINGS, none over `longest` [s].
 
-    Parameters
-    ----------
-    shapes
-        by group ('slow', 'fast', 'broad') and kind
-    tolerance
-        largest relative deviation of the machine from the reference, unit 1
-    longest
-        the longest recording [s]
-    random
-        source of randomness
-
+    Shapes are by group ('slow', 'fast', 'broad') and kind. `tolerance` is the machine's largest
+    relative deviation from the reference.
     """
     rate = programme.log_uniform(*RATE_HZ, 0, random)
     longest = min(longest, MOST_SAMPLES / rate)

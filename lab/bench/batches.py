@@ -3,9 +3,8 @@
 """
 Batches: many variants of the saw-tooth test in an executor of the caller.
 
-A task is a group of variants as plain numbers, and its result is statistics alone. It can run in
-a thread, in another process or on another machine. `main` runs one task and prints its peak
-memory.
+A task is a group of variants as plain numbers, and its result is statistics alone, so any thread,
+process or machine can run it. `main` runs one task and prints its peak memory.
 """
 
 from __future__ import annotations
@@ -38,29 +37,14 @@ _GROUP = 10
 
 @dataclass(frozen=True)
 class Task:
-    """
-    A group of variants.
+    """A group of variants."""
 
-    Attributes
-    ----------
-    scales : factors on the varied parameters, shape (variants, 4), as lists
-    duration_s : of each run [s]
-
-    """
-
-    scales: list[list[float]]
-    duration_s: float
+    scales: list[list[float]]   # factors on the varied parameters, shape (variants, 4)
+    duration_s: float           # of each run
 
 
 def statistics(task: Task) -> FloatArray:
-    """
-    Run a group of variants and return statistics alone.
-
-    Returns
-    -------
-    array of shape (variants, signals, 4): least, greatest, mean and rms of each signal
-
-    """
+    """Run a group; return each signal's least, greatest, mean and rms, (variants, signals, 4)."""
     drive = experiments()[TEST].drive()
     return np.array([_statistics(_variant(drive, scales), task.duration_s)
                      for scales in task.scales])
@@ -71,8 +55,7 @@ def _variant(drive: Drive, scales: list[float]) -> Drive:
     for unit in ('motor_1', 'motor_2'):
         for name, scale in zip(_VARIED, scales, strict=True):
             part, _, key = name.partition('.')
-            changes[f'{unit}.{name}'] = scale * getattr(
-                getattr(getattr(drive, unit), part), key)
+            changes[f'{unit}.{name}'] = scale * getattr(getattr(getattr(drive, unit), part), key)
     return changed(drive, changes)
 
 
@@ -95,8 +78,7 @@ def _statistics(drive: Drive, duration_s: float) -> FloatArray:
 
 def tasks(variants: int, duration_s: float = DURATION_S) -> list[Task]:
     """Return a number of variants as tasks; always the same ones."""
-    scales = 1.0 + 0.1 * np.random.default_rng(_SEED).uniform(-1.0, 1.0,
-                                                              (variants, len(_VARIED)))
+    scales = 1.0 + 0.1 * np.random.default_rng(_SEED).uniform(-1.0, 1.0, (variants, len(_VARIED)))
     return [Task(scales[first:first + _GROUP].tolist(), duration_s)
             for first in range(0, variants, _GROUP)]
 
@@ -110,11 +92,8 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
     """
     Measure the growth of time and memory, and the gain from more cores and a cluster.
 
-    Returns
-    -------
-    two_core_speedup; wall times by variants, duration and executor; peak memory by duration;
-    omitted measurements with the reason
-
+    Return two_core_speedup, wall times by variants, duration and executor, peak memory by
+    duration, and omitted measurements with the reason.
     """
     variants = QUICK_VARIANTS if quick else VARIANTS
     work = tasks(variants)

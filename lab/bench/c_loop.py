@@ -41,19 +41,9 @@ class CDrive:
 
     def prepared(self, duration: float, step_s: float, every: int) -> Callable[[], FloatArray]:
         """
-        Compute the command and return what runs the loop.
+        Compute the command over `duration` [s]; return what runs the loop by steps of `step_s`.
 
-        Parameters
-        ----------
-        duration, step_s
-            [s]
-        every
-            keep the samples of the steps that this number divides
-
-        Returns
-        -------
-        function that gives the samples, shape (n, signals, 2), with those at t = 0
-
+        It returns the samples of every `every`th step and those at t = 0, shape (n, signals, 2).
         """
         count = round(duration / step_s)
         unit = build(TEST_SIGNAL, self._drive)
@@ -72,14 +62,7 @@ class CDrive:
 
 @contextmanager
 def compiled() -> Iterator[ctypes.CDLL]:
-    """
-    Compile the loop into a folder of its own, which is removed at the end.
-
-    Raises
-    ------
-    UserError : there is no compiler, or it does not compile the source
-
-    """
+    """Compile the loop into a folder that is removed at the end; UserError where that fails."""
     compiler = shutil.which(COMPILER)
     if compiler is None:
         raise UserError(f'no {COMPILER} found: apt-get install gcc')

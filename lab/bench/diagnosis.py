@@ -18,15 +18,8 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
     """
     Measure the diagnosis of one case of a trial: three recordings of one antenna.
 
-    Returns
-    -------
-    wall time, processor time and peak memory on two cores; two_core_speedup, the wall time on one
-    core over that on two
-
-    Raises
-    ------
-    UserError : the command fails
-
+    Return wall time, processor time and peak memory on two cores, and two_core_speedup, the wall
+    time on one core over that on two. Raise UserError where the command fails.
     """
     took: dict[int, list[tuple[float, float, float]]] = {1: [], 2: []}
     with tempfile.TemporaryDirectory() as folder:

@@ -100,25 +100,17 @@ _Compiler = Callable[[Any], Any]
 def equations(compiler: _Compiler = lambda function: function,
               ) -> tuple[_Equation, _Equation, _Equation]:
     """
-    Return the functions of the model.
+    Return the functions of the model, each compiled by `compiler`, such as numba.njit.
 
-    Parameters
-    ----------
-    compiler
-        applied to each function; numba.njit compiles it
-
-    Returns
-    -------
-    rates : (x, r, slip, threshold, p, dx): writes the time derivative of x at a rate command r
-        [rad/s]. The slip of a body is +1 or -1 if it slips forward or backward, and 0 if it
-        sticks. With 2 its rate decides, Eq. (2); a rate within threshold counts as zero [rad/s
-        of a motor; at the hub divided by the gear ratio]
-    guards : (x, slip, p, g): writes a function for each body that falls through zero when the body
-        stops or breaks away, shape (BODIES,)
-    settle : (x, slip, body, breaks, p): a body that has stopped sticks unless friction cannot hold
-        it. If breaks is true a sticking body slips in any case; this is needed where the torque
-        jumps beyond stiction and x is the state before the jump
-
+    rates(x, r, slip, threshold, p, dx) writes the time derivative of x at a command r [rad/s].
+        The slip of a body is +1 or -1 if it slips forward or backward, and 0 if it sticks. With 2
+        its rate decides, Eq. (2); a rate within threshold counts as zero [rad/s of a motor; at the
+        hub divided by the gear ratio].
+    guards(x, slip, p, g) writes a function for each body that falls through zero when the body
+        stops or breaks away, shape (BODIES,).
+    settle(x, slip, body, breaks, p): a stopped body sticks unless friction cannot hold it.
+        If breaks is true a sticking body slips in any case; this is needed where the torque jumps
+        beyond stiction and x is the state before the jump.
     """
     mode_torque, applied = _torques(compiler)
     guards, settle = _events(compiler, applied)
@@ -258,8 +250,7 @@ def _events(compiler: _Compiler, applied: _Equation) -> tuple[_Equation, _Equati
     def guards(x, slip, p, g):  # type: ignore[no-untyped-def]
         for body in range(3):
             # all rates at the motor shafts, so that they have the same scale
-            rate = (p[RATIO] * x[HUB_RATE] if body == 2
-                    else x[1 + MOTOR_STATES * body + RATE])
+            rate = (p[RATIO] * x[HUB_RATE] if body == 2 else x[1 + MOTOR_STATES * body + RATE])
             if slip[body] != 0:
                 g[body] = slip[body] * rate
             else:
@@ -293,14 +284,8 @@ def pieces(experiment: DriveExperiment) -> list[tuple[float, float, float, float
     """
     Return the pieces of the rate command between its jumps and corners.
 
-    Returns
-    -------
-    start [s], end [s], value at the start [rad/s] and slope [rad/s^2] of each piece
-
-    Raises
-    ------
-    ValueError : the waveform is not one of zero, square, saw_tooth
-
+    Each is start [s], end [s], value at the start [rad/s] and slope [rad/s^2]. Raise ValueError
+    where the waveform is not one of zero, square, saw_tooth.
     """
     end = experiment.duration
     command = {name.rpartition('.')[2]: value for name, value in experiment.settings.items()

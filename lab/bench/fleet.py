@@ -24,15 +24,8 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
     """
     Measure how much faster two workers diagnose a fleet than one.
 
-    Returns
-    -------
-    wall times [s] and two_worker_speedup; the number of machines
-
-    Raises
-    ------
-    UserError : a machine cannot be diagnosed
-    ModuleNotFoundError : dask.distributed is not installed
-
+    Return wall times [s], two_worker_speedup and the number of machines. Raise UserError where a
+    machine cannot be diagnosed, ModuleNotFoundError without dask.distributed.
     """
     from distributed import LocalCluster
 

@@ -43,19 +43,12 @@ window.took = null;
 
 def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> dict[str, Any]:
     """
-    Measure with a headless Chromium.
+    Measure with a headless Chromium; raise UserError where there is none.
 
-    Returns
-    -------
     first_curve_s: from the command to the first moving curve; slider_ms: from a slider to the
     answer that its change is in force; rate_share and rate_share_paced: rate of the drive with the
     page over that without, as fast as possible and at real time; lost_steps, server_growth_MB and
-    page_growth_MB: in the time that open_s tells, at real time
-
-    Raises
-    ------
-    UserError : there is no Chromium
-
+    page_growth_MB: during open_s, at real time.
     """
     if EXECUTABLE is None:
         raise UserError('chromium is not installed')

@@ -36,17 +36,7 @@ def in_turn(work: Mapping[str, Callable[[], object]], repetitions: int) -> dict[
     """
     Time each piece of work once per turn, A B A B, after one warm-up turn.
 
-    Parameters
-    ----------
-    work
-        by name
-    repetitions
-        number of turns
-
-    Returns
-    -------
-    wall times [s] by name, one for each turn
-
+    Return the wall times [s] by name, one for each of `repetitions` turns.
     """
     for piece in work.values():
         piece()
@@ -64,10 +54,7 @@ def process(module: str, *arguments: str) -> tuple[float, float, float]:
     """
     Run a module; return its wall time [s], processor time [s] and peak memory [MB].
 
-    Raises
-    ------
-    UserError : it fails; the message is its last line
-
+    Raise UserError, with the module's last line, where it fails.
     """
     began = time.monotonic()
     with tempfile.TemporaryFile() as log:

@@ -36,20 +36,11 @@ _SIZES = np.array([1.0, *2 * (1.0, 1.0, 1.0, 1.0, 1.0), 1.0, 1.0, 1.0, *4 * (1e-
 
 @dataclass(frozen=True)
 class Setting:
-    """
-    The settings of a peer.
+    """The settings of a peer."""
 
-    Attributes
-    ----------
-    method : the peer's name of the integrator
-    tolerance : relative; absolute ones are this times the size of each state
-    threshold : rate of a rotor that counts as zero [rad/s]; 0 to locate stops as events
-
-    """
-
-    method: str
-    tolerance: float
-    threshold: float = 0.0
+    method: str             # the peer's name of the integrator
+    tolerance: float        # relative; absolute ones are this times the size of each state
+    threshold: float = 0.0  # rotor rate that counts as zero [rad/s]; 0 to locate stops as events
 
     def __str__(self) -> str:
         """Return the setting as text."""
@@ -112,17 +103,10 @@ class Problem:
 
     def switch(self, x: FloatArray, bodies: set[int], breaks: bool = False) -> None:
         """
-        Update stick and slip of the bodies, and of others that stop at the same moment.
+        Update stick and slip of `bodies`, whose guards fell through zero, and of others that stop.
 
-        Parameters
-        ----------
-        x
-            state, shape (STATES,); the rate of a body that stops becomes zero
-        bodies
-            those whose guard has fallen through zero
-        breaks
-            whether a sticking body slips even if x does not require it
-
+        The rate of a body that stops becomes zero in `x` (STATES,). With `breaks` a sticking body
+        slips even if x does not require it.
         """
         self.guards(x, self.slip, self.p, self._g)
         for body in range(BODIES):

@@ -85,25 +85,12 @@ class Candidate:
         return {'setting': self.name, 'error': self.error, 'wall_s': self.wall_s}
 
 
-def measure(repetitions: int, quick: bool, progress: Callable[[str], None],
-            ) -> dict[str, Any]:
+def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> dict[str, Any]:
     """
     Measure every experiment against every peer that is installed.
 
-    Parameters
-    ----------
-    repetitions
-        turns of which the medians are taken
-    quick
-        shorter experiments and fewer settings
-    progress
-        told what is being done
-
-    Returns
-    -------
-    speedup by peer and ratio_to_c, each of the experiment where it is least; by experiment the
-    settings tried, those chosen and their figures; what was left out and why
-
+    Return speedup by peer and ratio_to_c, each of the experiment where it is least; by experiment
+    the settings tried, those chosen and their figures; what was left out and why.
     """
     found: dict[str, Any] = {}
     left_out: dict[str, str] = {}
@@ -210,14 +197,8 @@ def ratio_to_c(problem: Problem, repetitions: int) -> dict[str, Any]:
     """
     Return the rate of the emulator's lock-step loop over that of the same loop in C.
 
-    Both make every macro-step of 1 ms and keep the samples of every fifth; they give the same
-    bits, which is checked first.
-
-    Raises
-    ------
-    UserError : there is no C compiler
-    AssertionError : the samples differ
-
+    Both make every macro-step of 1 ms and keep the samples of every fifth. They give the same
+    bits, which is checked first (AssertionError). Raise UserError where there is no C compiler.
     """
     duration, every = problem.experiment.duration, round(GRID_S / MACRO_STEP)
     emulator = Emulator(problem.drive)
@@ -264,11 +245,7 @@ def _knots(problem: Problem, step_s: float) -> FloatArray:
 
 @lru_cache(maxsize=16)
 def plan(problem: Problem, step_s: float) -> batch.Schedule:
-    """
-    Return the steps of `run_whole`: to each of its knots, at most `step_s` [s] at a time.
-
-    It is made once for a test, as in the diagnosis, and as the peers' equations and pieces are.
-    """
+    """Return the steps of `run_whole`, each of at most `step_s` [s]; made once for a test."""
     start, _, value, slope = (np.array(column) for column in zip(*problem.pieces, strict=True))
     knots = _knots(problem, step_s)
     parts = max(1, round(GRID_S / step_s))

@@ -18,14 +18,7 @@ WARM_STEPS = 300
 
 
 class Stamps:
-    """
-    The times of one process' steps, on the clock that all processes share.
-
-    Attributes
-    ----------
-    due_s : when step 0 was due, set by a process that paces the run [s]
-
-    """
+    """The times of one process' steps, on the clock that all processes share."""
 
     def __init__(self, path: str | os.PathLike[str], last: int) -> None:
         """Prepare to write to `path` after step `last`."""
@@ -33,7 +26,7 @@ class Stamps:
         self._last = last
         self._times = np.zeros(last + 1, np.int64)
         self._cpu_s = math.nan  # until the warm-up is noted
-        self.due_s = math.nan
+        self.due_s = math.nan  # when step 0 was due, set by a process that paces the run
 
     def note(self, step: int) -> None:
         """
@@ -66,20 +59,11 @@ class Stamps:
 
 
 class Stamped(NamedTuple):
-    """
-    The records of one process.
+    """The records of one process."""
 
-    Attributes
-    ----------
-    times : of each step, shape (last + 1,) [s]
-    cpu_s : processor time of the process from the end of the warm-up to the last step [s]
-    due_s : when step 0 was due, NaN if this process did not pace the run [s]
-
-    """
-
-    times: NDArray[np.float64]
-    cpu_s: float
-    due_s: float
+    times: NDArray[np.float64]  # of each step, shape (last + 1,) [s]
+    cpu_s: float                # processor time from the end of the warm-up to the last step
+    due_s: float                # when step 0 was due, NaN if this process did not pace the run
 
 
 def read(path: Path) -> Stamped:

@@ -31,12 +31,9 @@ def measure(repetitions: int, quick: bool, progress: Callable[[str], None]) -> d
     """
     Measure the starts of separate processes, interleaved.
 
-    Returns
-    -------
-    times from the start of the process to the end of the import or of the first step [s]:
+    Return times from the start of the process to the end of the import or of the first step [s]:
     interpreter_s, libraries_s, import_s, second_first_step_s (compiled before) and
-    first_first_step_s (nothing compiled yet); second_over_libraries, and demo_s
-
+    first_first_step_s (nothing compiled yet); second_over_libraries, and demo_s.
     """
     progress('starts')
     values: dict[str, list[float]] = {name: [] for name in _STARTS}

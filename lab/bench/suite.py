@@ -52,26 +52,11 @@ def measure(groups: Iterable[str], repetitions: int, quick: bool,
             progress: Callable[[str], None],
             options: Mapping[str, Mapping[str, Any]] | None = None) -> dict[str, Any]:
     """
-    Measure groups one after another.
+    Measure groups one after another; return the machine and the figures of each group.
 
-    Parameters
-    ----------
-    groups
-        names of groups
-    repetitions
-        turns over which each median is taken
-    quick
-        shorter runs and fewer settings
-    progress
-        called with a description of the present measurement
-    options
-        further arguments of a group's `measure`, by group
-
-    Returns
-    -------
-    the machine, and the figures of each group; a group that cannot be measured here has an entry
-    `left_out` with the reason instead
-
+    A group that cannot be measured here has an entry `left_out` with the reason instead. Medians
+    are over `repetitions` turns; `quick` has shorter runs and fewer settings. `progress` gets a
+    description of each measurement, `options` has further arguments of a group's `measure`.
     """
     result: dict[str, Any] = {'machine': machine(), 'quick': quick, 'repetitions': repetitions}
     for group in groups:

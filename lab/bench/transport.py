@@ -44,25 +44,13 @@ _RATIOS = (
 
 @dataclass(frozen=True)
 class ExchangeRun:
-    """
-    The records of five processes in one run.
+    """The records of five processes in one run."""
 
-    Attributes
-    ----------
-    step_s : macro-step [s]
-    pace : times real time, 0 for as fast as possible
-    nodes : by unit
-    began_s : from the start of the first process to the conductor's first step [s]; from that of
-        the last where one was started late
-    steal : the machine's steal time during the run
-
-    """
-
-    step_s: float
-    pace: float
-    nodes: dict[str, Stamped]
-    began_s: float
-    steal: Steal
+    step_s: float               # macro-step
+    pace: float                 # times real time, 0 for as fast as possible
+    nodes: dict[str, Stamped]   # by unit
+    began_s: float              # from the first start or a late one to the conductor's first step
+    steal: Steal                # the machine's steal time during the run
 
     @property
     def rate(self) -> float:
@@ -164,28 +152,14 @@ def _run(module: str, steps: int, step_s: float, pace: float,
 def measure(repetitions: int, quick: bool, progress: Callable[[str], None],
             paced_s: float | None = None) -> dict[str, Any]:
     """
-    Measure the exchange.
+    Measure the exchange; raise ModuleNotFoundError where ROS 2 is not installed.
 
-    Parameters
-    ----------
-    repetitions, quick, progress
-        see `suite.measure`
-    paced_s
-        how long the drive runs at real-time pace with a macro-step of 1 ms [s], and a tenth of
-        it with 0.5 ms; None for 600, 15 if quick
-
-    Returns
-    -------
-    real-time factors (rtf_...) with readings at 100 Hz; ratios to the bare exchange, without
-    readings; rates, intervals between steps, processor time per step; first_step_s of the node
-    that is started last; late_fraction of paced runs by tenths, and the machine's steal time
-    beside it. What ends in `_placed` has its processes placed for speed, the rest is left to the
-    system.
-
-    Raises
-    ------
-    ModuleNotFoundError : ROS 2 is not installed
-
+    `paced_s` is how long the drive runs at real-time pace with a macro-step of 1 ms, and a tenth
+    of it with 0.5 ms; None for 600 s, 15 s if quick. Return real-time factors (rtf_...) with
+    readings at 100 Hz; ratios to the bare exchange, without readings; rates, intervals between
+    steps, processor time per step; first_step_s of the node that is started last; late_fraction of
+    paced runs by tenths, and the machine's steal time. What ends in `_placed` has its processes
+    placed for speed.
     """
     import rclpy  # noqa: F401  fail here and not in five processes
 

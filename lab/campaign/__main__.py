@@ -3,8 +3,7 @@
 """
 Do one trial in this process: PART NAME SEED OPTIONS (JSON), the outcome goes to a file.
 
-The campaign starts each trial in a process of its own, so that a trial that hangs, leaks or dies
-spoils no other.
+Each trial has a process of its own, so that one that hangs, leaks or dies spoils no other.
 """
 
 from __future__ import annotations

@@ -84,8 +84,7 @@ def _recorder_on(outcome: Outcome, rng: random.Random, folder: Path, size: str, 
     if start is None:
         outcome.skipped = 'no file system can be mounted here (unshare -m)'
         return
-    command = (*start, str(folder), sys.executable, '-m', MEMBERS, 'recorder',
-               f'{folder}/bags')
+    command = (*start, str(folder), sys.executable, '-m', MEMBERS, 'recorder', f'{folder}/bags')
     with Rig(outcome, commands={RECORDER: command}, waited_for=[RECORDER], pace=0.0,
              settings=random_settings(rng)) as rig:
         rig.start()

@@ -19,14 +19,7 @@ class DomainClaim:
     """A ROS 2 domain that no other claim on this machine has while this one holds it."""
 
     def __init__(self) -> None:
-        """
-        Claim a free domain.
-
-        Raises
-        ------
-        RuntimeError : all of them are taken
-
-        """
+        """Claim a free domain; raise RuntimeError where all are taken."""
         # Each process starts at a different place. Programs that claim nothing also use domains,
         # and this makes it unlikely to meet one.
         start = os.getpid() % len(DOMAINS)

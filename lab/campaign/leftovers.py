@@ -17,11 +17,7 @@ TOKEN = 'ANTENNA_DRIVE_CAMPAIGN'
 
 
 def alive(marks: Mapping[str, str]) -> list[int]:
-    """
-    Return the processes with all these variables in their environment (on Linux).
-
-    Neither this one nor zombies are among them.
-    """
+    """Return the other processes with all these variables, zombies apart (on Linux)."""
     wanted = {f'{name}={value}'.encode() for name, value in marks.items()}
     found = []
     for folder in Path('/proc').iterdir():

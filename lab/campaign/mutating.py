@@ -58,19 +58,9 @@ def mutations(content: bytes, count: int, seed: int) -> Iterator[bytes]:
 def tree_mutations(tree: Any, write: Callable[[Any], bytes], count: int, seed: int,
                    ) -> Iterator[bytes]:
     """
-    Yield the text of plain data in which one to three places are changed.
+    Yield the text of mappings, lists and scalars in which one to three places are changed.
 
-    Parameters
-    ----------
-    tree
-        mappings, lists and scalars
-    write
-        returns the text of such a tree
-    count
-        how many texts are tried; those that `write` refuses are left out
-    seed
-        of the changes
-
+    `count` texts are tried; those that `write` refuses are left out.
     """
     rng = random.Random(seed)
     for _ in range(count):

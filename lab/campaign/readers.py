@@ -76,23 +76,13 @@ CHANGE = {'run': 5, 'step': 0, 'settings': {'bias_pot': 0.5, 'weights': [1.0, 2.
 
 
 class Reader(NamedTuple):
-    """
-    A reader.
+    """A reader."""
 
-    Attributes
-    ----------
-    file : where it reads, below a folder
-    content : a file that it accepts
-    read : reads the folder's file
-    tree, write : the content as plain data, and how it is written; None where it is none
-
-    """
-
-    file: str
-    content: bytes
-    read: Callable[[Path], Any]
-    tree: Any = None
-    write: Callable[[Any], bytes] | None = None
+    file: str                                       # where it reads, below a folder
+    content: bytes                                  # a file that it accepts
+    read: Callable[[Path], Any]                     # reads the folder's file
+    tree: Any = None                                # the content as plain data, or None
+    write: Callable[[Any], bytes] | None = None     # how `tree` is written
 
 
 def one_recording(samples: int = 60) -> Recording:
@@ -146,17 +136,7 @@ def _unchecked(bag: Path) -> bytes:
 
 
 def reader(name: str, folder: Path) -> Reader:
-    """
-    Return a reader by its name.
-
-    Parameters
-    ----------
-    name
-        one of `trials.READERS`
-    folder
-        where its files are; what it needs beside the file to be damaged is put there
-
-    """
+    """Return one of `trials.READERS`, with what it needs beside the damaged file in `folder`."""
     if name.startswith('bag'):
         return _bag_reader(name, folder)
     if name == 'csv':

@@ -45,14 +45,7 @@ KEPT = 3000
 
 
 class InVainError(Exception):
-    """
-    What had to come has not come.
-
-    Attributes
-    ----------
-    logs : the end of what each process of that drive wrote, by its name
-
-    """
+    """What had to come has not come; `logs` has the end of each process' output by its name."""
 
     def __init__(self, message: str, logs: Mapping[str, str]) -> None:
         """Say what has not come."""
@@ -180,33 +173,14 @@ class Rig:
         """
         Say what to start; `start` starts it.
 
-        Parameters
-        ----------
-        outcome
-            of the trial, which is told what is found
-        folder
-            where a recorder records
-        recorder, observers
-            members to start beside the nodes, in processes of their own
-        namespace, order
-            of the drive, and its processes in the order of their start
-        conductor
-            the command of another node in the place of test_signal
-        exchange
-            of all nodes: auto or python
-        environment
-            of all processes; None for this one's
-        commands, waited_for
-            of further processes, by name, and those of them that the drive waits for
-        settings, run
-            of the test signal, and its parameters run.*
-        nap_s, keep
-            how long the watcher takes for each step [s], and how many it keeps of each run
-        said
-            hears /diagnostics; None for a listener of the rig's own
-        nodes_are_killed
-            by the trial: a node may take its last frames along, and the recorder lacks steps
-
+        The outcome is told what is found. A recorder (which records in `folder`), observers and
+        the `commands` by name run beside the nodes in processes of their own, with `environment`;
+        the drive waits for those in `waited_for`. Processes start in the given order. `conductor`
+        is the command of another node in the place of test_signal, which gets `settings` and the
+        parameters run.*; `exchange` is auto or python. The watcher takes `nap_s` for each step and
+        keeps the last `keep` of each run. `said` hears /diagnostics; None for a listener of the
+        rig's own. Where `nodes_are_killed` by the trial, a node may take its last frames along,
+        and the recorder lacks steps.
         """
         self.outcome = outcome
         self.namespace = namespace
@@ -242,16 +216,9 @@ class Rig:
 
     def until(self, true: Callable[[], bool], what: str, patience_s: float = PATIENCE_S) -> float:
         """
-        Wait until something is true.
+        Wait until something is true, and return how long it took [s].
 
-        Returns
-        -------
-        how long it took [s]
-
-        Raises
-        ------
-        InVainError : it has not become true; the message says where the drive stands
-
+        Raise InVainError, which says where the drive stands, after `patience_s`.
         """
         began = time.monotonic()
         while not true():

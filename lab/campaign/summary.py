@@ -24,21 +24,7 @@ BAD = ('orphans', 'bags_unreadable', 'bags_short', 'garbage_stepped_on', 'traceb
 
 def summary(trials: Sequence[Trial], outcomes: Mapping[str, Mapping[str, Any]],
             settings: Mapping[str, Any], folder: str) -> dict[str, Any]:
-    """
-    Return the result as plain data.
-
-    Parameters
-    ----------
-    trials
-        the plan, done or not
-    outcomes
-        what is done, by id of the trial
-    settings
-        those of the campaign
-    folder
-        of the campaign, for the commands that repeat a trial
-
-    """
+    """Return the result as plain data: of the whole plan, with outcomes by id of the trial."""
     done = [outcomes[trial.label] for trial in trials if trial.label in outcomes]
     counts: Counter[str] = Counter(dict.fromkeys(COUNTS, 0))
     for entry in done:

@@ -34,24 +34,10 @@ END_S = 8.0
 
 
 class Campaign:
-    """
-    A campaign and its folder.
-
-    Attributes
-    ----------
-    outcomes : what is done, by the id of the trial
-
-    """
+    """A campaign and its folder; `outcomes` has what is done, by the id of the trial."""
 
     def __init__(self, folder: Path, settings: dict[str, Any]) -> None:
-        """
-        Open a folder, or make it.
-
-        Raises
-        ------
-        UserError : the folder holds a campaign of other settings, or cannot be written
-
-        """
+        """Open a folder, or make it; UserError if it has other settings or cannot be written."""
         self.folder = folder
         self.settings = settings
         self.outcomes: dict[str, dict[str, Any]] = {}
@@ -79,17 +65,9 @@ class Campaign:
     def do(self, trials: Sequence[Trial], told: Callable[[Trial, dict[str, Any]], None],
            jobs: int = 1) -> None:
         """
-        Do the trials that are not done, and tell of each.
+        Do the trials that are not done in their order; `told` gets the outcome of each.
 
-        Parameters
-        ----------
-        trials
-            in the order in which they are done
-        told
-            called after each with its outcome
-        jobs
-            how many of those of a part in SIDE_BY_SIDE are done at once
-
+        `jobs` of those of a part in SIDE_BY_SIDE are done at once.
         """
         ahead = [trial for trial in trials if trial.label not in self.outcomes]
         for together, group in groupby(ahead, lambda trial: trial.part in SIDE_BY_SIDE):

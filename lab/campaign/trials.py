@@ -42,22 +42,12 @@ CHECKS = ('another_network', 'security')
 
 
 class Trial(NamedTuple):
-    """
-    One trial.
+    """One trial."""
 
-    Attributes
-    ----------
-    part : one of PARTS
-    name : which of them, unique within the part
-    options : what the size of the campaign decides, such as numbers and durations [s]
-    patience_s : a trial that takes longer than this hangs
-
-    """
-
-    part: str
-    name: str
-    options: Mapping[str, Any]
-    patience_s: float
+    part: str                   # one of PARTS
+    name: str                   # unique within the part
+    options: Mapping[str, Any]  # what the size of the campaign decides, such as durations [s]
+    patience_s: float           # a trial that takes longer than this hangs
 
     @property
     def label(self) -> str:
@@ -71,22 +61,12 @@ class Trial(NamedTuple):
 
 @dataclass
 class Outcome:
-    """
-    What a trial has found.
+    """What a trial has found."""
 
-    Attributes
-    ----------
-    counts : numbers that add up over the trials, such as kills
-    figures : numbers of this trial alone, such as a rate
-    findings : one mapping for each fault: `what` says it in a line
-    skipped : why the trial cannot be done here, '' if it was done
-
-    """
-
-    counts: dict[str, int] = field(default_factory=dict)
-    figures: dict[str, Any] = field(default_factory=dict)
-    findings: list[dict[str, Any]] = field(default_factory=list)
-    skipped: str = ''
+    counts: dict[str, int] = field(default_factory=dict)            # add up over trials, as kills
+    figures: dict[str, Any] = field(default_factory=dict)           # of this trial, such as a rate
+    findings: list[dict[str, Any]] = field(default_factory=list)    # `what` says each in a line
+    skipped: str = ''                                               # why it cannot be done here
 
     def count(self, what: str, number: int = 1) -> None:
         """Add to a count."""
@@ -107,17 +87,7 @@ def run_trial(part: str, name: str, options: Mapping[str, Any], seed: int) -> Ou
 
 
 def plan(dose: str, soak_s: float | None = None) -> Iterator[Trial]:
-    """
-    Yield the trials of a campaign.
-
-    Parameters
-    ----------
-    dose
-        one of DOSES
-    soak_s
-        duration of the soak [s]; None for that of the dose
-
-    """
+    """Yield the trials of a campaign of one of DOSES; `soak_s` replaces the dose's soak [s]."""
     def sized(short: float, medium: float, full: float) -> Any:
         return {SHORT: short, MEDIUM: medium, FULL: full}[dose]
 

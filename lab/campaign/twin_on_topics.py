@@ -41,25 +41,10 @@ def watched_on_topics(columns: Mapping[str, FloatArray], sheet: Mapping[str, Any
     """
     Return what the twin's node says of a test in which an effect is switched on.
 
-    Parameters
-    ----------
-    columns
-        of the recording, by name; NaN where there is no sample
-    sheet
-        plain data of the test sheet
-    onset_s
-        when the effect is switched on; the end of the test if it never is [s]
-    alarms_per_day
-        that are allowed
-
-    Returns
-    -------
-    as `twin.proving.watched`; times are those at which the words came
-
-    Raises
-    ------
-    RuntimeError : the twin ended before its time, or nothing came of it or of the player
-
+    Columns are those of the recording by name, NaN where there is no sample; `sheet` is plain
+    data. `onset_s` is the end of the test if no effect is switched on. The result is that of
+    `twin.proving.watched`; its times are those at which the words came. Raise RuntimeError where
+    the twin ended before its time, or nothing came of it or of the player.
     """
     with ExitStack() as stack:
         stack.enter_context(_own_domain())
@@ -94,21 +79,10 @@ def watched_on_topics(columns: Mapping[str, FloatArray], sheet: Mapping[str, Any
 
 def told(said: Sequence[Said], zero_s: float, zero_ns: int, onset_s: float) -> dict[str, Any]:
     """
-    Return what a twin has said, until the first gap after the onset.
+    Return what a twin has said until the first gap after the onset, as `twin.proving.watched`.
 
-    Parameters
-    ----------
-    said
-        of all nodes on /diagnostics
-    zero_s, zero_ns
-        when the test began: as time.monotonic() tells it, and by the stamps of its samples
-    onset_s
-        when the effect was switched on, after that [s]
-
-    Returns
-    -------
-    as `twin.proving.watched`
-
+    The test began at `zero_s` of time.monotonic() and at `zero_ns` by the stamps of its samples;
+    the effect was switched on `onset_s` after that.
     """
     alarms: list[dict[str, Any]] = []
     first: dict[str, Any] = {'told_after_s': None, 'since_s': None, 'gaps': []}

@@ -141,8 +141,7 @@ def _run_again(arguments: argparse.Namespace) -> dict[str, Mapping[str, float]]:
     wanted: dict[str, list[str]] = {'as they are': []}
     for name in arguments.again:
         if name not in known:
-            raise UserError(f'--again: {name}: no such threshold; lab thresholds lists '
-                            'them')
+            raise UserError(f'--again: {name}: no such threshold; lab thresholds lists them')
         for label, _ in _halved_and_doubled(name, *known[name]):
             wanted[label] = ['--threshold', f'{name}={label.rpartition(" ")[2]}']
     jobs = [(_linked(folder, label, case).absolute(), options, machine_of(folder, case, manifest))

@@ -62,8 +62,7 @@ USUAL_TOLERANCE = 0.02
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `lab trial`."""
-    parser.add_argument('--cases', type=int, required=True, metavar='N',
-                        help='number of cases')
+    parser.add_argument('--cases', type=int, required=True, metavar='N', help='number of cases')
     parser.add_argument('--seed', type=int, required=True, metavar='S',
                         help='seed of the cases; for a published figure use one that nothing '
                              'was tuned on')
@@ -87,8 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--skip', type=Path, metavar='FILE',
                         help='make and diagnose no case that this file of `lab score '
                              '--cases` holds')
-    parser.add_argument('--diagnose', action='store_true',
-                        help='diagnose each case as well')
+    parser.add_argument('--diagnose', action='store_true', help='diagnose each case as well')
     add_diagnosis_options(parser, '--config my.yaml')
     parser.add_argument('--quiet', action='store_true', help='show no progress')
 

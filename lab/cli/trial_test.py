@@ -38,8 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('case', metavar='CASE', help='of an antenna, e.g. case_0001')
     parser.add_argument('--sheet', type=Path, required=True, metavar='FILE',
                         help='test sheet with a waveform (.yaml)')
-    parser.add_argument('--out', type=Path, required=True, metavar='FILE',
-                        help='recording (CSV)')
+    parser.add_argument('--out', type=Path, required=True, metavar='FILE', help='recording (CSV)')
     parser.add_argument('--duration', type=float, default=DURATION_S, metavar='S',
                         help='of the test (default: %(default)g)')
     parser.add_argument('--number', type=int, default=1, metavar='N',

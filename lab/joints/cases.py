@@ -28,19 +28,7 @@ READINGS = ('position', 'current')
 
 
 def draw_truths(count: int, seed: int, machines: Sequence[str]) -> list[Truth]:
-    """
-    Draw all cases of a trial; machines take turns within each kind of case.
-
-    Parameters
-    ----------
-    count
-        number of cases
-    seed
-        of all random draws
-    machines
-        one or more of machines.MACHINES
-
-    """
+    """Draw all cases of a trial; machines, of machines.MACHINES, take turns within each kind."""
     random = np.random.default_rng([seed, 0])
     kinds = random.permutation(kinds_of(count))
     queues = {name: _Queues(kind_of(name), random) for name in machines}
@@ -101,22 +89,10 @@ def draw_imperfections(kind: Kind, random: np.random.Generator) -> dict[str, Any
 def moved(truth: Truth, recording: int, start: float,
           ) -> tuple[FloatArray, FloatArray, dict[str, FloatArray]]:
     """
-    Simulate one test of a case.
+    Simulate one test (from 0) of a case, from `start` off the first reference.
 
-    Parameters
-    ----------
-    truth
-        of the case
-    recording
-        its number, from 0
-    start
-        where the machine is before the test, off the first reference
-
-    Returns
-    -------
-    the times of the bus, shape (n,) [s]; what it asks for, shape (n,); position and current at
-    each tick of the controller, shape ((n - 1) ticks + 1,) each
-
+    Return the times of the bus [s] and what it asks for, shape (n,) each; position and current at
+    each tick of the controller, shape ((n - 1) ticks + 1,) each.
     """
     kind, test, rate = kind_of(truth['machine']), truth['tests'][recording], (
         truth['sample_rate_hz'])
@@ -132,21 +108,7 @@ def moved(truth: Truth, recording: int, start: float,
 
 
 def make_recording(truth: Truth, recording: int) -> dict[str, FloatArray]:
-    """
-    Simulate and record one test of a case.
-
-    Parameters
-    ----------
-    truth
-        of the case
-    recording
-        its number, from 0
-
-    Returns
-    -------
-    columns of the recording by name, each of shape (n,)
-
-    """
+    """Return the columns of one recording of a case (from 0) by name, each of shape (n,)."""
     random = np.random.default_rng([*truth['seed'], 2 + recording])
     kind, flaws, rate = kind_of(truth['machine']), truth['imperfections'], truth['sample_rate_hz']
     size = kind.table['start']

@@ -28,24 +28,13 @@ _SHARES_OF_A_TEST = ('brake_from', 'brake_until', 'slip_at')
 
 @dataclass(frozen=True)
 class Cause:
-    """
-    An effect as a machine has it.
+    """An effect as a machine has it."""
 
-    Attributes
-    ----------
-    key : 'component.effect', as the diagnosis names it
-    quantities : the first one is the size, the others are drawn uniformly
-    sets : numbers of the mechanism, and the quantity that each becomes
-    scales : numbers that are multiplied by the quantity 'factor'
-    stated : how a verdict states the size; empty if it is not comparable
-
-    """
-
-    key: str
-    quantities: tuple[Quantity, ...]
-    sets: Mapping[str, str]
-    scales: tuple[str, ...]
-    stated: Mapping[str, str]
+    key: str                            # 'component.effect', as the diagnosis names it
+    quantities: tuple[Quantity, ...]    # the first is the size, the others are drawn uniformly
+    sets: Mapping[str, str]             # by number of the mechanism, the quantity it becomes
+    scales: tuple[str, ...]             # numbers that are multiplied by the quantity 'factor'
+    stated: Mapping[str, str]           # how a verdict states the size; empty if not comparable
 
     def draw(self, size: float, random: np.random.Generator) -> dict[str, float]:
         """Draw the effect's numbers; a size of 0 is just detectable, 1 is strong."""
@@ -53,19 +42,7 @@ class Cause:
 
     def changed(self, numbers: Mapping[str, float], values: Parameters,
                 duration: float) -> dict[str, float]:
-        """
-        Return a mechanism's numbers with the effect.
-
-        Parameters
-        ----------
-        numbers
-            of the mechanism
-        values
-            the effect's
-        duration
-            of the test [s]
-
-        """
+        """Return a mechanism's numbers with the effect's values, in a test of `duration` [s]."""
         found = dict(numbers)
         for name, quantity in self.sets.items():
             found[name] = values[quantity] * (duration if name in _SHARES_OF_A_TEST else 1.0)
@@ -76,21 +53,12 @@ class Cause:
 
 @dataclass(frozen=True)
 class Kind:
-    """
-    A kind of machine.
+    """A kind of machine."""
 
-    Attributes
-    ----------
-    name : one of MACHINES
-    table : its YAML file
-    catalogue, outside : its effects, and what its model lacks, by key
-
-    """
-
-    name: str
-    table: Mapping[str, Any]
-    catalogue: Mapping[str, Cause]
-    outside: Mapping[str, Cause]
+    name: str                       # one of MACHINES
+    table: Mapping[str, Any]        # its YAML file
+    catalogue: Mapping[str, Cause]  # its effects by key
+    outside: Mapping[str, Cause]    # what its model lacks by key
 
     @property
     def columns(self) -> Mapping[str, str]:
@@ -121,17 +89,9 @@ class Kind:
     def mechanism(self, deviations: Mapping[str, float], effects: list[dict[str, Any]],
                   duration: float) -> Mechanism:
         """
-        Return one machine in one test.
+        Return one machine in one test of `duration` [s].
 
-        Parameters
-        ----------
-        deviations
-            factors by the numbers that are off
-        effects
-            of a truth: id and parameters
-        duration
-            of the test [s]
-
+        Deviations are factors by the numbers that are off; `effects` are those of a truth.
         """
         numbers = {name: value * deviations.get(name, 1.0)
                    for name, value in self.table['nominal'].items()}

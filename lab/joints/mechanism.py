@@ -28,91 +28,57 @@ PARTS = 8           # steps of the integration in a tick
 
 
 class Mechanism(NamedTuple):
-    """
-    The numbers of a machine; zero switches off what is not marked as needed.
+    """The numbers of a machine; zero switches off what is not marked as needed."""
 
-    Attributes
-    ----------
-    motor : the driven body; needed
-    load : body behind the shaft; without it, the motor is the whole machine
-    stiffness, damping : of the shaft
-    half_gap : of the teeth between motor and shaft
-    hung_share, hung_hz, hung_damping : share of the last body that hangs on a spring, its own
-        frequency, and its damping ratio
-    constant : driving torque per current; needed
-    constant_loss : by which iron saturates, constant / (1 + loss current^2)
-    coulomb, viscous : friction of the motor; coulomb is needed
-    bristle : deflection at which bristles slip under Coulomb friction; needed
-    bristle_damping : damping ratio of the motor on its bristles
-    asymmetry : share by which Coulomb friction is larger forward and smaller backward
-    stribeck, stribeck_rate : friction that falls as 1 / (1 + rate / stribeck_rate)
-    slope : by which friction grows along the way
-    spot, spot_at, spot_width : one place that rubs harder, as a share
-    cooling, cooling_time : share of friction that is lost as the grease gets warm
-    brake, brake_from, brake_until : friction of a brake that drags for a while
-    ripple, ripple_cycles, ripple_phase : torque that repeats with the motor
-    spring : that pulls the motor to zero
-    gravity, gravity_phase, gear : torque by the angle of the load behind the gear
-    shake, shake_hz : torque on the last body at one frequency
-    position_gain, rate_limit, velocity_gain, velocity_time, current_limit : of the loop
-    digit : of the encoder in the loop; needed
-    encoder_error, encoder_cycles, encoder_phase : cyclic error of that encoder
-    slip, slip_at : by which the encoder slips once, and when
-    dead_zone : of the amplifier, smooth
-    current_lag : of the current loop; needed
-    delay : of the demand, as three equal lags
-
-    """
-
-    motor: Annotated[float, 'kg m^2']
-    constant: Annotated[float, 'N m/A']
-    coulomb: Annotated[float, 'N m']
-    viscous: Annotated[float, 'N m s/rad']
-    bristle: Annotated[float, 'rad']
-    bristle_damping: Annotated[float, '1']
-    position_gain: Annotated[float, '1/s']
+    motor: Annotated[float, 'kg m^2']               # the driven body; needed
+    constant: Annotated[float, 'N m/A']             # driving torque per current; needed
+    coulomb: Annotated[float, 'N m']                # friction of the motor; needed
+    viscous: Annotated[float, 'N m s/rad']          # friction of the motor
+    bristle: Annotated[float, 'rad']                # deflection at which bristles slip; needed
+    bristle_damping: Annotated[float, '1']          # damping ratio of the motor on its bristles
+    position_gain: Annotated[float, '1/s']          # of the loop, as the next four
     rate_limit: Annotated[float, 'rad/s']
     velocity_gain: Annotated[float, 'A s/rad']
     velocity_time: Annotated[float, 's']
     current_limit: Annotated[float, 'A']
-    current_lag: Annotated[float, 's']
-    digit: Annotated[float, 'rad']
-    load: Annotated[float, 'kg m^2'] = 0.0
-    stiffness: Annotated[float, 'N m/rad'] = 0.0
-    damping: Annotated[float, 'N m s/rad'] = 0.0
-    half_gap: Annotated[float, 'rad'] = 0.0
-    hung_share: Annotated[float, '1'] = 0.0
-    hung_hz: Annotated[float, 'Hz'] = 10.0
-    hung_damping: Annotated[float, '1'] = 0.03
-    constant_loss: Annotated[float, '1/A^2'] = 0.0
-    asymmetry: Annotated[float, '1'] = 0.0
-    stribeck: Annotated[float, 'N m'] = 0.0
+    current_lag: Annotated[float, 's']              # of the current loop; needed
+    digit: Annotated[float, 'rad']                  # of the encoder in the loop; needed
+    load: Annotated[float, 'kg m^2'] = 0.0          # body behind the shaft; 0: the motor is all
+    stiffness: Annotated[float, 'N m/rad'] = 0.0    # of the shaft
+    damping: Annotated[float, 'N m s/rad'] = 0.0    # of the shaft
+    half_gap: Annotated[float, 'rad'] = 0.0         # of the teeth between motor and shaft
+    hung_share: Annotated[float, '1'] = 0.0         # share of the last body that hangs on a spring
+    hung_hz: Annotated[float, 'Hz'] = 10.0          # frequency of what hangs
+    hung_damping: Annotated[float, '1'] = 0.03      # damping ratio of what hangs
+    constant_loss: Annotated[float, '1/A^2'] = 0.0  # saturation: constant / (1 + loss current^2)
+    asymmetry: Annotated[float, '1'] = 0.0          # share of Coulomb: more forward, less backward
+    stribeck: Annotated[float, 'N m'] = 0.0         # falls as 1 / (1 + rate / stribeck_rate)
     stribeck_rate: Annotated[float, 'rad/s'] = 1.0
-    slope: Annotated[float, '1/rad'] = 0.0
-    spot: Annotated[float, '1'] = 0.0
+    slope: Annotated[float, '1/rad'] = 0.0          # by which friction grows along the way
+    spot: Annotated[float, '1'] = 0.0               # one place that rubs harder, as a share
     spot_at: Annotated[float, 'rad'] = 0.0
     spot_width: Annotated[float, 'rad'] = 1.0
-    cooling: Annotated[float, '1'] = 0.0
+    cooling: Annotated[float, '1'] = 0.0            # share of friction lost to warm grease
     cooling_time: Annotated[float, 's'] = 10.0
-    brake: Annotated[float, 'N m'] = 0.0
+    brake: Annotated[float, 'N m'] = 0.0            # friction of a brake that drags for a while
     brake_from: Annotated[float, 's'] = 0.0
     brake_until: Annotated[float, 's'] = 0.0
-    ripple: Annotated[float, 'N m'] = 0.0
+    ripple: Annotated[float, 'N m'] = 0.0           # torque that repeats with the motor
     ripple_cycles: Annotated[float, '1/rad'] = 1.0
     ripple_phase: Annotated[float, 'rad'] = 0.0
-    spring: Annotated[float, 'N m/rad'] = 0.0
-    gravity: Annotated[float, 'N m'] = 0.0
+    spring: Annotated[float, 'N m/rad'] = 0.0       # that pulls the motor to zero
+    gravity: Annotated[float, 'N m'] = 0.0          # by the angle of the load behind the gear
     gravity_phase: Annotated[float, 'rad'] = 0.0
     gear: Annotated[float, '1'] = 1.0
-    shake: Annotated[float, 'N m'] = 0.0
+    shake: Annotated[float, 'N m'] = 0.0            # torque on the last body at one frequency
     shake_hz: Annotated[float, 'Hz'] = 1.0
-    encoder_error: Annotated[float, 'rad'] = 0.0
+    encoder_error: Annotated[float, 'rad'] = 0.0    # cyclic, of that encoder
     encoder_cycles: Annotated[float, '1/rad'] = 1.0
     encoder_phase: Annotated[float, 'rad'] = 0.0
-    slip: Annotated[float, 'rad'] = 0.0
+    slip: Annotated[float, 'rad'] = 0.0             # by which the encoder slips once
     slip_at: Annotated[float, 's'] = 0.0
-    dead_zone: Annotated[float, 'A'] = 0.0
-    delay: Annotated[float, 's'] = 0.0
+    dead_zone: Annotated[float, 'A'] = 0.0          # of the amplifier, smooth
+    delay: Annotated[float, 's'] = 0.0              # of the demand, as three equal lags
 
 
 @inner
@@ -137,19 +103,8 @@ def accelerations(m: Mechanism, t: float, current: float, bent: float, q: float,
     """
     Return the accelerations of motor, load and what hangs [rad/s^2].
 
-    Parameters
-    ----------
-    m
-        the machine
-    t
-        since the recording began [s]
-    current
-        [A]
-    bent
-        deflection of the bristles [rad]
-    q, w, ql, wl, qh, wh
-        angles and rates of motor, load and what hangs [rad], [rad/s]
-
+    `t` counts from the start of the recording [s]; `current` is in [A] and `bent` [rad] is the
+    bristles' deflection. q, w, ql, wl, qh, wh are the bodies' angles [rad] and rates [rad/s].
     """
     stiff = m.coulomb / m.bristle
     bending = w - abs(w) * bent * stiff / level(m, t, q, w)
@@ -256,24 +211,11 @@ def demanded(m: Mechanism, asked: float, read: float, before: float,
 def simulate(m: Mechanism, reference: FloatArray, ticks: int, begin: int, start: float,
              angle: FloatArray, current: FloatArray) -> None:
     """
-    Write what the encoder and the ammeter could read at each tick, (n - 1) ticks + 1 of them.
+    Write the encoder's angle [rad] and the current [A] at each tick, (n - 1) ticks + 1 of them.
 
-    Parameters
-    ----------
-    m
-        the machine, at rest at first
-    reference
-        angle asked for at the samples of the bus, shape (n,) [rad]; the drive goes from one to
-        the next while it waits for the one after
-    ticks
-        of the controller between two samples of the bus
-    begin
-        ticks before the recording in which the first reference holds
-    start
-        angle at first [rad]
-    angle, current
-        results, [rad], [A]
-
+    The bus asks for the angles `reference`, shape (n,) [rad], `ticks` of the controller apart; the
+    drive goes from one to the next while it waits for the one after. The machine rests at `start`
+    [rad]; the first reference holds for `begin` ticks before the recording.
     """
     q = ql = qh = before = start
     w = wl = wh = bent = integral = flowing = one = two = three = 0.0

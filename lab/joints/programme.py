@@ -28,13 +28,7 @@ def draw_tests(table: Mapping[str, Any], random: np.random.Generator) -> list[Te
     """
     Draw the three tests of a case: shape, duration [s] and the numbers of the shape.
 
-    Parameters
-    ----------
-    table
-        of the machine: reach, step, rate, greatest_rate, greatest_acceleration
-    random
-        source of randomness
-
+    The machine's table has reach, step, rate, greatest_rate and greatest_acceleration.
     """
     shapes = ('steps', str(random.choice(['triangle', 'sine'])),
               str(random.choice(['chirp', 'multisine'])))
@@ -43,17 +37,7 @@ def draw_tests(table: Mapping[str, Any], random: np.random.Generator) -> list[Te
 
 
 def reference(test: Test, times: FloatArray) -> FloatArray:
-    """
-    Return what the bus asks for, in the unit of the position.
-
-    Parameters
-    ----------
-    test
-        from `draw_tests`
-    times
-        since the test began, shape (n,) [s]
-
-    """
+    """Return the position that the bus asks for at `times` in the test, shape (n,) [s]."""
     since = np.maximum(times - REST_S, 0.0)
     if test['shape'] == 'steps':
         places = np.searchsorted(test['from_s'], since, side='right') - 1

@@ -28,25 +28,14 @@ CYCLES: Final = (1, 2, *range(8, 41, 2))
 
 @dataclass(frozen=True)
 class Bounds:
-    """
-    The range of a parameter of the servo.
+    """The range of a parameter of the servo."""
 
-    Attributes
-    ----------
-    low, high : hard bounds
-    start : initial value of a global fit
-    step : of difference quotients; relative for a logarithmic parameter
-    logarithmic : True where only the order of magnitude is known beforehand
-    shape : True for a parameter without meaning while its effect is absent
-
-    """
-
-    low: float
-    high: float
-    start: float
-    step: float
-    logarithmic: bool = False
-    shape: bool = False
+    low: float                  # hard bound
+    high: float                 # hard bound
+    start: float                # initial value of a global fit
+    step: float                 # of difference quotients; relative for a logarithmic parameter
+    logarithmic: bool = False   # only the order of magnitude is known beforehand
+    shape: bool = False         # without meaning while its effect is absent
 
     def share(self, value: float) -> float:
         """Return the share of the range at a value, 0 to 1."""
@@ -141,15 +130,8 @@ def vector(values: Mapping[str, float]) -> FloatArray:
     """
     Return the parameters in the order of the physics, zero where none is given.
 
-    Parameters
-    ----------
-    values
-        by name, in the units of `UNITS`; tied names and cycles are resolved
-
-    Raises
-    ------
-    KeyError : there is no such parameter
-
+    Values are by name in the units of `UNITS`; tied names and cycles are resolved. KeyError if
+    unknown.
     """
     row = np.zeros(len(ORDER))
     for name, rest in (('stribeck_rate', 1.0), ('stribeck_shape', 1.0)):
@@ -183,19 +165,7 @@ def _waves(kind: str) -> tuple[Form, ...]:
 
 
 def catalogue(without: Iterable[str] = ()) -> dict[str, Effect]:
-    """
-    Return the effects by id.
-
-    Parameters
-    ----------
-    without
-        ids of effects to leave out
-
-    Raises
-    ------
-    KeyError : there is no such effect
-
-    """
+    """Return the effects by id, except those in `without`; KeyError where one does not exist."""
     effects = {effect.id: effect for effect in _EFFECTS}
     for name in without:
         del effects[name]

@@ -27,41 +27,20 @@ ENTRIES = {
 
 @dataclass(frozen=True)
 class Firmware:
-    """
-    The drive law and the registers of a kind of servo.
+    """The drive law and the registers of a kind of servo."""
 
-    Attributes
-    ----------
-    error_gain : duty per position error and unit of the position gain [1/rad]
-    duty_count : the load register at full duty
-    position_step : of the encoder [rad]
-    rate_step : of the speed register [rad/s]
-    rate_window_s : time over which the speed register averages [s]
-
-    """
-
-    error_gain: float
-    duty_count: float
-    position_step: float
-    rate_step: float
-    rate_window_s: float
+    error_gain: float       # duty per position error and unit of the position gain [1/rad]
+    duty_count: float       # the load register at full duty
+    position_step: float    # of the encoder [rad]
+    rate_step: float        # of the speed register [rad/s]
+    rate_window_s: float    # time over which the speed register averages
 
 
 def firmware_of(motor: str, beside: Path | None = None) -> Firmware:
     """
-    Return the firmware of a kind of servo.
+    Return the firmware of a kind of servo, from MOTOR.yaml in the folder `beside` or in ours.
 
-    Parameters
-    ----------
-    motor
-        its name in the logs; MOTOR.yaml holds the firmware
-    beside
-        folder of the logs, whose file goes before ours; None for ours alone
-
-    Raises
-    ------
-    UserError : there is no such file, or an entry of it is wrong or missing
-
+    Raise UserError where there is no such file, or an entry of it is wrong or missing.
     """
     shipped = sorted(path.stem for path in _SHIPPED.glob('*.yaml'))
     # the name comes from a log: it must not lead out of the folders

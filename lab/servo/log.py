@@ -23,58 +23,28 @@ STEP_S = 2.8e-3
 
 @dataclass(frozen=True)
 class ServoLog:
-    """
-    One log of a servo with a pendulum.
-
-    Attributes
-    ----------
-    name : for people
-    kp : position gain, in the firmware's unit
-    trajectory : the name of the goal's course
-    mass, length : of the pendulum [kg], [m]
-    gain : duty per position error [1/rad]
-    supply : voltage [V]
-    firmware : of the servo
-    time : of the samples, shape (n,) [s]
-    goal : shape (n,) [rad]
-    enabled : 1 where the servo drives, shape (n,)
-    temperature : shape (n,) [degC]
-    measured : position [rad], speed [rad/s], duty; shape (n, 3)
-
-    """
+    """One log of a servo with a pendulum; arrays have shape (n,) unless noted."""
 
     name: str
-    kp: float
-    trajectory: str
-    mass: float
-    length: float
-    gain: float
-    supply: float
+    kp: float                   # position gain, in the firmware's unit
+    trajectory: str             # the name of the goal's course
+    mass: float                 # of the pendulum [kg]
+    length: float               # of the pendulum [m]
+    gain: float                 # duty per position error [1/rad]
+    supply: float               # [V]
     firmware: Firmware
-    time: FloatArray
-    goal: FloatArray
-    enabled: FloatArray
-    temperature: FloatArray
-    measured: FloatArray
+    time: FloatArray            # of the samples [s]
+    goal: FloatArray            # [rad]
+    enabled: FloatArray         # 1 where the servo drives
+    temperature: FloatArray     # [degC]
+    measured: FloatArray        # position [rad], speed [rad/s], duty; shape (n, 3)
 
     @classmethod
     def of(cls, name: str, recording: Recording, beside: Path | None = None) -> ServoLog:
         """
-        Prepare a log that `bam.read_bam` has read.
+        Prepare a log that `bam.read_bam` has read; see `firmware_of` for `beside`.
 
-        Parameters
-        ----------
-        name
-            for people
-        recording
-            of the log
-        beside
-            folder in which the servo's firmware may lie; see `firmware_of`
-
-        Raises
-        ------
-        UserError : too short, or the drive law of this servo is not known
-
+        Raise UserError where it is too short, or the drive law of this servo is not known.
         """
         notes = recording.notes
         for key in ('mass', 'length', 'kp', 'vin'):
@@ -108,21 +78,10 @@ class ServoLog:
 
     def simulate(self, values: FloatArray, step: float = STEP_S) -> FloatArray:
         """
-        Return position, rate, duty and current that a servo with these numbers would have had.
+        Return what a servo with these values (`catalogue.vector`) would have had, shape (n, 4).
 
-        It runs free of the measured course, but that it starts where that starts, at rest.
-
-        Parameters
-        ----------
-        values
-            from `servo_catalogue.vector`
-        step
-            of integration, at most [s]
-
-        Returns
-        -------
-        array of shape (n, 4) [rad, rad/s, 1, A]
-
+        It has position [rad], rate [rad/s], duty and current [A]. The servo starts at rest where
+        the measured course starts and then runs free of it, in steps of at most `step` [s].
         """
         out = np.empty((self.time.size, 4))
         swing(values, self.mass, self.length, self.gain, self.supply, self.time, self.goal,

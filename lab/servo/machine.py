@@ -24,22 +24,10 @@ class ServoMachine(Machine):
     """
     A servo in the tests that were logged.
 
-    Parameters
-    ----------
-    logs
-        the tests
-    values
-        the model's numbers without any offset; a number that is not named is absent
-    free
-        the numbers that are not known for sure and are fitted beside any effect
-    without
-        effects that are not considered
-    noise
-        standard deviation of a perfect model's residuals in position [rad], speed [rad/s] and
-        duty; None for the sensors' steps alone
-    threads
-        how many runs at once
-
+    The model's numbers are `values`, without any offset; those not named are absent. The `free`
+    ones are fitted beside any effect. Effects in `without` are not considered. `noise` is the
+    standard deviation of a perfect model's residuals in position [rad], speed [rad/s] and duty;
+    None for the sensors' steps alone. `threads` is how many runs are simulated at once.
     """
 
     time_scales = TimeScales(start_s=1.5, scan_s=8.0, pulse_s=0.15, response_s=1.5, block_s=1.0)

@@ -32,11 +32,7 @@ FloatArray = NDArray[np.float64]
 
 
 class Servo(NamedTuple):
-    """
-    The servo's parameters in the order of the kernel, with their units.
-
-    catalogue.py explains them. Zero switches an effect off; the first three must be above zero.
-    """
+    """The kernel's parameters in its order, see catalogue.py; the first three are above zero."""
 
     torque_constant: Annotated[float, 'N m/A']
     resistance: Annotated[float, 'ohm']
@@ -110,35 +106,14 @@ def swing(values: FloatArray, mass: float, length: float, gain: float, supply: f
     """
     Simulate a servo with a pendulum in open loop: nothing is corrected from measurements.
 
-    The integrator is a leapfrog of second order. Friction is an impulse that can bring the shaft
-    to an exact stop.
-
-    Parameters
-    ----------
-    values
-        parameters in the order and units of UNITS, shape (46,)
-    mass, length
-        of the pendulum [kg], [m]
-    gain
-        duty per position error, k_p g [1/rad]
-    supply
-        voltage [V]
-    time
-        of the samples, rising, shape (n,) [s]
-    goal
-        goal position from each sample to the next, shape (n,) [rad]
-    enabled
-        1 where the bridge drives, 0 where it is off, shape (n,)
-    temperature
-        of the servo, shape (n,) [degC]
-    start, start_rate
-        at the first sample [rad], [rad/s]
-    step
-        largest integration step [s]
-    out
-        position [rad], rate [rad/s], duty and current [A] at each sample, shape (n, 4); written.
-        Rate and current are those of the last step before the sample
-
+    The integrator is a leapfrog of second order with steps of at most `step` [s]. Friction is an
+    impulse that can bring the shaft to an exact stop. Values have the order and units of UNITS,
+    shape (46,); the pendulum has `mass` [kg] and `length` [m]. `gain` is k_p g, duty per position
+    error [1/rad]; `supply` is in [V]. Of shape (n,) are the rising `time` of the samples [s], the
+    `goal` from each to the next [rad], `enabled`, 1 where the bridge drives, and `temperature`
+    [degC]. The first sample has `start` [rad] and `start_rate` [rad/s]. `out` becomes position
+    [rad], rate [rad/s], duty and current [A] at each sample, shape (n, 4); rate and current are
+    those of the last step before it.
     """
     servo = _servo(values)
     armature = servo.armature_inertia
@@ -295,23 +270,7 @@ def _tooth_torque(twist: float, rate: float, play: float, stiffness: float,
 @inner
 def _friction(torque: float, external: float, angle: float, rate: float, warming: float,
               stuck: float, servo: Servo) -> tuple[float, float]:
-    """
-    Return the friction level [N m] and the viscous coefficient [N m s/rad].
-
-    Parameters
-    ----------
-    torque, external
-        of the motor and of the load on it [N m]
-    angle, rate
-        of the motor [rad], [rad/s]
-    warming
-        temperature above REFERENCE_TEMPERATURE [K]
-    stuck
-        time for which the shaft has been at rest [s]
-    servo
-        the parameters
-
-    """
+    """Return the friction level [N m] and the viscous coefficient [N m s/rad]."""
     level = servo.coulomb_torque
     if servo.friction_asymmetry != 0.0:
         level *= 1.0 + (servo.friction_asymmetry if rate >= 0.0 else -servo.friction_asymmetry)

@@ -18,18 +18,10 @@ from simgap.verdict import verdict
 
 @dataclass(frozen=True)
 class Ranking:
-    """
-    Hypotheses by probability, 'unknown' left out.
+    """Hypotheses by probability, 'unknown' left out."""
 
-    Attributes
-    ----------
-    answers : the likeliest first
-    confusable : groups of effects that the data cannot tell apart
-
-    """
-
-    answers: Sequence[verdict.Answer]
-    confusable: Sequence[Sequence[str]]
+    answers: Sequence[verdict.Answer]       # the likeliest first
+    confusable: Sequence[Sequence[str]]     # groups that the data cannot tell apart
 
 
 def _untold(share: float, doing: str) -> None:

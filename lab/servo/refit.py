@@ -42,18 +42,10 @@ PARENTS: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Fit:
-    """
-    Fitted parameters.
+    """Fitted parameters."""
 
-    Attributes
-    ----------
-    values : by name
-    error : mean over the tests of the mean absolute position error [rad]
-
-    """
-
-    values: dict[str, float]
-    error: float
+    values: dict[str, float]    # by name
+    error: float                # mean over the tests of the mean absolute position error [rad]
 
 
 def error(tests: Sequence[ServoLog], values: Values) -> float:
@@ -87,21 +79,10 @@ def initial_values(names: Sequence[str], known: Values | None = None) -> dict[st
 def refit(tests: Sequence[ServoLog], names: Sequence[str], begins: Sequence[Values],
           runs: int, seed: int = 1) -> Fit:
     """
-    Fit parameters to tests.
+    Fit the parameters `names` to tests; all others are absent.
 
-    Parameters
-    ----------
-    tests
-        the logs
-    names
-        the fitted parameters; all others are absent
-    begins
-        known values to start from, besides the default ones
-    runs
-        largest number of simulations of all tests
-    seed
-        of the random candidates
-
+    Fits start from the default values and from `begins`; `runs` limits the simulations of all
+    tests.
     """
     starts = [(initial_values(names), WIDE),
               *((initial_values(names, known), NEAR) for known in begins)]

@@ -39,18 +39,10 @@ ITERATIONS = 5
 
 @dataclass(frozen=True)
 class FitEffort:
-    """
-    How long is searched.
+    """How long is searched."""
 
-    Attributes
-    ----------
-    runs : of all tests, for one global fit
-    near_runs : of all tests, for a fit from where a simpler model is
-
-    """
-
-    runs: int = 2400
-    near_runs: int = 500
+    runs: int = 2400        # of all tests, for one global fit
+    near_runs: int = 500    # of all tests, for a fit from where a simpler model is
 
 
 @dataclass(frozen=True)
@@ -63,36 +55,20 @@ class Fold:
 
 @dataclass(frozen=True)
 class Found:
-    """
-    What a model lacked.
+    """What a model lacked."""
 
-    Attributes
-    ----------
-    effects : what was added and stayed
-    names : the numbers of the model that is reached
-    fit : their values
-    rounds : for each round its ranking and what was added, as plain data
-
-    """
-
-    effects: tuple[str, ...]
-    names: tuple[str, ...]
-    fit: Fit
-    rounds: list[dict[str, Any]]
+    effects: tuple[str, ...]        # what was added and stayed
+    names: tuple[str, ...]          # the numbers of the model that is reached
+    fit: Fit                        # their values
+    rounds: list[dict[str, Any]]    # of each its ranking and what was added, as plain data
 
 
 def folds(tests: Sequence[ServoLog]) -> list[Fold]:
-    """
-    Return folds that withhold each test once, together with none of its gain or trajectory.
-
-    So every fold is fitted to all gains and all trajectories, where there are two or more of
-    each.
-    """
+    """Return folds that withhold each test once, with none of its gain or trajectory beside it."""
     gains = sorted({test.kp for test in tests})
     trajectories = sorted({test.trajectory for test in tests})
     count = max(len(gains), len(trajectories), 2)
-    turn = [(gains.index(test.kp) + trajectories.index(test.trajectory)) % count
-            for test in tests]
+    turn = [(gains.index(test.kp) + trajectories.index(test.trajectory)) % count for test in tests]
     parts = [Fold(tuple(t for t, k in zip(tests, turn, strict=True) if k != i),
                   tuple(t for t, k in zip(tests, turn, strict=True) if k == i))
              for i in range(count)]
@@ -104,17 +80,8 @@ def lacking(tests: Sequence[ServoLog], effort: FitEffort, without: Sequence[str]
     """
     Find what the model of a motor with Coulomb and viscous friction lacks.
 
-    Parameters
-    ----------
-    tests
-        of one servo, with two gains or trajectories at least
-    effort
-        how long is searched
-    without
-        effects that are not considered
-    progress
-        called with the share that is done, 0 to 1, and what is being done
-
+    Tests are of one servo, with two gains or trajectories at least. Effects in `without` are not
+    considered. `progress` gets the share that is done, 0 to 1, and what is being done.
     """
     parts = folds(tests)
     structure: Structure = ()
@@ -158,22 +125,12 @@ def lacking(tests: Sequence[ServoLog], effort: FitEffort, without: Sequence[str]
 
 @dataclass(frozen=True)
 class _Trial:
-    """
-    A model with a candidate's effects, judged on what folds withhold.
+    """A model with a candidate's effects, judged on what folds withhold."""
 
-    Attributes
-    ----------
-    structure : all its effects
-    values : of its numbers, where a fit may begin
-    judged : mean error on what was withheld [rad]
-    priced : the same with the price of what is new [rad]
-
-    """
-
-    structure: Structure
-    values: dict[str, float]
-    judged: float
-    priced: float
+    structure: Structure        # all its effects
+    values: dict[str, float]    # of its numbers, where a fit may begin
+    judged: float               # mean error on what was withheld [rad]
+    priced: float               # the same with the price of what is new [rad]
 
     @classmethod
     def of(cls, candidate: Hypothesis, structure: Structure, values: Mapping[str, float],
@@ -254,19 +211,9 @@ def _likeliest(ranked: Sequence[Hypothesis], singles: Sequence[Hypothesis]) -> l
 def settled(tests: Sequence[ServoLog], names: Sequence[str], start: Mapping[str, float],
             scale: Sequence[float]) -> Fit:
     """
-    Fit numbers by robust least squares from where they are.
+    Fit the numbers `names` by robust least squares from `start`.
 
-    Parameters
-    ----------
-    tests
-        that are fitted
-    names
-        what is fitted
-    start
-        values of all of them
-    scale
-        that residuals are measured by, in position, speed and duty
-
+    Residuals in position, speed and duty are measured by `scale`.
     """
     model = ServoMachine(tests, {name: start[name] for name in names}, names, noise=scale)
     problem = LeastSquares(model)

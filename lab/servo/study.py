@@ -38,18 +38,10 @@ SPLITS = {'gain': 'kp', 'trajectory': 'trajectory'}
 
 @dataclass(frozen=True)
 class Direction:
-    """
-    A choice of the tests that are fitted; the others are withheld.
+    """A choice of the tests that are fitted; the others are withheld."""
 
-    Attributes
-    ----------
-    split : 'gain' or 'trajectory'
-    fitted : the two gains or trajectories that are fitted
-
-    """
-
-    split: str
-    fitted: tuple[Any, ...]
+    split: str                  # 'gain' or 'trajectory'
+    fitted: tuple[Any, ...]     # the two gains or trajectories that are fitted
 
     def split_tests(self, tests: Sequence[ServoLog]) -> tuple[list[ServoLog], list[ServoLog]]:
         """Return the fitted and the withheld tests."""
@@ -63,10 +55,7 @@ def directions(tests: Sequence[ServoLog], splits: Iterable[str] = tuple(SPLITS),
     """
     Return every choice of two gains and of two trajectories that withholds some tests.
 
-    Raises
-    ------
-    UserError : there are fewer than three gains and fewer than three trajectories
-
+    Raise UserError where there are fewer than three gains and fewer than three trajectories.
     """
     found = []
     for split in splits:
@@ -81,21 +70,7 @@ def directions(tests: Sequence[ServoLog], splits: Iterable[str] = tuple(SPLITS),
 
 def compared(tests: Sequence[ServoLog], direction: Direction, effort: FitEffort,
              without: Sequence[str] = ()) -> dict[str, Any]:
-    """
-    Compare the models in one direction; return plain data.
-
-    Parameters
-    ----------
-    tests
-        all logs
-    direction
-        the choice of the fitted ones
-    effort
-        of each fit
-    without
-        effects to leave out of the diagnosis
-
-    """
+    """Compare the models in one direction; the diagnosis leaves out the effects in `without`."""
     began = time.monotonic()
     fitted, withheld = direction.split_tests(tests)
     found = lacking(fitted, effort, without)
@@ -116,8 +91,7 @@ def compared(tests: Sequence[ServoLog], direction: Direction, effort: FitEffort,
     }
 
 
-def _model(fit: Fit, fitted: Sequence[ServoLog], withheld: Sequence[ServoLog],
-           ) -> dict[str, Any]:
+def _model(fit: Fit, fitted: Sequence[ServoLog], withheld: Sequence[ServoLog]) -> dict[str, Any]:
     row = vector(fit.values)
     errors = {test.name: 1e3 * test.error(row) for test in withheld}
     return {'fitted_mrad': 1e3 * servo_refit.error(fitted, fit.values),
@@ -132,29 +106,10 @@ def study(tests: Sequence[ServoLog], chosen: Sequence[Direction], effort: FitEff
     """
     Compare in several directions and summarise; return plain data.
 
-    Parameters
-    ----------
-    tests
-        all logs
-    chosen
-        from `directions`
-    effort
-        of each fit
-    without
-        effects to leave out of the diagnosis
-    jobs
-        parallel processes
-    keep
-        folder for the result of each direction; results found there are used again
-    progress
-        called with the share that is done, 0 to 1, and a description
-    scheduler
-        address of a dask.distributed scheduler whose workers compare instead of `jobs` processes
-
-    Raises
-    ------
-    UserError : there is no effect of a name in `without`, or the scheduler has no workers
-
+    The diagnosis leaves out the effects in `without`. Results of directions that are found in the
+    folder `keep` are used again. `scheduler` is the address of a dask.distributed scheduler whose
+    workers compare instead of `jobs` processes. `progress` gets the share that is done, 0 to 1,
+    and a description. Raise UserError for an unknown effect or a scheduler without workers.
     """
     for name in without:
         if name not in catalogue():

@@ -49,26 +49,10 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
             duration: float, *, wild: bool = False, family: str = 'a', largest: float = 1.0,
             longest: float = LONGEST_S, machines: Sequence[str] = ()) -> dict[str, Any]:
     """
-    Draw and seal the truths of a trial, unless they are sealed already.
+    Draw and seal the truths of a trial, unless they are sealed already; return the manifest.
 
-    Parameters
-    ----------
-    folder
-        of the trial
-    count, seed, tolerance, sample_rate, duration, wild, family, largest, longest
-        as in `cases.draw_truths`
-    machines
-        other machines than the antenna, as in `others.cases.draw_truths`; of the entries above,
-        only `count` and `seed` are then used
-
-    Returns
-    -------
-    the manifest
-
-    Raises
-    ------
-    UserError : the folder holds a trial with other settings
-
+    Settings are those of `cases.draw_truths`; with `machines` other than the antenna only `count`
+    and `seed` are used. Raise UserError where the folder holds a trial with other settings.
     """
     settings: dict[str, Any] = {'cases': count, 'seed': seed}
     if machines:
@@ -76,8 +60,7 @@ def prepare(folder: Path, count: int, seed: int, tolerance: float, sample_rate: 
     elif wild:
         settings |= {'tolerance': tolerance, 'wild': True, 'family': family}
     else:
-        settings |= {'tolerance': tolerance, 'sample_rate_hz': sample_rate,
-                     'duration_s': duration}
+        settings |= {'tolerance': tolerance, 'sample_rate_hz': sample_rate, 'duration_s': duration}
     # a trial that was begun without these entries goes on
     if largest != 1.0:
         settings['largest'] = largest
@@ -111,17 +94,7 @@ def write_csv(path: Path, columns: Mapping[str, FloatArray],
 
 
 def make_case(folder: Path, truth: Truth) -> None:
-    """
-    Write the recordings of one case and their test sheets; of a wild case, keep one back.
-
-    Parameters
-    ----------
-    folder
-        of the trial
-    truth
-        of the case
-
-    """
+    """Write the recordings of one case and their test sheets; of a wild case, keep one back."""
     if len(truth.get('sheets', ())) > len(RECORDINGS):
         (folder / KEPT).mkdir(exist_ok=True)
         _make_folder(folder / KEPT / truth['case'], truth, {len(RECORDINGS): KEPT_BACK})
@@ -155,22 +128,10 @@ def make_cases(folder: Path, manifest: dict[str, Any], jobs: int,
                done: Done = lambda part, total: None, scheduler: str | None = None,
                skipped: Container[str] = ()) -> None:
     """
-    Make all cases that do not exist yet.
+    Make all cases that do not exist yet, except those in `skipped`, in `jobs` processes.
 
-    Parameters
-    ----------
-    folder, manifest
-        of the trial
-    jobs
-        number of processes
-    done
-        called with the number of complete cases and their total
-    scheduler
-        address of a dask.distributed scheduler whose workers make them; they see the folder
-        under the same path
-    skipped
-        names of cases that are not wanted
-
+    `done` gets the number of complete cases and their total. `scheduler` is the address of a
+    dask.distributed scheduler whose workers make them; they see the folder under the same path.
     """
     _remove_drafts(folder)
     names = [name for name in manifest['seals'] if name not in skipped]
@@ -222,21 +183,8 @@ def diagnose_case(case: Path, options: Sequence[str], limit: float,
     """
     Diagnose one case in a process of its own, which gets only the recordings.
 
-    Parameters
-    ----------
-    case
-        folder of the case
-    options
-        further options for the diagnosis
-    limit
-        time limit, after which the case counts as failed [s]
-    kept
-        recording that is kept from the diagnosis; it is predicted after the verdict
-
-    Returns
-    -------
-    True if there is a verdict; otherwise FAILURE holds the reason
-
+    After `limit` [s] the case counts as failed. The recording `kept` is predicted after the
+    verdict. Return whether there is a verdict; otherwise FAILURE holds the reason.
     """
     correction = [] if kept is None else ['--corrected', str(case / CORRECTED)]
     failure = diagnose_recordings(case, RECORDINGS, VERDICT, limit, [*correction, *options])
@@ -254,23 +202,8 @@ def diagnose_recordings(case: Path, recordings: Sequence[str], name: str, limit:
     """
     Diagnose some recordings of a case in a process of its own, unless that was done before.
 
-    Parameters
-    ----------
-    case
-        folder of the case
-    recordings
-        names of the recordings in it
-    name
-        of the verdict in it; it is there only if the diagnosis succeeds
-    limit
-        time limit [s]
-    options
-        further options for the diagnosis
-
-    Returns
-    -------
-    what the diagnosis said; empty if it was done before
-
+    The verdict `name` is there only if the diagnosis succeeds within `limit` [s]. Return what the
+    diagnosis said, '' if it was done before.
     """
     if (case / name).exists():
         return ''
@@ -292,19 +225,8 @@ def predict_kept(case: Path, options: Sequence[str], kept: Path) -> bool:
     """
     Predict the recording that was kept back, before and after, and name it in the verdict.
 
-    Parameters
-    ----------
-    case
-        folder of a case with its verdict and its corrected configuration
-    options
-        further options that the diagnosis was given
-    kept
-        the recording
-
-    Returns
-    -------
-    True if both predictions are there; otherwise PREDICTION_FAILURE holds the reason
-
+    The case has its verdict and its corrected configuration. Return whether both predictions are
+    there; otherwise PREDICTION_FAILURE holds the reason.
     """
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument('--config', action='append')
@@ -342,21 +264,8 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
     """
     Diagnose all cases that have no verdict yet, including those that failed before.
 
-    Where a recording was kept back, it is predicted then.
-
-    Parameters
-    ----------
-    folder, manifest, jobs, done, scheduler, skipped
-        as for `make_cases`
-    options
-        further options for the diagnosis
-    limit
-        time limit of one diagnosis, after which it counts as failed [s]
-
-    Returns
-    -------
-    number of cases that failed
-
+    Where a recording was kept back, it is predicted then. A diagnosis counts as failed after
+    `limit` [s]; for the rest see `make_cases`. Return the number of cases that failed.
     """
     names = [name for name in manifest['seals'] if name not in skipped]
     here = folder if scheduler is None else folder.absolute()
@@ -374,8 +283,7 @@ def diagnose_cases(folder: Path, manifest: dict[str, Any], jobs: int,
 
     def known(name: str) -> tuple[Path, Path | None, str | None]:
         diagnosed = (folder / name / VERDICT).exists()
-        return here / name, kept(name), (
-            None if diagnosed else machine_of(folder, name, manifest))
+        return here / name, kept(name), (None if diagnosed else machine_of(folder, name, manifest))
 
     complete(names, known, [Arm(lacks, partial(_diagnose_seen_case, here, options, limit))],
              jobs=jobs, scheduler=scheduler, threads=True, done=done)

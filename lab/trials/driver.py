@@ -21,19 +21,10 @@ Done = Callable[[int, int], None]
 
 
 class Arm(NamedTuple):
-    """
-    What is done with each case.
+    """What is done with each case; processes need a function of a module, or a partial of one."""
 
-    Attributes
-    ----------
-    lacks : whether a case lacks it, from the name of the case and its row so far
-    do : from what is known of a case to entries of its row; a function of a module, or a partial
-        of one, because processes may have to do it
-
-    """
-
-    lacks: Callable[[str, Row], bool]
-    do: Callable[[Any], Row]
+    lacks: Callable[[str, Row], bool]   # from the name of a case and its row so far
+    do: Callable[[Any], Row]            # from what is known of a case to entries of its row
 
 
 def complete(names: Sequence[str], known: Callable[[str], Any], arms: Sequence[Arm],
@@ -42,21 +33,9 @@ def complete(names: Sequence[str], known: Callable[[str], Any], arms: Sequence[A
     """
     Do what the cases lack, the arms of a case one after the other.
 
-    Parameters
-    ----------
-    names
-        of the cases
-    known
-        from the name of a case to what its arms get
-    arms
-        what is done with each
-    results
-        where the rows are kept; None: the arms keep what they find in the folder of the case
-    jobs, scheduler, threads
-        who does it, as for `workers`; one job without threads is done by this process
-    done
-        called with the number of complete cases and of all
-
+    `known` gives what the arms get from the name of a case. Rows are kept in `results`; without it
+    the arms keep what they find in the folder of the case. `jobs`, `scheduler` and `threads` are
+    as for `workers`; one job without threads is done here. `done` gets the complete cases and all.
     """
     rows: Mapping[str, Row] = {} if results is None else {name: results[name] for name in names}
     lacking = {name: [arm.do for arm in arms if arm.lacks(name, rows.get(name, {}))]
@@ -85,8 +64,7 @@ def _results(tasks: Sequence[tuple[Any, ...]], jobs: int, scheduler: str | None,
             yield from pool.each(_row, tasks)
 
 
-def _row(case: Any, arms: Sequence[Callable[[Any], Row]],
-         keep: Callable[..., None] | None) -> Row:
+def _row(case: Any, arms: Sequence[Callable[[Any], Row]], keep: Callable[..., None] | None) -> Row:
     """Return what these arms add to the row of a case."""
     row: dict[str, Any] = {}
     for do in arms:

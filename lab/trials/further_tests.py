@@ -35,17 +35,7 @@ def with_test(truth: Truth, sheet: Mapping[str, Any], place: int,
     """
     Return a truth with one test more, and the number of its recording.
 
-    Parameters
-    ----------
-    truth
-        of a case
-    sheet
-        of the test; the sensors are those of the case
-    place
-        from 0; a test in another place has another noise
-    duration_s
-        of the test [s]
-
+    The test has the given sheet but the case's sensors; its noise depends on `place`, from 0.
     """
     first = truth['sheets'][0]
     number = len(truth['sheets']) + place

@@ -42,19 +42,7 @@ def _columns(path: Path) -> dict[str, FloatArray]:
 
 
 def noise_power(column: str, truth: Mapping[str, Any], reading: FloatArray) -> float:
-    """
-    Return the mean square of what a recorder adds to a signal, as the truth states it.
-
-    Parameters
-    ----------
-    column
-        of the recording
-    truth
-        of the case
-    reading
-        as recorded, shape (n,)
-
-    """
+    """Return the mean square of what a recorder adds to a reading (n,), as the truth states."""
     grade = SensorGrade(**truth['sheets'][-1]['sensors'])
     if column == 'encoder_rad':
         return (2.0 * math.pi / 2**grade.encoder_bits)**2 / 12.0
@@ -70,27 +58,13 @@ def noise_power(column: str, truth: Mapping[str, Any], reading: FloatArray) -> f
     return (truth['imperfections']['noise'][column]['level']**2 + spike) * power + digit**2 / 12.0
 
 
-def closed_fraction(recording: Path, before: Path, after: Path,
-                    truth: Mapping[str, Any]) -> float:
+def closed_fraction(recording: Path, before: Path, after: Path, truth: Mapping[str, Any]) -> float:
     """
-    Return the fraction of the gap that a correction closes, from -1 to 1.
+    Return the fraction of the gap that a correction closes, from -1 to 1; NaN if there is no gap.
 
     The mean over the signals with a gap of (E_before - E_after) / (E_before - E_noise), where E is
-    a mean square; each is bounded to -1 to 1. NaN if no signal has a gap.
-
-    Parameters
-    ----------
-    recording
-        that was kept back
-    before, after
-        predictions of it; between their rows they are straight lines
-    truth
-        of the case
-
-    Raises
-    ------
-    PredictionError : a prediction cannot be read, lacks a signal or ends before the recording
-
+    a mean square; each is bounded to -1 to 1. Between their rows predictions are straight lines.
+    Raise PredictionError where one cannot be read, lacks a signal or ends before the recording.
     """
     recorded, predicted = _columns(recording), [_columns(path) for path in (before, after)]
     time, fractions = recorded['time_s'], []

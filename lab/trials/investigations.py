@@ -46,26 +46,10 @@ def run_trial(folder: Path, manifest: dict[str, Any], jobs: int, limit: float,
               options: Sequence[str] = (),
               done: Done = lambda part, total: None) -> dict[str, Any]:
     """
-    Investigate each case in both ways, and return what that took.
+    Investigate each of the sealed wild cases in both ways, and return what that took (`summary`).
 
-    Parameters
-    ----------
-    folder, manifest
-        of sealed wild cases, see `batch.prepare`
-    jobs
-        cases at a time
-    limit
-        time limit of each diagnosis of the standard programme; an investigation has as much for
-        each of its steps [s]
-    options
-        further options for these diagnoses
-    done
-        called with the number of complete cases and of all
-
-    Returns
-    -------
-    as `summary`
-
+    `limit` [s] holds for each diagnosis of the standard programme, with further `options`, and for
+    each step of an investigation. `done` gets the number of complete cases and of all.
     """
     results = TrialResults(folder, manifest)
     complete(list(manifest['seals']), partial(sealing.open_truth, folder, manifest=manifest),
@@ -135,13 +119,7 @@ def until_sure(answers: Sequence[Mapping[str, Any]], alike: int = 1) -> tuple[fl
     """
     Return how many tests there were until an answer was sure, inf for never, and if it was right.
 
-    Parameters
-    ----------
-    answers
-        first ones, after each test
-    alike
-        how many of them in a row must be the same, the sure one included
-
+    Answers are the first ones after each test; the sure one is the last of `alike` equal ones.
     """
     for number, answer in enumerate(answers, 1):
         last = answers[max(number - alike, 0):number]

@@ -32,43 +32,23 @@ def run_trial(folder: Path, wanted: int, jobs: int, limit: float, options: Seque
               done: Done = lambda part, total: None,
               scored: Path | None = None) -> dict[str, Any]:
     """
-    Diagnose the first cases of a trial again without their true effects.
+    Diagnose the first `wanted` cases of a trial again without their true effects.
 
-    Parameters
-    ----------
-    folder
-        of the trial, diagnosed at least in part, or drawn again
-    wanted
-        number of cases; fewer if there are no more
-    jobs
-        diagnoses at a time
-    limit
-        time limit of each diagnosis [s]
-    options
-        further options for each diagnosis, as in the trial
-    done
-        called with the number of cases that are complete, and their total
-    scored
-        file of `lab score --cases` with the first answers; None: those in the folder
+    The trial is diagnosed at least in part, or drawn again; first answers are those in its folder
+    or in `scored`, a file of `lab score --cases`. Each diagnosis may take `limit` [s]. `done` gets
+    the number of complete cases, and their total.
 
-    Returns
-    -------
-    `cases`, one entry each with `case`, `effect`, `unknown_before`, `unknown_after`, and
-    `named` with its `probability`, the first answer without the effect; `failures`;
-    `median_rise` and `mean_rise` of the probability of 'unknown'; `recognised` with `ci95`, the
-    share of cases in which it rises by RISE or more; `named_wrongly` with its interval, the share
-    in which something else is named above OVERCONFIDENT
+    Return `cases`, one entry each with `case`, `effect`, `unknown_before`, `unknown_after`, and
+    `named` with its `probability`, the first answer without the effect; `failures`; `median_rise`
+    and `mean_rise` of the probability of 'unknown'; `recognised` with `ci95`, the share of cases
+    in which it rises by RISE or more; `named_wrongly` with its interval, the share in which
+    something else is named above OVERCONFIDENT.
 
-    Raises
-    ------
-    UserError : no case of the trial has a single effect that was named first; a file of other
-        cases
-    SealError : a truth is missing or was changed
-
+    Raise UserError where no case has a single effect that was named first, or the file is of other
+    cases; SealError where a truth is missing or was changed.
     """
     answered = read_cases(folder)[0] if scored is None else read_scored_of(scored, folder)
-    cases = [case for case in answered
-             if case.truth['kind'] == 'single' and case.right][:wanted]
+    cases = [case for case in answered if case.truth['kind'] == 'single' and case.right][:wanted]
     if not cases:
         raise UserError(f'{folder}: no case with a single effect that was named first; '
                         'lab trial --diagnose makes a trial')

@@ -42,23 +42,13 @@ SIZES = (1.0 / 3.0, 1.0)
 
 def draw_truths(count: int, seed: int, tolerance: float, healthy_s: float = 0.0) -> list[Truth]:
     """
-    Draw the cases of a trial of the twin.
+    Draw the cases of a trial of the twin; an effect is switched on in each unless `healthy_s`.
 
-    Parameters
-    ----------
-    count
-        number of cases
-    seed
-        of all random draws
-    tolerance
-        largest relative deviation of any parameter from the reference, unit 1
-    healthy_s
-        length of tests in which nothing happens; 0: an effect is switched on in each [s]
-
+    `tolerance` is the largest relative deviation of any parameter from the reference. `healthy_s`
+    is the length of tests in which nothing happens [s].
     """
     effects = round_robin(list(CATALOGUE.values()), np.random.default_rng([seed, 0]))
-    return [_truth(number, seed, tolerance, healthy_s, effects)
-            for number in range(1, count + 1)]
+    return [_truth(number, seed, tolerance, healthy_s, effects) for number in range(1, count + 1)]
 
 
 def _truth(number: int, seed: int, tolerance: float, healthy_s: float,
@@ -83,21 +73,9 @@ def _truth(number: int, seed: int, tolerance: float, healthy_s: float,
 
 def make_recording(truth: Truth) -> dict[str, FloatArray]:
     """
-    Simulate the test of a case.
+    Return the columns of a case's recording by name, each of shape (n,).
 
-    Parameters
-    ----------
-    truth
-        from `draw_truths`
-
-    Returns
-    -------
-    columns of the recording by name, each of shape (n,)
-
-    Raises
-    ------
-    SimulationError : the antenna of this case cannot be integrated
-
+    Raise SimulationError where the antenna of this case cannot be integrated.
     """
     random = np.random.default_rng([*truth['seed'], 2])
     sheet, rate = sheet_of(truth, 0), truth['sample_rate_hz']
@@ -127,18 +105,8 @@ def shows_by(truth: Truth, columns: Mapping[str, FloatArray], within_s: float) -
     """
     Return how far an effect changes the readings, as half a chi-square of the sheet's noise.
 
-    An effect may not show in a test at all: a circuit that is at its limit throughout has no
-    speed.
-
-    Parameters
-    ----------
-    truth
-        of the case
-    columns
-        from `make_recording`
-    within_s
-        time after the onset that counts [s]
-
+    The first `within_s` [s] after the onset count. An effect may not show in a test at all: a
+    circuit that is at its limit throughout has no speed.
     """
     healthy = make_recording({**truth, 'effects': []})
     grade = sheet_of(truth, 0).sensors
@@ -156,24 +124,10 @@ def shows_by(truth: Truth, columns: Mapping[str, FloatArray], within_s: float) -
 def simulate_changes(stretches: Sequence[tuple[Records, float]], sheet: CaseSheet,
                      times: FloatArray, place: tuple[float, float] = (0.0, 0.0)) -> TrueSignals:
     """
-    Simulate one test from rest, with one machine after the other.
+    Simulate one test from rest, with one machine after the other, as `simulate` does.
 
-    Parameters
-    ----------
-    stretches
-        each machine, and the time at which its part ends [s]; the last part goes on to the last
-        of `times`
-    sheet
-        the test
-    times
-        of the signals, ascending, from 0 on, shape (n,) [s]
-    place
-        position of each motor in its gap at the start, -1 to 1
-
-    Raises
-    ------
-    SimulationError : the integration failed
-
+    Stretches have each machine and the time at which its part ends [s]; the last goes on to the
+    end. Raise SimulationError where the integration failed.
     """
     y = start_state(stretches[0][0], sheet, place)
     mode = np.zeros(equations.SWITCHES, np.int64)

@@ -16,17 +16,7 @@ INK, GRID = '#1a3a5f', '#d0d4da'
 
 
 def draw_scorecard(figures: dict[str, Any], path: Path) -> None:
-    """
-    Draw a scorecard to a file; the suffix selects the format.
-
-    Parameters
-    ----------
-    figures
-        from `scorecard.score`
-    path
-        of the picture
-
-    """
+    """Draw the figures of `scorecard.score` to a file; the suffix selects the format."""
     table = figures['confusion']
     rows = sorted(table)
     named = {answer for row in table.values() for answer in row}
@@ -77,8 +67,7 @@ def _reliability(axes: Any, figures: dict[str, Any]) -> None:
                       xytext=(0, 5), textcoords='offset points', ha='center')
     axes.set(xlim=(0, 1), ylim=(0, 1.08), xlabel='stated probability of the first answer',
              ylabel='share that is right')
-    axes.set_title(f'Reliability, calibration error {figures["ece"]:.3f}', fontsize=10,
-                   loc='left')
+    axes.set_title(f'Reliability, calibration error {figures["ece"]:.3f}', fontsize=10, loc='left')
     axes.legend(loc='upper left', frameon=False)
 
 
@@ -87,8 +76,7 @@ def _sizes(axes: Any, by_size: dict[str, dict[str, Any]]) -> None:
     for shift, name, colour in ((-0.2, 'top1', INK), (0.2, 'top3', '#9dbbd9')):
         values = [group[name] for group in by_size.values()]
         axes.bar(places + shift, np.nan_to_num(values), width=0.38, color=colour, label=name)
-    axes.set_xticks(places, [f'{size}\n{group["cases"]} cases'
-                             for size, group in by_size.items()])
+    axes.set_xticks(places, [f'{size}\n{group["cases"]} cases' for size, group in by_size.items()])
     axes.set(ylim=(0, 1.15), ylabel='share of single effects')
     axes.set_title('Hits by size of the effect', fontsize=10, loc='left')
     axes.legend(loc='upper right', ncols=2, frameon=False)

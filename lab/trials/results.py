@@ -25,15 +25,7 @@ class TrialResults:
     """
     The results of a trial, kept in its folder.
 
-    Parameters
-    ----------
-    folder, manifest
-        of the trial
-
-    Raises
-    ------
-    UserError : a line of the file is no result of this trial; the message names file and line
-
+    Raise UserError, with file and line, where a line is not a result of this trial.
     """
 
     def __init__(self, folder: Path, manifest: Mapping[str, Any]) -> None:
@@ -73,11 +65,7 @@ class TrialResults:
         return (name for name in self._names if name in self._found)
 
     def put(self, name: str, **known: Any) -> None:
-        """
-        Add to what is known of a case, and write the file whole; threads may do so at once.
-
-        An entry that is a dict is added to what is there under its key.
-        """
+        """Add to what is known of a case (dicts by entry); write the file whole, thread-safely."""
         with self._lock:
             row = self._found.setdefault(name, {})
             row |= {key: {**row.get(key, {}), **value} if isinstance(value, dict) else value

@@ -35,20 +35,11 @@ HEALTHY_AT_SITE = 0.9       # share of the machines for which the figures of a s
 
 @dataclass(frozen=True)
 class Case:
-    """
-    A truth with its verdict.
-
-    Attributes
-    ----------
-    truth : of the case
-    verdict : None if the diagnosis failed
-    closed : fraction of the gap that is closed on the recording kept back; nan if not predicted
-
-    """
+    """A truth with its verdict."""
 
     truth: Truth
-    verdict: Verdict | None
-    closed: float = math.nan
+    verdict: Verdict | None     # None if the diagnosis failed
+    closed: float = math.nan    # fraction of the gap on the recording kept back; or nan
 
     @property
     def kind(self) -> str:
@@ -126,21 +117,9 @@ class Case:
 
 def read_cases(folder: Path) -> tuple[list[Case], list[Truth]]:
     """
-    Read truths and verdicts of a trial, checking every seal.
+    Return the diagnosed cases of a trial and the truths of the others, checking every seal.
 
-    Parameters
-    ----------
-    folder
-        of the trial
-
-    Returns
-    -------
-    the diagnosed cases, and the truths of those that are not diagnosed yet
-
-    Raises
-    ------
-    SealError : a truth is missing or was changed
-
+    Raise SealError where a truth is missing or was changed.
     """
     manifest = sealing.read_manifest(folder)
     cases: list[Case] = []
@@ -222,11 +201,7 @@ def reliability(confidences: Sequence[float], right: Sequence[bool]) -> list[Bin
 
 
 def site(cases: Sequence[Case]) -> dict[str, float]:
-    """
-    Return the figures for a site where HEALTHY_AT_SITE of the machines are healthy.
-
-    Cases without effect and all others are weighted to that share. nan if either are missing.
-    """
+    """Return the figures for a site where HEALTHY_AT_SITE are healthy; nan without both kinds."""
     healthy = [case for case in cases if case.kind == 'none']
     faulty = [case for case in cases if case.kind != 'none']
     groups = [(group, weight / len(group)) for group, weight in (
@@ -300,21 +275,7 @@ def confusion(cases: Sequence[Case]) -> dict[str, dict[str, int]]:
 
 
 def score(cases: Sequence[Case], pending: int = 0) -> dict[str, Any]:
-    """
-    Compute the scorecard.
-
-    Parameters
-    ----------
-    cases
-        with their verdicts
-    pending
-        number of cases not yet diagnosed
-
-    Returns
-    -------
-    figures by name, nan where there are no cases; lab/notebook/trial.md defines them
-
-    """
+    """Return the figures of lab/notebook/trial.md by name, nan where there are no cases."""
     by_kind = {kind: [case for case in cases if case.kind == kind]
                for kind in (SCORED_SINGLE, SCORED_PAIR, 'none', 'outside')}
     singles, pairs = by_kind[SCORED_SINGLE], by_kind[SCORED_PAIR]

@@ -41,14 +41,7 @@ def case_lines(cases: Iterable[Case]) -> Iterator[str]:
 
 
 def read_scored(path: Path) -> list[Case]:
-    """
-    Read the cases of a file that `case_lines` filled.
-
-    Raises
-    ------
-    UserError : the file cannot be read, or a line is no case; the message names file and line
-
-    """
+    """Read a file of `case_lines`; UserError where it or a line of it cannot be read."""
     cases = []
     try:
         with path.open(encoding='utf-8') as stream:
@@ -68,11 +61,8 @@ def read_scored_of(path: Path, folder: Path) -> list[Case]:
     """
     Read the cases of a file, and check that they are cases of a trial.
 
-    Raises
-    ------
-    UserError : the file cannot be read, or holds a case that is not in the trial
-    SealError : a truth of the trial is missing or was changed
-
+    Raise UserError where the file cannot be read or has another case, SealError where a truth of
+    the trial is missing or was changed.
     """
     manifest = sealing.read_manifest(folder)
     here = {name: identity(sealing.open_truth(folder, name, manifest))

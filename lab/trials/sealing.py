@@ -7,8 +7,7 @@ Sealed truths: written before any recording, with salted hashes that anyone can 
     DIR/truth/case_0001.json     the truth with its salt
     DIR/case_0001/               the input of a diagnosis
 
-The salt prevents guessing a truth from its hash. Anyone who has the truth file can check that it
-is the sealed one.
+The salt prevents guessing a truth from its hash. Whoever has the truth file can check it.
 """
 
 from __future__ import annotations
@@ -54,23 +53,7 @@ def write_whole(path: Path, text: str) -> None:
 
 
 def seal(folder: Path, settings: dict[str, Any], truths: Iterable[Truth]) -> dict[str, Any]:
-    """
-    Write all truths and then the manifest with their hashes.
-
-    Parameters
-    ----------
-    folder
-        of the trial; created if missing
-    settings
-        of the draw; written to the manifest
-    truths
-        of all cases
-
-    Returns
-    -------
-    the manifest
-
-    """
+    """Write all truths, then the manifest with settings and hashes; return the manifest."""
     (folder / TRUTHS).mkdir(parents=True, exist_ok=True)
     seals = {}
     for truth in truths:
@@ -89,14 +72,7 @@ def manifest_seal(manifest: dict[str, Any]) -> str:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """
-    Read the manifest of a trial.
-
-    Raises
-    ------
-    SealError : there is no manifest, or the file is not one
-
-    """
+    """Read the manifest of a trial; SealError where there is none, or the file is not one."""
     path = folder / MANIFEST
     manifest = _read(path, 'make a trial first: lab trial --out DIR')
     if manifest.get('format') != FORMAT or not isinstance(manifest.get('seals'), dict) or (
@@ -109,14 +85,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 
 def open_truth(folder: Path, case: str, manifest: dict[str, Any]) -> Truth:
-    """
-    Read the truth of one case and check its seal.
-
-    Raises
-    ------
-    SealError : the file is missing, unreadable or changed since
-
-    """
+    """Read the truth of a case; SealError where it is missing, unreadable or changed since."""
     path = folder / TRUTHS / f'{case}.json'
     truth = _read(path, 'restore it from where the trial was made')
     if seal_of(truth) != manifest['seals'].get(case) or truth.get('case') != case:

@@ -59,15 +59,7 @@ def size_of(effect: str, values: Parameters, machine: str | None = None) -> Size
     """
     Return how a verdict states the size of an effect; None if it is not comparable.
 
-    Parameters
-    ----------
-    effect
-        id
-    values
-        its quantities in the truth
-    machine
-        one of others.machines.MACHINES; None for the antenna
-
+    Values are its quantities in the truth; `machine` is one of MACHINES, None for the antenna.
     """
     if machine is None:
         row = _TABLE.get(effect) or _TABLE.get(effect.split('.', 1)[1])
@@ -84,22 +76,11 @@ def size_of(effect: str, values: Parameters, machine: str | None = None) -> Size
 
 
 def stated_sizes(truth: Mapping[str, Any], verdict: Verdict) -> list[StatedSize]:
-    """
-    Return the sizes of the true effects that the first entry of a verdict names and states.
-
-    Parameters
-    ----------
-    truth
-        of the case
-    verdict
-        of the case
-
-    """
+    """Return the sizes of the true effects that the first entry of a verdict names and states."""
     first, found = verdict.which[0], []
     for entry in truth['effects']:
         key = entry['id']
-        if key not in first.effects or (
-                truth.get('family') == 'b' and key.split('.')[1] in LAWS):
+        if key not in first.effects or (truth.get('family') == 'b' and key.split('.')[1] in LAWS):
             continue
         size = size_of(key, entry['parameters'], truth.get('machine'))
         stated = first.parameters.get(f'{key}.{size.parameter}') if size else None

@@ -52,29 +52,11 @@ def run_trial(folder: Path, manifest: dict[str, Any], wanted: int, jobs: int, li
               options: Sequence[str] = (), rules: Sequence[str] = RULES,
               done: Done = lambda part, total: None) -> dict[str, Any]:
     """
-    Find open cases, give each its third tests, and return what they told.
+    Find `wanted` open cases, give each its third tests by `rules`, and return what they told.
 
-    Parameters
-    ----------
-    folder, manifest
-        of sealed wild cases, see `batch.prepare`
-    wanted
-        number of open cases; fewer if there are no more
-    jobs
-        cases at a time
-    limit
-        time limit of each diagnosis and each proposal [s]
-    options
-        further options for each diagnosis
-    rules
-        some of RULES
-    done
-        called with the number of open cases that are complete, and of those wanted
-
-    Returns
-    -------
-    as `summary`
-
+    The folder has sealed wild cases; the result is that of `summary`. Each diagnosis, with further
+    `options`, and each proposal may take `limit` [s]. `done` gets the numbers of complete and
+    wanted open cases.
     """
     names, results = list(manifest['seals']), TrialResults(folder, manifest)
     found: list[str] = []

@@ -43,27 +43,14 @@ class VerdictLine:
 
 @dataclass(frozen=True)
 class Verdict:
-    """
-    The answer of a diagnosis.
+    """The answer of a diagnosis."""
 
-    Attributes
-    ----------
-    verdict : one of VERDICTS
-    which : sorted, the most probable first
-    confusable : groups of ids that the data cannot separate
-    explained_fraction : nan if not given
-    seconds : nan if not given
-    held_back : names of the predictions 'before' and 'after' of the recording that was kept
-        back; empty if not given
-
-    """
-
-    verdict: str
-    which: tuple[VerdictLine, ...]
-    confusable: tuple[frozenset[str], ...]
-    explained_fraction: float
-    seconds: float
-    held_back: Mapping[str, str] = field(default_factory=dict, compare=False)
+    verdict: str  # one of VERDICTS
+    which: tuple[VerdictLine, ...]  # sorted, the most probable first
+    confusable: tuple[frozenset[str], ...]  # ids that the data cannot separate
+    explained_fraction: float  # nan if not given
+    seconds: float  # nan if not given
+    held_back: Mapping[str, str] = field(default_factory=dict, compare=False)  # before and after
 
     def confusable_with(self, effect: str) -> frozenset[str]:
         """
@@ -78,8 +65,7 @@ class Verdict:
 
     def means(self, named: frozenset[str], true: frozenset[str]) -> bool:
         """Return whether an entry names the true effects or ones confusable with them."""
-        return len(named) == len(true) and any(True for _ in self._matchings(
-            sorted(named), true))
+        return len(named) == len(true) and any(True for _ in self._matchings(sorted(named), true))
 
     def _matchings(self, named: list[str], true: frozenset[str]) -> Iterator[None]:
         if not named:
@@ -100,14 +86,7 @@ class Verdict:
 
 
 def read_verdict(path: Path) -> Verdict:
-    """
-    Read and check a verdict.
-
-    Raises
-    ------
-    VerdictError : it is missing, not JSON, or not a verdict; the message says why
-
-    """
+    """Read and check a verdict; VerdictError where it is missing, not JSON or not a verdict."""
     try:
         content = json.loads(path.read_text(encoding='utf-8'))
     except (OSError, ValueError, RecursionError) as error:
@@ -119,14 +98,7 @@ def read_verdict(path: Path) -> Verdict:
 
 
 def parse_verdict(content: Any) -> Verdict:
-    """
-    Check the content of a verdict.
-
-    Raises
-    ------
-    VerdictError : it is not a verdict; the message names the key
-
-    """
+    """Check the content of a verdict; VerdictError, which names the key, where it is wrong."""
     if not isinstance(content, dict):
         raise VerdictError('not a JSON object')
     if content.get('verdict') not in VERDICTS:

@@ -1,8 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The models that diagnose the joint and the axis, as their users would write them.
+The models that diagnose the joint and the axis, as users write them by docs/own-machine.md.
 
-They are data of the trial: each diagnosis is given the path of one. docs/own-machine.md teaches
-how to write them.
+They are data of the trial: each diagnosis is given the path of one.
 """

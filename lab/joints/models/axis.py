@@ -84,8 +84,7 @@ def tidy(log: Log) -> Log:
     """Return a log with even rows, and the angle of the screw."""
     log = without_gaps(log, ('reference_m',), settles_s=0.5)
     angle = 2.0 * math.pi / LEAD * log['position_m']
-    return Log(log.name, log.time, {**log.columns, 'screw_rad': angle}, log.constants,
-               log.labels)
+    return Log(log.name, log.time, {**log.columns, 'screw_rad': angle}, log.constants, log.labels)
 
 
 machine = own_machine(
