@@ -20,7 +20,11 @@ INSTALLED, ENGINE, LABORATORY = 46_000, 14_000, 14_000
 FILE, FUNCTION, README, PAGE, DECISION_WORDS = 400, 60, 200, 300, 80
 
 LONG_FILES: dict[str, int] = {}
-LONG_FUNCTIONS: dict[str, int] = {}
+LONG_FUNCTIONS: dict[str, int] = {
+    # compiled loops, whose parts share their state
+    'lab/servo/physics.py:swing': 82,
+    'lab/antenna/integrator.py:integrate': 67,
+}
 
 
 def sources(house: str) -> list[Path]:
