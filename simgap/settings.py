@@ -3,10 +3,10 @@
 """
 Every threshold of the diagnosis: its unit, what it decides, and the trial that set it.
 
-`Settings()` is what a diagnosis uses unless it is given another record. `lab thresholds`
-prints the table and says what halving and doubling a threshold does to the score of a trial.
-Trials are listed in lab/notebook/history.md. 'Practice cases' are those before the first sealed
-trial; 'design' means that the value was chosen without any.
+`Settings()` is what a diagnosis uses unless it is given another record. `lab thresholds` prints
+the table and says what halving and doubling a threshold does to the score of a trial. Trials are
+listed in lab/notebook/history.md. 'Practice cases' are those before the first sealed trial;
+'design' means that the value was chosen without any.
 """
 
 from __future__ import annotations
@@ -376,10 +376,7 @@ class Settings:
         """
         Return the settings with one threshold changed.
 
-        Raises
-        ------
-        KeyError : there is no threshold of that name
-
+        Raises KeyError if there is no threshold of that name.
         """
         if name not in {known for known, _, _ in self.entries()}:
             raise KeyError(name)

@@ -19,13 +19,8 @@ class BoxQuadratic:
     """
     A quadratic programme within bounds, for one gradient or several.
 
-    Parameters
-    ----------
-    hessian
-        symmetric and positive semidefinite, shape (m, m)
-    low, high
-        bounds of the step, low <= 0 <= high, shape (m,)
-
+    hessian : symmetric and positive semidefinite, shape (m, m)
+    low, high : bounds of the step, low <= 0 <= high, shape (m,)
     """
 
     def __init__(self, hessian: FloatArray, low: FloatArray, high: FloatArray) -> None:

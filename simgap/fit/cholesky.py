@@ -19,12 +19,8 @@ def factored(matrix: FloatArray, ridge: float = 0.0) -> FloatArray:
     A Hessian that was summed in single precision need not be positive definite. Along a direction
     that is flat within its rounding nothing is known, and a ridge of that size goes nowhere there.
     `ridge` is added to the diagonal in any case; more is added as long as the matrix is not
-    positive definite.
-
-    Raises
-    ------
-    ValueError : the matrix has NaN or infinity, which no ridge would mend
-
+    positive definite. Raises ValueError if the matrix has NaN or infinity, which no ridge would
+    mend.
     """
     np.asarray_chkfinite(matrix)
     while True:

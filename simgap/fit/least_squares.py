@@ -31,18 +31,11 @@ class LeastSquares:
     """
     The residuals of a machine in its experiments.
 
-    Parameters
-    ----------
-    machine
-        what is fitted
-    used
-        for each experiment the samples that are fitted, shape (n,) of bool; None for all
-    scale
-        factor of the expected noise; while the model lacks something strong, the misfit counts
+    machine : what is fitted
+    used : for each experiment the samples that are fitted, shape (n,) of bool; None for all
+    scale : factor of the expected noise; while the model lacks something strong, the misfit counts
         as noise, so that the nuisances are not bent to imitate it
-    settings
-        thresholds
-
+    settings : thresholds
     """
 
     def __init__(self, machine: Machine, used: Sequence[NDArray[np.bool_]] | None = None,

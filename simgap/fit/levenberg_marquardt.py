@@ -30,13 +30,10 @@ class LevenbergMarquardt:
     """
     The solver of a least-squares problem.
 
-    Attributes
-    ----------
     residuals : returns those at a point, shape (n,)
     weights : returns those of residuals, shape (n,)
     cost : returns the sum of the losses and of the priors, given residuals, values and precisions
     settings : thresholds
-
     """
 
     residuals: Callable[[dict[str, float]], FloatArray]

@@ -38,9 +38,9 @@ def led(problem: LeastSquares, state: FitState, options: SearchSettings) -> FitS
     Return a fit that was led out of a local minimum, or the given one if that gains nothing.
 
     Where motors stick and slip, the cost of a test has many minima, and a slow test holds the fit
-    to all of them in one. The cost of a test that moves smoothly leads to its optimum. So the
-    test that fits best is fitted alone, and all of them from there. If another one then fits
-    best, it leads in its turn.
+    to all of them in one. The cost of a test that moves smoothly leads to its optimum. So the test
+    that fits best is fitted alone, and all of them from there. If another one then fits best, it
+    leads in its turn.
     """
     def fitted(part: LeastSquares, point: Point, target: float = math.inf) -> FitState:
         begun = part.start(state.parameters, with_initial_conditions(part, dict(point)))

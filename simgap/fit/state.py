@@ -18,12 +18,10 @@ class FitState:
     """
     Where a fit is.
 
-    Attributes
-    ----------
     parameters : what is fitted, m of them
     x : their values, shape (m,)
-    residual : measured minus predicted, in standard deviations, shape (n,); zero where nothing
-        was measured
+    residual : measured minus predicted, in standard deviations, shape (n,); zero where nothing was
+        measured
     base_jacobian : derivative of the prediction [standard deviations per unit] as last taken,
         shape (n, m); in single precision, because it is large and gives a direction only
     weight : weight of each residual in iteratively reweighted least squares, shape (n,)
@@ -31,7 +29,6 @@ class FitState:
     broyden_errors, broyden_directions : the rank-one updates of the Jacobian since then, shapes
         (n,) and (m,) each
     kept_hessian : the Hessian of a state that has dropped its Jacobian
-
     """
 
     parameters: tuple[Parameter, ...]

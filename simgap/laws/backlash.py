@@ -12,13 +12,8 @@ def dead_zone(twist: float, half_gap: float) -> float:
     """
     Return how far the teeth are pressed into each other, Eq. (1) with k = 1.
 
-    Parameters
-    ----------
-    twist
-        angle between the two gears, at the shaft of the stiffness [rad]
-    half_gap
-        b, the gap reaches from -b to b [rad]
-
+    twist : angle between the two gears, at the shaft of the stiffness [rad]
+    half_gap : b, the gap reaches from -b to b [rad]
     """
     if twist > half_gap:
         return twist - half_gap
@@ -51,23 +46,13 @@ def contact_torque(
     """
     Return the torque of the touching flanks, Eq. (1) with a contact damping beside the spring.
 
-    Parameters
-    ----------
-    side
-        the flank that pushes, from `contact_side`
-    twist, twist_rate
-        angle and rate between the two gears [rad], [rad/s]
-    half_gap
-        b [rad]
-    stiffness
-        k [N m/rad]
-    damping
-        torque per rate of approach while in contact [N m s/rad]; not in the article
+    side : the flank that pushes, from `contact_side`
+    twist, twist_rate : angle and rate between the two gears [rad], [rad/s]
+    half_gap : b [rad]
+    stiffness : k [N m/rad]
+    damping : torque per rate of approach while in contact [N m s/rad]; not in the article
 
-    Returns
-    -------
-    torque on the driven gear [N m]; a flank that pushes has the sign of its side
-
+    Returns torque on the driven gear [N m]; a flank that pushes has the sign of its side.
     """
     if side > 0:
         return stiffness * (twist - half_gap) + damping * twist_rate

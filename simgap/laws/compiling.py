@@ -3,9 +3,9 @@
 """
 How functions are compiled: once for this machine, kept on disk until any of their sources changes.
 
-numba's own disk cache looks only at the file of the function that it keeps, and so a stale
-kernel would survive a correction of a block in another file. The cache folder is therefore
-named after a digest of every source that compiled code is made from.
+numba's own disk cache looks only at the file of the function that it keeps, and so a stale kernel
+would survive a correction of a block in another file. The cache folder is therefore named after a
+digest of every source that compiled code is made from.
 
 A function is compiled, and numba itself is loaded, when the function is first called. A program
 that only asks which signals there are, to read a recording say, does not wait for a compiler.
@@ -91,11 +91,8 @@ class Keeping:
     """
     How a package keeps what it compiles.
 
-    Attributes
-    ----------
     owner : name of its folder in the user's cache
     sources : folders whose sources its functions are compiled with, beside the laws
-
     """
 
     owner: str
@@ -123,21 +120,12 @@ def generated(keeping: Keeping, name: str, text: str, names: Mapping[str, Any]) 
     """
     Compile functions that a program has written, and keep text and results on disk.
 
-    Parameters
-    ----------
-    keeping
-        of the package whose program it is
-    name
-        of the file
-    text
-        functions with the decorators of this module
-    names
-        what the text refers to
+    keeping : of the package whose program it is
+    name : of the file
+    text : functions with the decorators of this module
+    names : what the text refers to
 
-    Returns
-    -------
-    the module that the text defines
-
+    Returns the module that the text defines.
     """
     digest = _digest(keeping.sources, text)
     module = ModuleType(f'{keeping.owner}.generated.{name}_{digest}')

@@ -41,10 +41,7 @@ def nanoseconds(seconds: ArrayLike) -> Any:
     """
     Return seconds as whole nanoseconds, rounded to the nearest.
 
-    Raises
-    ------
-    RecordingError : not finite, or beyond the 292 years that 64 bits hold
-
+    Raises RecordingError if not finite, or beyond the 292 years that 64 bits hold.
     """
     scaled = np.asarray(seconds, dtype=np.float64)
     # whole seconds and the rest apart: one product would lose bits of long stamps
@@ -70,17 +67,12 @@ class Channel:
     """
     The samples of one signal.
 
-    Attributes
-    ----------
     unit : SI unit; '' if unknown
     time_ns : array of shape (n,), int64 [ns]; strictly increasing, spacing as uneven as it was
     values : array of shape (n,), float64 [unit]; finite: where there is no sample there is none
 
-    Raises
-    ------
-    RecordingError : the shapes differ, a time stamp is not later than the one before, or a
-        value is not finite
-
+    Raises RecordingError if the shapes differ, a time stamp is not later than the one before, or a
+    value is not finite.
     """
 
     unit: str
@@ -141,21 +133,11 @@ class Channel:
         """
         Return the values at other times; see METHODS for what each method does.
 
-        Parameters
-        ----------
-        time_ns
-            array of shape (m,), int64 [ns]; inside the span of the samples
-        method
-            one of METHODS
+        time_ns : array of shape (m,), int64 [ns]; inside the span of the samples
+        method : one of METHODS
 
-        Returns
-        -------
-        array of shape (m,) [unit]
-
-        Raises
-        ------
-        RecordingError : no such method, or a time outside the span: nothing is extrapolated
-
+        Returns array of shape (m,) [unit]. Raises RecordingError if no such method, or a time
+        outside the span: nothing is extrapolated.
         """
         if method not in METHODS:
             raise RecordingError(f'no method {method!r}: choose one of {", ".join(METHODS)}')
@@ -181,10 +163,7 @@ def check_name(name: str) -> None:
     """
     Check that a name can be a ROS 2 topic: words, perhaps with slashes between them.
 
-    Raises
-    ------
-    RecordingError : it cannot
-
+    Raises RecordingError if it cannot.
     """
     parts = name.split('/') if isinstance(name, str) else []
     if not parts or not all(part.isascii() and part.isidentifier() for part in parts):
@@ -196,10 +175,7 @@ def make_channel(name: str, unit: str, time_ns: ArrayLike, values: ArrayLike) ->
     """
     Make a channel, and name the signal when its samples are refused.
 
-    Raises
-    ------
-    RecordingError : see Channel; the message begins with `name`
-
+    Raises RecordingError if see Channel; the message begins with `name`.
     """
     try:
         return Channel(unit, time_ns, values)  # type: ignore[arg-type]

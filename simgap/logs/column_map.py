@@ -60,14 +60,11 @@ class TimeMap:
     """
     How the time is written.
 
-    Attributes
-    ----------
     column : name of the column, or its place, counted from 0
     unit : one of TIME_UNITS, or iso8601 (without a zone it is taken for UTC)
     offset_ns : added to every time stamp [ns]
     from_first : count from the first time stamp of the file
     duplicates : which row counts where a time stamp is repeated: refuse, first or last
-
     """
 
     column: str | int
@@ -82,8 +79,6 @@ class SignalMap:
     """
     How one signal is written: SI value = factor * (sign * scale * number + offset).
 
-    Attributes
-    ----------
     number : the columns, and the number that they give
     unit : SI unit of the signal
     factor : SI units in the unit of the column
@@ -92,7 +87,6 @@ class SignalMap:
     time_column : column of this signal's own time stamps; None for the common one
     clock_offset_ns : added to this signal's time stamps [ns]
     sign_bit : value of the bit that is the sign of a sign-magnitude register; 0 for none
-
     """
 
     number: Expression
@@ -120,12 +114,9 @@ class KnownSignals:
     """
     Signals that a program knows already, before it reads a map.
 
-    Attributes
-    ----------
     owner : who has them, for messages
     units : their SI units by name
     aliases : other names by which a map may call them
-
     """
 
     owner: str = ''
@@ -140,18 +131,11 @@ def load_map(path: str | Path, known: KnownSignals = NO_SIGNALS) -> ImportMap:
     """
     Read a map.
 
-    Parameters
-    ----------
-    path
-        of the map
-    known
-        signals whose units need not be stated
+    path : of the map
+    known : signals whose units need not be stated
 
-    Raises
-    ------
-    ParameterError : the file cannot be read or an entry is not allowed; one line names the file,
-        the key and what is allowed
-
+    Raises ParameterError if the file cannot be read or an entry is not allowed; one line names the
+    file, the key and what is allowed.
     """
     path = Path(path)
     tree = read_yaml(path)
@@ -165,10 +149,8 @@ def parse_map(tree: object, known: KnownSignals = NO_SIGNALS) -> ImportMap:
     """
     Check the plain data of a map; parameters as in `load_map`.
 
-    Raises
-    ------
-    ParameterError : an entry is missing, unknown or not allowed; the message names the key
-
+    Raises ParameterError if an entry is missing, unknown or not allowed; the message names the
+    key.
     """
     top = mapping_of('the map', tree, _TOP)
     texts = {key: _text(key, top[key]) for key in _TEXT_ENTRIES if key in top}

@@ -51,11 +51,8 @@ class Reference:
     """
     A column of a file.
 
-    Attributes
-    ----------
     column : its name, or its place, counted from 0
     index : which number of a vector in a cell, counted from 0; None for a cell with one number
-
     """
 
     column: str | int
@@ -72,12 +69,9 @@ class Expression:
     """
     A number as a function of columns.
 
-    Attributes
-    ----------
     references : the columns, each of them once
     value : returns the number from those of the columns, in this order; ArithmeticError or
         ValueError where it has none, such as 1 / 0
-
     """
 
     references: tuple[Reference, ...]
@@ -93,17 +87,10 @@ def parse_expression(key: str, text: str) -> Expression:
     """
     Read an expression.
 
-    Parameters
-    ----------
-    key
-        of the entry, for errors
-    text
-        such as '0.1 * current - 0.02 * sign(rate)'
+    key : of the entry, for errors
+    text : such as '0.1 * current - 0.02 * sign(rate)'
 
-    Raises
-    ------
-    ParameterError : it is none, or holds what is not allowed; the message names the key
-
+    Raises ParameterError if it is none, or holds what is not allowed; the message names the key.
     """
     if len(text) > LONGEST:
         raise ParameterError(f'{key}: {len(text)} characters given, allowed are {LONGEST}')

@@ -28,19 +28,11 @@ def without_gaps(log: Log, commands: Sequence[str], settles_s: float = 0.0) -> L
     are NaN there. Commands are interpolated. Where a command jumped or turned in a gap, nobody
     knows when: readings are left out from the gap on until the machine has settled.
 
-    Parameters
-    ----------
-    log
-        as recorded
-    commands
-        columns that are known between the rows, too, such as a reference
-    settles_s
-        for which readings are left out after an unknown command [s]
+    log : as recorded
+    commands : columns that are known between the rows, too, such as a reference
+    settles_s : for which readings are left out after an unknown command [s]
 
-    Raises
-    ------
-    LogError : there is no such column
-
+    Raises LogError if there is no such column.
     """
     steps = np.diff(log.time)
     counts = np.maximum(np.round(steps / np.median(steps)).astype(int), 1)

@@ -36,14 +36,11 @@ class Log:
     """
     What was recorded in one test.
 
-    Attributes
-    ----------
     name : for people
     time : of the samples, rising, shape (n,) [s]
     columns : shape (n,) each, as recorded; NaN where there is no sample
     constants : what the tester knows of this test, such as a mass
     labels : what was different in this test, such as load: A
-
     """
 
     name: str
@@ -57,10 +54,7 @@ class Log:
         """
         Make the samples arrays of numbers.
 
-        Raises
-        ------
-        LogError : the time does not rise, or a column has another number of samples
-
+        Raises LogError if the time does not rise, or a column has another number of samples.
         """
         time = np.array(self.time, float)
         if time.ndim != 1 or time.size < _LEAST_SAMPLES or not np.all(np.diff(time) > 0.0):
@@ -78,10 +72,7 @@ class Log:
         """
         Return a column, shape (n,); where it has no sample, the last one before holds.
 
-        Raises
-        ------
-        LogError : there is no such column
-
+        Raises LogError if there is no such column.
         """
         try:
             return self._held[column]
@@ -95,11 +86,8 @@ class OneTest:
     """
     What a simulation gets of a test.
 
-    Attributes
-    ----------
     log : the test's log, perhaps only its beginning
     push : what enters at each place of the model, shape (n,); zero unless something does
-
     """
 
     log: Log
@@ -140,18 +128,12 @@ def read_log(path: str | Path, import_map: ImportMap | None = None) -> Log:
     """
     Read a log, and NAME.yaml beside it if it is there: constants and labels of the test.
 
-    Parameters
-    ----------
-    path
-        a file of any kind that `recording.tables` knows; without a map its columns keep their
+    path : a file of any kind that `recording.tables` knows; without a map its columns keep their
         names, and time_s, time or t is the time
-    import_map
-        which column is which, and how it is written
+    import_map : which column is which, and how it is written
 
-    Raises
-    ------
-    LogError, RecordingError : a cell, a row or a column cannot be read; one line says where
-
+    Raises LogError, RecordingError if a cell, a row or a column cannot be read; one line says
+    where.
     """
     path = Path(path)
     time, columns = _mapped(path, import_map) if import_map else _plain(path)
@@ -166,10 +148,8 @@ def read_logs(paths: Sequence[str | Path], map_path: str | Path | None = None) -
     """
     Read several files with one map.
 
-    Raises
-    ------
-    LogError, RecordingError, ParameterError : as `read_log` and `load_map`; two files of one name
-
+    Raises LogError, RecordingError, ParameterError if as `read_log` and `load_map`; two files of
+    one name.
     """
     import_map = load_map(map_path) if map_path else None
     logs = [read_log(path, import_map) for path in paths]

@@ -38,22 +38,11 @@ def read_mat(path: Path) -> dict[str, Any]:
     """
     Return the variables of a file that are plain real numbers.
 
-    Parameters
-    ----------
-    path
-        a .mat file, version 4 to 7
+    path : a .mat file, version 4 to 7
 
-    Returns
-    -------
-    names with arrays, shape as in MATLAB: at least two axes
-
-    Raises
-    ------
-    RecordingError
-        if it is of version 7.3, or has more numbers than `antenna_drive.limits` allows
-    ValueError, or another error of scipy's
-        if it is damaged
-
+    Returns names with arrays, shape as in MATLAB: at least two axes. Raises RecordingError if if
+    it is of version 7.3, or has more numbers than `antenna_drive.limits` allows. Raises
+    ValueError, or another error of scipy's if if it is damaged.
     """
     from scipy.io import loadmat, whosmat
     from scipy.io.matlab import matfile_version, MatReadError

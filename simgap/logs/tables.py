@@ -42,14 +42,11 @@ class Layout:
     """
     How text is laid out; other kinds of files need no such help.
 
-    Attributes
-    ----------
     delimiter, decimal : between cells, and in numbers
     comment : rows that begin with it are left out; '' for none
     encoding : of the text
     skip_lines : lines before the header
     header : False if the columns have no names
-
     """
 
     delimiter: str = ','
@@ -65,15 +62,12 @@ class Table:
     """
     An open file.
 
-    Attributes
-    ----------
     names : of the columns; empty texts where they have none
     rows : the rows, each with the number of its line
     start : where the names stand, for errors
     counted : what the number of a row counts
     lengths : of columns that need not be equally long, by name
     is_text : whether a cell that is no number is a mistake, and no column of another kind
-
     """
 
     names: Sequence[str]
@@ -89,10 +83,8 @@ def open_table(path: Path, layout: Layout = Layout()) -> Iterator[Table]:
     """
     Open a file of any kind, told by its suffix; what is no array, JSON or Parquet is text.
 
-    Raises
-    ------
-    RecordingError : it cannot be opened, is not what its suffix says, or is larger than allowed
-
+    Raises RecordingError if it cannot be opened, is not what its suffix says, or is larger than
+    allowed.
     """
     reader = _READERS.get(path.suffix.lower())
     if reader is None:

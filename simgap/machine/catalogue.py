@@ -16,11 +16,7 @@ class Catalogue(dict[str, Effect]):
     """
     Effects by id.
 
-    Parameters
-    ----------
-    effects
-        in the order in which they are tried
-
+    effects : in the order in which they are tried
     """
 
     def __init__(self, effects: Iterable[Effect] = ()) -> None:
@@ -31,12 +27,7 @@ class Catalogue(dict[str, Effect]):
         Return the catalogue without some effects.
 
         It also lacks their parts, what they are parts of, and what becomes one of them at an end
-        of its range.
-
-        Raises
-        ------
-        KeyError : there is no effect of a name
-
+        of its range. Raises KeyError if there is no effect of a name.
         """
         gone = {name for effect in effects for name in (effect, *self[effect].parts)}
         kept = copy(self)
@@ -64,10 +55,7 @@ class Catalogue(dict[str, Effect]):
         """
         Return the form of an effect by its name.
 
-        Raises
-        ------
-        KeyError : the effect has no such form
-
+        Raises KeyError if the effect has no such form.
         """
         for form in effect.forms:
             if form.name == name:

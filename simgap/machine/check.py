@@ -24,10 +24,7 @@ def check_machine(machine: Machine) -> None:
     """
     Check what a machine declares, and what it predicts without any effect.
 
-    Raises
-    ------
-    MachineError : something is missing or wrong
-
+    Raises MachineError if something is missing or wrong.
     """
     if not machine.experiments:
         raise MachineError('experiments: there is none')

@@ -17,13 +17,10 @@ class DiagramBlock:
     """
     A part of the machine.
 
-    Attributes
-    ----------
     component : as the effects of the catalogue name it
     label : for people
     x, y : its upper left corner
     width : of the block
-
     """
 
     component: str
@@ -38,13 +35,10 @@ class Diagram:
     """
     Blocks and the lines between them.
 
-    Attributes
-    ----------
     blocks : in the order in which they are drawn
     lines : x and y of their two ends
     height : of a block
     several : components that are no block but several, with the components of those blocks
-
     """
 
     height: ClassVar[int] = 26

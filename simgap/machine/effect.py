@@ -22,8 +22,6 @@ class Parameter:
     """
     A number in which the machine may differ from its model; zero is the model as configured.
 
-    Attributes
-    ----------
     name : unique in its machine
     unit : of the value
     low, high : hard bounds, with zero between them
@@ -36,7 +34,6 @@ class Parameter:
     label : key and value of the label of the tests that it acts on; None for all
     least_step : least step of a difference quotient, for a prediction that is a staircase in the
         value, such as a delay in samples; 0 for none
-
     """
 
     name: str
@@ -58,14 +55,11 @@ class Form:
     """
     One mathematical form of an effect.
 
-    Attributes
-    ----------
     name : for people
     parameters : those that are no shape parameters are zero where the effect is absent
     scanned : True if the form was chosen by a scan of many, such as the orders of a ripple
     is_course : True for a course over time that is free at every moment, such as a gust
     is_wave : True if its two sizes are the sine and the cosine part of a wave
-
     """
 
     name: str
@@ -121,8 +115,6 @@ class Effect:
     """
     Something that the model may lack.
 
-    Attributes
-    ----------
     id : 'component.effect'
     component : the part of the machine that it sits in
     cause : its physical cause, one sentence
@@ -130,7 +122,6 @@ class Effect:
     forms : alternatives; the best one counts
     parts : ids of the effects that act together in it, each in its own place
     simpler : ids of the effects that it becomes at an end of its range
-
     """
 
     id: str  # noqa: A003: the word of the verdict's format

@@ -16,12 +16,9 @@ class Colour:
     """
     The colour of noise: a filter whose output is white, see `noise`.
 
-    Attributes
-    ----------
     pole : of the slow part, for one sample; 0 if there is none
     gain : share of an innovation that stays in the slow part
     level : standard deviation of the innovations, in units of the stated noise
-
     """
 
     pole: float = 0.0
@@ -34,8 +31,6 @@ class Experiment:
     """
     What was measured in one test.
 
-    Attributes
-    ----------
     name : for people
     time : shape (n,) [s]
     channels : names of the c signals
@@ -47,7 +42,6 @@ class Experiment:
         (c,), in the signals' units; None for a usual share of the motion
     colours : of the noise, one for each signal, as a diagnosis finds it; empty for white noise
     labels : what was different in this test, such as load: A; see `interventions`
-
     """
 
     name: str

@@ -33,11 +33,8 @@ class DisturbanceInput:
     """
     A place where an unknown input may act on the machine.
 
-    Attributes
-    ----------
     name : unique in its machine, for people
     component : the part of the machine that it acts on
-
     """
 
     name: str
@@ -48,17 +45,10 @@ class Machine(ABC):
     """
     A machine that can be simulated, and the experiments that were made with it.
 
-    Parameters
-    ----------
-    experiments
-        what was measured
-    nuisances
-        numbers that are known only within a tolerance; they are fitted beside any effect
-    effects
-        the catalogue of what the model may lack
+    experiments : what was measured
+    nuisances : numbers that are known only within a tolerance; they are fitted beside any effect
+    effects : the catalogue of what the model may lack
 
-    Attributes
-    ----------
     experiments, nuisances, catalogue : as given; the effects by id
     disturbance_inputs : where an unknown input may act; readings need not be listed
     notes : what the machine inferred or missed, for people
@@ -66,7 +56,6 @@ class Machine(ABC):
     advice : tests that settle what is open: names of effects without their component (empty for
         any), and what to record
     planning : what the design of a further test must know of the tests, as plain data
-
     """
 
     experiments: Sequence[Experiment]
@@ -91,18 +80,12 @@ class Machine(ABC):
         """
         Return the readings of one experiment, had the machine these parameter values.
 
-        Parameters
-        ----------
-        point
-            parameter values by name; a parameter that is not named is zero, a shape parameter
+        point : parameter values by name; a parameter that is not named is zero, a shape parameter
             that is not named has no effect
-        experiment
-            its index
+        experiment : its index
 
-        Returns
-        -------
-        array of shape (n, c), as `Experiment.measured`; NaN or infinite where the run diverged
-
+        Returns array of shape (n, c), as `Experiment.measured`; NaN or infinite where the run
+        diverged.
         """
 
     # -- what it may override for speed --------------------------------------------------------
@@ -112,19 +95,12 @@ class Machine(ABC):
         """
         Return the readings of several variants.
 
-        Parameters
-        ----------
-        points
-            parameter values by name, one mapping for each variant
-        only
-            for each variant the index of the one experiment that is wanted, None for all
-        until
-            end of the simulation after an experiment's first sample [s]; later readings are NaN
+        points : parameter values by name, one mapping for each variant
+        only : for each variant the index of the one experiment that is wanted, None for all
+        until : end of the simulation after an experiment's first sample [s]; later readings are
+            NaN
 
-        Returns
-        -------
-        for each variant and experiment an array of shape (n, c), or None where not wanted
-
+        Returns for each variant and experiment an array of shape (n, c), or None where not wanted.
         """
         results: list[list[FloatArray | None]] = []
         for point, one in zip(points, only or [None] * len(points), strict=True):
@@ -183,19 +159,11 @@ class Machine(ABC):
         """
         Return the readings with an unknown input.
 
-        Parameters
-        ----------
-        point
-            parameter values by name
-        place
-            where it acts, one of `disturbance_inputs`
-        course
-            the input over time, in a unit that moves the machine a little
+        point : parameter values by name
+        place : where it acts, one of `disturbance_inputs`
+        course : the input over time, in a unit that moves the machine a little
 
-        Returns
-        -------
-        for each experiment an array of shape (n, c)
-
+        Returns for each experiment an array of shape (n, c).
         """
         raise NotImplementedError(f'{type(self).__name__} names disturbance_inputs '
                                   'and lacks simulate_disturbed')

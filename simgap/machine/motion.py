@@ -32,14 +32,11 @@ class TimeScales:
     """
     How fast the machine is, which the search and the localisation need to know.
 
-    Attributes
-    ----------
     start_s : time within which the effect of the initial conditions shows [s]
     scan_s : length of the part of a test that a scan of parameter values looks at [s]
     pulse_s : rise time of the pulses of an unknown input [s]
     response_s : time after which the response to such a pulse has ended [s]
     block_s : time beyond which residuals are independent, for the bootstrap [s]
-
     """
 
     start_s: float
@@ -61,13 +58,10 @@ class Motion:
     """
     How a machine moves in an experiment, as far as it is known.
 
-    Attributes
-    ----------
     time : shape (n,) [s]
     rate, load, angle : shape (n,), in any unit; None for an unknown one
     load_limit : load at which the drive saturates
     reversal_s : time after a reversal that still belongs to it [s]
-
     """
 
     time: FloatArray

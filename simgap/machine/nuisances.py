@@ -14,16 +14,11 @@ class Nuisances(list[Parameter]):
     """
     The nuisances of a machine, and how they share numbers with its effects.
 
-    Parameters
-    ----------
-    numbers
-        the nuisances
-    initial_conditions
-        of some experiments by index, values that are tried out before a fit. Gradients do not
-        lead from one side of a gap to the other. Groups are tried one after the other, each from
-        the best of those before it: conditions that hardly depend on each other need not be
-        tried in all combinations
-
+    numbers : the nuisances
+    initial_conditions : of some experiments by index, values that are tried out before a fit.
+        Gradients do not lead from one side of a gap to the other. Groups are tried one after the
+        other, each from the best of those before it: conditions that hardly depend on each other
+        need not be tried in all combinations
     """
 
     def __init__(self, numbers: Iterable[Parameter] = (),

@@ -22,13 +22,8 @@ class OwnTests(TestSpace):
     """
     The tests that a model of one's own declares.
 
-    Parameters
-    ----------
-    model
-        with its `tests` and `limits`
-    duration_s
-        of a test [s]
-
+    model : with its `tests` and `limits`
+    duration_s : of a test [s]
     """
 
     def __init__(self, model: Model, duration_s: float) -> None:
@@ -87,14 +82,7 @@ class OwnTests(TestSpace):
 
 
 def own_tests(model: Model, duration_s: float) -> OwnTests:
-    """
-    Return the tests that a model declares.
-
-    Raises
-    ------
-    ModelError : it declares none
-
-    """
+    """Return the tests that a model declares. Raises ModelError if it declares none."""
     if not model.tests:
         raise ModelError('tests: the model does not say what a test may be; give machine(..., '
                          'tests={kind: f(duration_s, random) -> Log})')

@@ -32,11 +32,8 @@ class Checked:
     """
     What a check found.
 
-    Attributes
-    ----------
     faults : what has to be mended, a line each
     remarks : what should be known, a line each
-
     """
 
     faults: Sequence[str]

@@ -35,8 +35,6 @@ class Number:
     """
     A number of the simulation.
 
-    Attributes
-    ----------
     value : as configured
     low, high : bounds; equal to the value for a known number
     unit : of the value
@@ -44,7 +42,6 @@ class Number:
     sigma : standard deviation about the value; 0 if nothing is known but the bounds
     is_shape : True for a number of an effect that means nothing while the effect is absent
     tolerance : size up to which an effect's number is usual and not worth a name
-
     """
 
     value: float
@@ -72,8 +69,6 @@ class Reading:
     """
     A reading of a sensor, which the simulation predicts.
 
-    Attributes
-    ----------
     unit : of the reading
     noise : standard deviation of the sensor's white noise; at least that of its digit
     model_error : slow error that a right model may have; None for 0.3 percent of the motion
@@ -81,7 +76,6 @@ class Reading:
     column : of the logs; empty for the reading's own name
     zero : how far the sensor's zero may be off, in each test
     gain : share by which its scale may be off
-
     """
 
     unit: str
@@ -103,13 +97,10 @@ class Push:
     """
     A place where something unknown may enter, such as a force on a carriage.
 
-    Attributes
-    ----------
     component : part of the machine
     label : for people
     unit : of what enters
     size : what moves the machine a little, well above the noise and far from any limit
-
     """
 
     component: str
@@ -131,15 +122,12 @@ class Ripple:
     """
     A wave by an angle, whose order is given or found.
 
-    Attributes
-    ----------
     stem : its numbers are stem_cosine, stem_sine and stem_order, and of harmonic k stem_cosine_k
         and stem_sine_k
     amplitude : bounds of each amplitude
     angle : that it follows
     orders : cycles per revolution that are tried; empty to find them
     harmonics : how many the wave has, its fundamental counted
-
     """
 
     stem: str
@@ -165,15 +153,12 @@ class OwnEffect:
     """
     Something that the model may lack.
 
-    Attributes
-    ----------
     name : 'component.effect'
     cause : its physical cause, one sentence
     look : what it looks like in the readings, one sentence
     forms : alternatives; the best one counts
     ripple : set in the place of forms for a wave by an angle
     simpler : name of the effect that it becomes at an end of its range; empty if there is none
-
     """
 
     name: str
@@ -194,8 +179,6 @@ class Model:
     """
     A simulation, and what may differ from it; with the logs of its tests it becomes a machine.
 
-    Attributes
-    ----------
     simulate : f(numbers, test) -> {reading: shape (n,)}. `numbers.name` is a number; `test.time`
         [s] and `test['column']` are arrays of shape (n,), `test.push['name']` is what enters
         there. A test may be shorter than its log, because a search looks at its beginning first
@@ -216,10 +199,7 @@ class Model:
         and without readings, drawn with `random`, a numpy Generator
     limits : greatest size that a reading may have in such a test, by reading
 
-    Raises
-    ------
-    ModelError : a name is there twice, or an entry is not what it should be
-
+    Raises ModelError if a name is there twice, or an entry is not what it should be.
     """
 
     simulate: Simulation

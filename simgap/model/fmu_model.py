@@ -42,17 +42,10 @@ class FmuModel:
     """
     A simulation with an FMU; see `Simulator`.
 
-    Parameters
-    ----------
-    path
-        of the .fmu file
-    ports
-        names of its variables
+    path : of the .fmu file
+    ports : names of its variables
 
-    Raises
-    ------
-    ModelError : the file cannot be read or instantiated, or has no such variable
-
+    Raises ModelError if the file cannot be read or instantiated, or has no such variable.
     """
 
     parallel = False

@@ -22,16 +22,11 @@ def load_model(place: str) -> Model:
     """
     Return the model of a Python file or of a model file.
 
-    Parameters
-    ----------
-    place
-        'FILE.py:NAME', 'FILE.py' if the name is 'machine', or 'FILE.yaml' (see `model_file`)
+    place : 'FILE.py:NAME', 'FILE.py' if the name is 'machine', or 'FILE.yaml' (see `model_file`)
 
-    Raises
-    ------
-    ModelError : there is no such file or name, or the file fails; the message says at which line
-    ModuleNotFoundError : a model file needs mujoco or fmpy, which is not installed
-
+    Raises ModelError if there is no such file or name, or the file fails; the message says at
+    which line. Raises ModuleNotFoundError if a model file needs mujoco or fmpy, which is not
+    installed.
     """
     if place.endswith(_MODEL_FILES):
         return load_model_file(Path(place))

@@ -30,17 +30,10 @@ class OwnMachine(Machine):
     """
     A model of one's own in the tests that were logged.
 
-    Parameters
-    ----------
-    model
-        see `declaration.machine`
-    logs
-        the tests
+    model : see `declaration.machine`
+    logs : the tests
 
-    Raises
-    ------
-    LogError : a log lacks a reading
-
+    Raises LogError if a log lacks a reading.
     """
 
     def __init__(self, model: Model, logs: Sequence[Log]) -> None:
@@ -134,17 +127,10 @@ class OwnMachine(Machine):
         """
         Return the readings of one test in which something pushes, as `predict` does.
 
-        Parameters
-        ----------
-        point
-            parameter values by name
-        experiment
-            its index
-        push
-            what enters at some of the model's places, for each sample of the log
-        until
-            end of the simulation after the first sample [s]; later readings are NaN
-
+        point : parameter values by name
+        experiment : its index
+        push : what enters at some of the model's places, for each sample of the log
+        until : end of the simulation after the first sample [s]; later readings are NaN
         """
         log = self.logs[experiment]
         part = beginning(log, until) if math.isfinite(until) else log
@@ -167,10 +153,7 @@ class OwnMachine(Machine):
         """
         Return what the model's simulation says, checked, shape (n,) for each reading.
 
-        Raises
-        ------
-        ModelError : it failed, or gave something else than its readings
-
+        Raises ModelError if it failed, or gave something else than its readings.
         """
         try:
             if self._lock is None:

@@ -45,14 +45,11 @@ class _Action:
     """
     What a number does to a place or an input.
 
-    Attributes
-    ----------
     key : the entry that says it
     number : its name
     act : one of _ACTS
     target : place or input
     factor : of the number
-
     """
 
     key: str
@@ -66,11 +63,8 @@ def load_model_file(path: Path) -> Model:
     """
     Return the model that a YAML file describes.
 
-    Raises
-    ------
-    ModelError : the file or the model that it names cannot be used; one line names file and entry
-    ModuleNotFoundError : mujoco or fmpy is not installed
-
+    Raises ModelError if the file or the model that it names cannot be used; one line names file
+    and entry. Raises ModuleNotFoundError if mujoco or fmpy is not installed.
     """
     try:
         return _model(path, mapping_of('', read_yaml(path), _TOP))

@@ -52,17 +52,10 @@ class MujocoModel:
     """
     A simulation with MuJoCo; see `Simulator`.
 
-    Parameters
-    ----------
-    path
-        of the MJCF file
-    ports
-        places as above; inputs are actuators, pushes joints, outputs sensors with one value
+    path : of the MJCF file
+    ports : places as above; inputs are actuators, pushes joints, outputs sensors with one value
 
-    Raises
-    ------
-    ModelError : the file cannot be read, or has no such place, actuator, joint or sensor
-
+    Raises ModelError if the file cannot be read, or has no such place, actuator, joint or sensor.
     """
 
     parallel = True
@@ -156,10 +149,7 @@ class _Worker:
         """
         Return the cell of the model or its data that a place names, shape (1,), to be written.
 
-        Raises
-        ------
-        ModelError : there is no such place
-
+        Raises ModelError if there is no such place.
         """
         parts = _PLACE.fullmatch(place)
         if parts is None or (parts['name'] is None) != (parts['kind'] == 'option'):

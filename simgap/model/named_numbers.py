@@ -14,10 +14,7 @@ class Numbers(Mapping[str, float]):
     """
     Numbers of a simulation as attributes; it remembers which were asked for.
 
-    Attributes
-    ----------
     asked_for : names that the simulation has read
-
     """
 
     def __init__(self, values: Mapping[str, float]) -> None:
@@ -26,14 +23,7 @@ class Numbers(Mapping[str, float]):
         self.asked_for: set[str] = set()
 
     def __getattr__(self, name: str) -> float:
-        """
-        Return a number.
-
-        Raises
-        ------
-        ModelError : no entry of the model declares it
-
-        """
+        """Return a number. Raises ModelError if no entry of the model declares it."""
         if name.startswith('__'):
             raise AttributeError(name)
         return self[name]

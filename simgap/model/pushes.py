@@ -39,12 +39,9 @@ class PushedSpan:
     """
     A span of time in which something pushes.
 
-    Attributes
-    ----------
     test : its name
     from_s, until_s : begin and end [s]
     size : mean of the push in it, in the unit of its place
-
     """
 
     test: str
@@ -58,15 +55,9 @@ def pushes(problem: LeastSquares, point: Mapping[str, float],
     """
     Return the spans in which something pushes at a place.
 
-    Parameters
-    ----------
-    problem
-        the machine in its tests
-    point
-        its numbers as fitted without any effect
-    place
-        one of the machine's
-
+    problem : the machine in its tests
+    point : its numbers as fitted without any effect
+    place : one of the machine's
     """
     machine = problem.machine
     assert isinstance(machine, OwnMachine)
@@ -91,11 +82,7 @@ def level_edges(time: FloatArray, course: FloatArray) -> FloatArray:
     least (B. Jackson et al., An algorithm for optimal partitioning of data on an interval, IEEE
     Signal Processing Letters 12, 2005).
 
-    Parameters
-    ----------
-    time, course
-        shape (m,) [s], any unit
-
+    time, course : shape (m,) [s], any unit
     """
     if time.size < _LEAST_NODES:
         return time[[0, -1]]

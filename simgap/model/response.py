@@ -21,11 +21,8 @@ class StepResponse:
     """
     How readings answer to a step of a number, in standard deviations.
 
-    Attributes
-    ----------
     acts : False if nothing changes
     roughness : how much the difference quotient changes when its step is doubled, as a share
-
     """
 
     acts: bool

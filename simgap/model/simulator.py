@@ -16,13 +16,10 @@ class Ports:
     """
     Names in a simulation program, each with the entry of the model file that gives it.
 
-    Attributes
-    ----------
     places : parameters and initial states that are written before a run
     inputs : what the log feeds in
     pushes : where something unknown may enter
     outputs : what is read
-
     """
 
     places: Mapping[str, str]
@@ -35,12 +32,9 @@ class Simulator(Protocol):
     """
     A simulation program with the ports that a model file names.
 
-    Attributes
-    ----------
     defaults : of the places, as the program's own file has them, NaN where it has none
     longest_step_s : of a run
     parallel : True if several threads may call `run` at once
-
     """
 
     defaults: FloatArray
@@ -52,20 +46,11 @@ class Simulator(Protocol):
         """
         Simulate from the start, with each input held during a step.
 
-        Parameters
-        ----------
-        values
-            of the places, in their order; NaN leaves a place as it is
-        start_s
-            time of the first row
-        step_s
-            time from row to row
-        inputs
-            inputs, then pushes, shape (n, inputs + pushes)
+        values : of the places, in their order; NaN leaves a place as it is
+        start_s : time of the first row
+        step_s : time from row to row
+        inputs : inputs, then pushes, shape (n, inputs + pushes)
 
-        Returns
-        -------
-        the outputs at the beginning of each step, shape (n, outputs); NaN from a
-        failure on
-
+        Returns the outputs at the beginning of each step, shape (n, outputs); NaN from a failure
+        on.
         """

@@ -30,13 +30,10 @@ class Unseen:
     """
     How far a reading of an unseen log is from its predictions, as rms in the reading's unit.
 
-    Attributes
-    ----------
     configured : of the model as configured
     before : of the model fitted to the logs of the diagnosis by least squares, without any effect
     after : the same with the effects of the best answer
     unit : of the reading
-
     """
 
     configured: float
@@ -53,15 +50,9 @@ def unseen(diagnosis: Diagnosis, log: Log,
     Nothing is fitted to the log: a number that each test has of its own is the mean of those of
     the diagnosed tests. An effect that has a size by label has that of the log's label.
 
-    Parameters
-    ----------
-    diagnosis
-        from `diagnose_logs`
-    log
-        another test of the same machine
-    push
-        what is known to have entered at some of the model's places, shape (n,) each
-
+    diagnosis : from `diagnose_logs`
+    log : another test of the same machine
+    push : what is known to have entered at some of the model's places, shape (n,) each
     """
     whole, machine = diagnosis.machine, without_labels(diagnosis.machine)
     assert isinstance(machine, OwnMachine)

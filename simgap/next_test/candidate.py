@@ -23,8 +23,6 @@ class Candidate:
     """
     A test and what it is expected to tell.
 
-    Attributes
-    ----------
     family, test : as the test space has drawn it
     use : share of each limit that it uses, the worst of all rivals
     score : by the criterion; the larger the better
@@ -32,11 +30,10 @@ class Candidate:
         test that was judged, in the geometric mean; NaN where it was not asked for
     promised : how well it tells the rivals apart to first order
     confirmed : the same with every rival fitted to the readings of the others
-    kept : while not confirmed, the share of its promise that counts: as other tests of its
-        family have kept theirs
+    kept : while not confirmed, the share of its promise that counts: as other tests of its family
+        have kept theirs
     deviations : of each number of the effects, its standard deviation before and after
     sizes : of each effect, the smallest size that shows, and its unit
-
     """
 
     family: str
@@ -66,8 +63,6 @@ class Proposal:
     """
     What was found.
 
-    Attributes
-    ----------
     objective, criterion : what was asked for, and by which rule
     rivals : that were to be told apart
     tests : judged ones that help, the best first; none if no test within the limits helps
@@ -77,7 +72,6 @@ class Proposal:
         they differ, the greatest difference first
     tried : number of tests that were simulated
     unnamed : where something without a name may act, see `Findings`
-
     """
 
     objective: str

@@ -36,15 +36,12 @@ class Confusability:
     """
     What a set of tests can tell.
 
-    Attributes
-    ----------
     effects : ids, m of them
     detectable : least size that shows in any case, in the unit of the effect's first parameter;
         infinite if none within its bounds does; shape (m,)
     units : of that size
     alike : share of the squared remainder of one effect that another can imitate, shape (m, m)
     limit : share from which two effects count as alike
-
     """
 
     effects: tuple[str, ...]

@@ -64,8 +64,6 @@ class DesignEffort:
     """
     How much is searched.
 
-    Attributes
-    ----------
     drawn : tests of each family
     judged : of all, those that are judged with all tolerances free
     varied : of these, those that are varied
@@ -73,7 +71,6 @@ class DesignEffort:
     confirmed : of the best, those that every rival is fitted to at a time
     rounds : of that at most, while another test promises more than the best of those
     margin : share of each limit that a test may use
-
     """
 
     drawn: int = 12
@@ -89,23 +86,13 @@ class TestDesign:
     """
     The search for the next test.
 
-    Parameters
-    ----------
-    space
-        the tests that the machine may run
-    findings
-        of the tests so far
-    objective
-        one of `OBJECTIVES`, or `D_OPTIMAL` or `RANDOM` to compare with
-    suspected
-        for `detect`, ids of effects; empty for all
-    threads
-        tests at once
-    settings, effort
-        thresholds, and how much is searched
-    seed
-        of the tests that are drawn
-
+    space : the tests that the machine may run
+    findings : of the tests so far
+    objective : one of `OBJECTIVES`, or `D_OPTIMAL` or `RANDOM` to compare with
+    suspected : for `detect`, ids of effects; empty for all
+    threads : tests at once
+    settings, effort : thresholds, and how much is searched
+    seed : of the tests that are drawn
     """
 
     __test__ = False
@@ -127,10 +114,7 @@ class TestDesign:
         """
         Search, and return what was found.
 
-        Raises
-        ------
-        KeyError : the machine's catalogue lacks an effect or a form of a rival
-
+        Raises KeyError if the machine's catalogue lacks an effect or a form of a rival.
         """
         effort = self._effort
         drawn = [Candidate(family, self._space.draw(family, self._random), {})
@@ -223,11 +207,9 @@ class TestDesign:
         return replace(test, promised=promised, sizes=self._sizes(machine.low_fidelity()))
 
     def _with_fits(self, judged: Sequence[Candidate], pool: ThreadPoolExecutor) -> list[Candidate]:
-        """
-        Confirm the best tests until no other one promises more, and put those first.
-
-        Tests of a family break their promises alike: a promise counts as far as others were kept.
-        """
+        """Confirm the best tests until no other one promises more, and put those first."""
+        # Tests of a family break their promises alike: a promise counts as far as others were
+        # kept.
         best = list(judged)
         for _ in range(self._effort.rounds):
             if not best or best[0].confirmed is not None:
@@ -313,11 +295,8 @@ class TestDesign:
         return weight
 
     def _compound(self, test: Candidate, coarseness: float) -> float:
-        """
-        Return what a test tells of the rivals and of other effects, by their weights.
-
-        Each part is the logarithm of an efficiency, but for what all tests share.
-        """
+        """Return what a test tells of the rivals and of other effects, by their weights."""
+        # Each part is the logarithm of an efficiency, but for what all tests share.
         if test.separation is None:
             return -math.log(coarseness)
         unlisted = max(self._settings.planning.unlisted, self._findings.unlisted)

@@ -34,13 +34,8 @@ def as_data(proposal: Proposal, space: TestSpace, settings: Settings = DEFAULT) 
     """
     Return a proposal as plain data, for the JSON.
 
-    Parameters
-    ----------
-    proposal, space
-        what was found among which tests
-    settings
-        thresholds
-
+    proposal, space : what was found among which tests
+    settings : thresholds
     """
     rivals = proposal.rivals
     found: dict[str, Any] = {
@@ -174,12 +169,9 @@ class ProposalContents:
     """
     All that the page about a proposal says.
 
-    Attributes
-    ----------
     title, lead : in a few words and in a sentence
     data : of `as_data`
     panels : for each signal what the likeliest rivals would read
-
     """
 
     title: str
@@ -193,13 +185,8 @@ def contents(proposal: Proposal, space: TestSpace, settings: Settings = DEFAULT,
     """
     Return what the page about a proposal says.
 
-    Parameters
-    ----------
-    proposal, space, settings
-        as in `as_data`
-    effort
-        with the margin that was kept
-
+    proposal, space, settings : as in `as_data`
+    effort : with the margin that was kept
     """
     data = as_data(proposal, space, settings)
     said = lines(data)

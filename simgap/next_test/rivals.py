@@ -42,15 +42,12 @@ class Rival:
     """
     An answer of a verdict.
 
-    Attributes
-    ----------
     named : effects that it names; none for 'none'
     effects, forms : what was fitted, with the name of the form of each
     probability : of the answer, in the verdict
     names, values : numbers of the machine and of the effects, shape (m,)
     covariance : of the values, shape (m, m)
     doubts : what tells whether effects that it names are larger than their tolerances, by effect
-
     """
 
     named: tuple[str, ...]
@@ -71,10 +68,7 @@ class Rival:
         """
         Return the forms of the effects in a machine.
 
-        Raises
-        ------
-        KeyError : the machine's catalogue lacks an effect or a form
-
+        Raises KeyError if the machine's catalogue lacks an effect or a form.
         """
         return [machine.catalogue.form_named(machine.catalogue[effect], form)
                 for effect, form in zip(self.effects, self.forms, strict=True)]
@@ -116,10 +110,7 @@ class Rival:
         """
         Take a rival from plain data.
 
-        Raises
-        ------
-        KeyError, TypeError, ValueError, AttributeError : it is not a rival
-
+        Raises KeyError, TypeError, ValueError, AttributeError if it is not a rival.
         """
         names = tuple(data['names'])
         lower = np.zeros((len(names), len(names)))
@@ -136,8 +127,6 @@ class Findings:
     """
     What the design of a further test takes from the tests so far.
 
-    Attributes
-    ----------
     rivals : answers of the verdict; none before the first test
     inflated : by what differences of the cost are divided
     noise : of each sensor, see `noise.found_noise`; by default that of its data sheet
@@ -145,7 +134,6 @@ class Findings:
         parameter, by effect; where answers are open nobody asks for it
     unnamed : probability that something without a name acts in a part of the machine, by part;
         what they leave of 1 is spread over the whole catalogue
-
     """
 
     rivals: Sequence[Rival] = ()
@@ -158,8 +146,8 @@ class Findings:
         """
         Return whether there are answers to tell apart: several, and none of them sure.
 
-        Nor is there anything to tell apart if all others have less than `unknown` has at least,
-        or if it is likelier than each of them. What is open then is whether any effect of the
+        Nor is there anything to tell apart if all others have less than `unknown` has at least, or
+        if it is likelier than each of them. What is open then is whether any effect of the
         catalogue is true.
         """
         known = [rival.probability for rival in self.rivals]
@@ -183,12 +171,8 @@ class Findings:
         Take the findings from the entry `planning` of a verdict.
 
         A verdict of an earlier version lacks noise, doubts, what has shown or where something
-        unnamed may be, which is not an error.
-
-        Raises
-        ------
-        KeyError, TypeError, ValueError, AttributeError : it holds none
-
+        unnamed may be, which is not an error. Raises KeyError, TypeError, ValueError,
+        AttributeError if it holds none.
         """
         return cls([Rival.of_data(item) for item in planning['rivals']],
                    float(planning['inflation']), dict(planning.get('noise', {})),

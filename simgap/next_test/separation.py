@@ -32,8 +32,6 @@ class Separation:
     """
     What a planned test tells of r rivals.
 
-    Attributes
-    ----------
     prior : probability of each rival before the test, shape (r,)
     lack : half the chi-square by which rival j fits worse than i if i is true, shape (r, r)
     channels : share of that which each signal gives; empty where it was not asked for
@@ -41,7 +39,6 @@ class Separation:
     odds : logarithm of the odds that rival j loses to i at most if i is true, because the verdict
         doubts an effect that only one of them names, shape (r, r); infinite for all other pairs
     shrunk : for each rival the share to which deviations of sizes shrink, by name
-
     """
 
     prior: FloatArray
@@ -105,13 +102,10 @@ def odds_of(rivals: Sequence[Rival], lack: FloatArray, shrunk: Sequence[Mapping[
 
 
 def _ended(doubt: Doubt, known: float, share: float, gain: float) -> FloatArray:
-    """
-    Return the logarithms of the odds by which a test moves a doubt, shape (2,).
-
-    By how much the doubt falls if the effect is there, and by how much the effect does if not.
-    `known` is the deviation of its size from the readings alone, which shrinks to a `share`;
-    `gain` is what the test adds if the effect is there.
-    """
+    """Return the logarithms of the odds by which a test moves a doubt, shape (2,)."""
+    # By how much the doubt falls if the effect is there, and by how much the effect does if not.
+    # `known` is the deviation of its size from the readings alone, which shrinks to a `share`;
+    # `gain` is what the test adds if the effect is there.
     # what follows from a tolerance, or from how tests differ, does not shrink
     after = replace(doubt, deviation=math.sqrt(max(
         doubt.deviation ** 2 - (1.0 - share ** 2) * known ** 2, LEAST)))

@@ -18,11 +18,8 @@ class TestSpace(ABC):
     """
     The tests that a machine may run.
 
-    Attributes
-    ----------
     families : names of the kinds of test
     limits : that a test must keep, by name
-
     """
 
     __test__ = False  # not a test case, whatever pytest makes of the name
@@ -43,13 +40,8 @@ class TestSpace(ABC):
         """
         Return the share of each limit that a test uses, 1 at the limit.
 
-        Parameters
-        ----------
-        machine
-            from `machine`
-        points
-            variants of it; the worst one counts
-
+        machine : from `machine`
+        points : variants of it; the worst one counts
         """
 
     def nearby(self, family: str, test: Any, random: np.random.Generator) -> Any:

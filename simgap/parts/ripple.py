@@ -14,15 +14,9 @@ def wave(angle: float, order: float, cosine: float, sine: float) -> float:
     """
     Return a wave in the unit of its amplitudes.
 
-    Parameters
-    ----------
-    angle
-        that it follows [rad]
-    order
-        cycles per revolution
-    cosine, sine
-        amplitudes of its two parts
-
+    angle : that it follows [rad]
+    order : cycles per revolution
+    cosine, sine : amplitudes of its two parts
     """
     if cosine == 0.0 and sine == 0.0:
         return 0.0
@@ -34,15 +28,9 @@ def harmonics(angle: float, order: float, amplitudes: tuple[float, ...]) -> floa
     """
     Return a wave with harmonics, in the unit of its amplitudes.
 
-    Parameters
-    ----------
-    angle
-        that it follows [rad]
-    order
-        of the fundamental, cycles per revolution
-    amplitudes
-        cosine and sine part of the fundamental, of the second harmonic, and so on
-
+    angle : that it follows [rad]
+    order : of the fundamental, cycles per revolution
+    amplitudes : cosine and sine part of the fundamental, of the second harmonic, and so on
     """
     total = 0.0
     for k in range(len(amplitudes) // 2):

@@ -32,17 +32,10 @@ def rate_limited(value: float, wanted: float, limit: float, step: float) -> floa
     """
     Return a value that follows another no faster than it may.
 
-    Parameters
-    ----------
-    value
-        before the step
-    wanted
-        that it follows, in the same unit
-    limit
-        greatest change per second
-    step
-        [s]
-
+    value : before the step
+    wanted : that it follows, in the same unit
+    limit : greatest change per second
+    step : [s]
     """
     return value + min(max(wanted - value, -limit * step), limit * step)
 
@@ -52,17 +45,10 @@ def lagged(value: float, source: float, time_constant: float, step: float) -> fl
     """
     Return the output of a first-order lag after a step in which its input stands still.
 
-    Parameters
-    ----------
-    value
-        output before the step
-    source
-        input, in the same unit
-    time_constant
-        [s]; 0 for none
-    step
-        [s]
-
+    value : output before the step
+    source : input, in the same unit
+    time_constant : [s]; 0 for none
+    step : [s]
     """
     if time_constant <= 0.0:
         return source
@@ -92,15 +78,9 @@ def delayed(past: NDArray[np.float64], k: int, ticks: float) -> float:
 
     It has a derivative by the delay, which `held` has not.
 
-    Parameters
-    ----------
-    past
-        the signal at each tick so far, shape (n,), any unit
-    k
-        index of the present tick
-    ticks
-        delay, 0 or more; before the first sample the first value holds
-
+    past : the signal at each tick so far, shape (n,), any unit
+    k : index of the present tick
+    ticks : delay, 0 or more; before the first sample the first value holds
     """
     whole, share = int(ticks), ticks % 1.0
     return (1.0 - share) * past[max(k - whole, 0)] + share * past[max(k - whole - 1, 0)]
@@ -114,19 +94,11 @@ def held(time: NDArray[np.float64], values: NDArray[np.float64], moment: float,
 
     A delayed command is `held(time, command, now - delay, place)`.
 
-    Parameters
-    ----------
-    time, values
-        of the samples, shape (n,) [s], any unit
-    moment
-        [s]; before the first sample the first value holds
-    place
-        index from which the search starts, as the last call returned it; 0 at first
+    time, values : of the samples, shape (n,) [s], any unit
+    moment : [s]; before the first sample the first value holds
+    place : index from which the search starts, as the last call returned it; 0 at first
 
-    Returns
-    -------
-    the value, and its index
-
+    Returns the value, and its index.
     """
     # a sample's time is a sum of steps, and a sum of steps is rounded
     while place + 1 < time.size and time[place + 1] <= moment + 1e-9:

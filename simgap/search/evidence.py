@@ -22,12 +22,9 @@ class Evidence:
     """
     What a verdict is decided on.
 
-    Attributes
-    ----------
     hypotheses : everything that was fitted, the nuisances alone among them
     lacks : what each of them leaves
     inflation : of the cost's differences, see `intervals.inflation`
-
     """
 
     hypotheses: Sequence[Hypothesis]
@@ -51,14 +48,7 @@ class Evidence:
 
     @classmethod
     def of_data(cls, data: Sequence[Mapping[str, Any]]) -> Evidence:
-        """
-        Take evidence from plain data.
-
-        Raises
-        ------
-        KeyError, TypeError : it is not evidence
-
-        """
+        """Take evidence from plain data. Raises KeyError, TypeError if it is not evidence."""
         return cls([_hypothesis(item) for item in data],
                    [LackOfFit(**item['lack_of_fit']) for item in data],
                    data[0].get('inflation', 1.0) if data else 1.0)

@@ -30,11 +30,8 @@ class FullFits:
     """
     Fits to the whole tests, as many at once as there are threads.
 
-    Attributes
-    ----------
     problem : with the noise of the motion that was found
     progress : called with the share that is done, 0 to 1, and what is being done
-
     """
 
     def __init__(self, problem: LeastSquares, progress: Callable[[float, str], None],

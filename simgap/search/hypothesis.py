@@ -21,13 +21,10 @@ class Hypothesis:
     """
     Effects that were fitted together with all nuisances.
 
-    Attributes
-    ----------
     effects : their ids; none for the nuisances alone
     forms : one for each effect
     state : where the fit ended
     doubts : the probability that an effect is within its tolerance, by effect; 0 if not given
-
     """
 
     effects: tuple[str, ...]

@@ -31,12 +31,9 @@ class Sensitivity:
     """
     A form of an effect and the derivatives of the prediction by its parameters.
 
-    Attributes
-    ----------
     effect : its id
     form : of the effect
     jacobian : shape (n, m); zero for shape parameters
-
     """
 
     effect: str

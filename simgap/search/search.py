@@ -176,11 +176,8 @@ class Search:
 
     def _sorted(self, fitted: Callable[[Any], Hypothesis], of: Iterable[Any],
                 full: int | None = None) -> list[Hypothesis]:
-        """
-        Fit several hypotheses at once; return the best first.
-
-        Only the first `full` keep their Jacobians, which take most of the memory; None for all.
-        """
+        """Fit several hypotheses at once; return the best first."""
+        # Only the first `full` keep their Jacobians, which take most of the memory; None for all.
         found: list[Hypothesis] = []
         for hypothesis in self._pool.map(fitted, of):
             insort(found, hypothesis, key=self._priced)

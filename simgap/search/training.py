@@ -24,13 +24,9 @@ class Part(Machine):
     """
     A machine in some of its experiments. What is not among them cannot reach a fit.
 
-    Parameters
-    ----------
-    machine, chosen
-        in all experiments, and the indices of those that count
-    experiments, held
-        what was measured in them, None for all that the machine has; values that are held, by name
-
+    machine, chosen : in all experiments, and the indices of those that count
+    experiments, held : what was measured in them, None for all that the machine has; values that
+        are held, by name
     """
 
     def __init__(self, machine: Machine, chosen: Sequence[int],
@@ -82,12 +78,9 @@ class Slopes:
     """
     Derivatives that were taken once for all experiments, to begin fits with.
 
-    Attributes
-    ----------
     parameters : what the columns belong to
     rows : of each experiment
     jacobian : at the sensors' own noise, shape (n, m)
-
     """
 
     parameters: tuple[Parameter, ...]

@@ -31,8 +31,6 @@ class Conclusion:
     """
     What the fits to a machine's experiments say.
 
-    Attributes
-    ----------
     problem : the whole experiments, with the noise of the motion that was found
     none, best : the hypotheses without and with the likeliest effects
     reach : how far the gap shrinks, see `held_out`
@@ -41,7 +39,6 @@ class Conclusion:
     evidence : every fit, with what each leaves
     decision : what follows from it
     notes : for people
-
     """
 
     problem: LeastSquares
@@ -63,11 +60,7 @@ def concluded(machine: Machine, progress: Callable[[float, str], None], threads:
     A course over time has so many numbers that it imitates what moves the same part. Where it
     looks like no real one, everything is done without it first.
 
-    Parameters
-    ----------
-    machine, progress, threads, settings, earlier
-        see `diagnosis.diagnose`
-
+    machine, progress, threads, settings, earlier : see `diagnosis.diagnose`
     """
     whole = LeastSquares(machine, settings=settings)
 
@@ -163,11 +156,8 @@ def _between_tests(reach: Mapping[str, Any]) -> dict[str, float]:
 
 def _rests(fits: FullFits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
            settings: Settings) -> dict[str, Hypothesis]:
-    """
-    Return the best without each doubted effect, where there is no such fit, by effect.
-
-    The search gives up what is far behind the best, and so the best without what gains most.
-    """
+    """Return the best without each doubted effect, where there is no such fit, by effect."""
+    # The search gives up what is far behind the best, and so the best without what gains most.
     known = {frozenset(h.effects) for h in hypotheses}
     return {effect: fits.without(best, effect) for effect in best.effects
             if best.doubts.get(effect, 0.0) >= settings.interval.least_doubt

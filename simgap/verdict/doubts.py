@@ -22,8 +22,6 @@ class Doubt:
     """
     What tells whether an effect is larger than its tolerance.
 
-    Attributes
-    ----------
     size : name of the number that exceeds its tolerance by most deviations
     excess : over the tolerance, in the unit of the number
     deviation : standard deviation of the number
@@ -31,7 +29,6 @@ class Doubt:
     gain : of the effect [half chi-square], over the inflation; 0 if no fit has shown it
     sure_by_gain : gain at which the doubt is a half, however small the excess
     slope : how sharply the doubt falls beyond these limits
-
     """
 
     size: str
@@ -63,16 +60,11 @@ def doubts(hypothesis: Hypothesis, deviating: Mapping[str, float], gained: float
     tolerance by more, or to gain more, because it may only mend the form of the strongest. A
     course over time is judged as a whole, elsewhere.
 
-    Parameters
-    ----------
-    hypothesis, deviating, settings
-        with the standard deviations of its values, from `intervals.deviations`
-    gained, own_gains
-        gain of all its effects, and of some beside the others [half chi-square], over the
-        inflation
-    beyond
-        excess of the strongest effect, in deviations, at which its doubt is a half
-
+    hypothesis, deviating, settings : with the standard deviations of its values, from
+        `intervals.deviations`
+    gained, own_gains : gain of all its effects, and of some beside the others [half chi-square],
+        over the inflation
+    beyond : excess of the strongest effect, in deviations, at which its doubt is a half
     """
     point = hypothesis.state.point()
     found: dict[str, Doubt] = {}

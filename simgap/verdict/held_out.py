@@ -33,15 +33,11 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads:
     """
     Return the gap before and after, on data whose effect is withheld, for the JSON.
 
-    Parameters
-    ----------
-    problem
-        the whole tests
-    none, best, threads
-        the hypotheses without and with the likeliest effects, and how many tests go at once
-    groups, what
-        group of each test, withheld together, and its name for people; None if each is its own
-
+    problem : the whole tests
+    none, best, threads : the hypotheses without and with the likeliest effects, and how many tests
+        go at once
+    groups, what : group of each test, withheld together, and its name for people; None if each is
+        its own
     """
     single = len(problem.experiments) == 1
     judge = Judge(problem, none, best, groups or [e.name for e in problem.experiments])

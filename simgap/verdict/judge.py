@@ -32,8 +32,6 @@ class Withheld:
     """
     A test that was withheld.
 
-    Attributes
-    ----------
     name : of the test
     time : shape (n,) [s]
     gap_before : measured minus predicted without the effects, in the readings' own units, shape
@@ -44,7 +42,6 @@ class Withheld:
     reasons : why the others cannot be judged, by id
     names, values : numbers of the judged effects
     drawn : `after` with draws of these numbers, shape (draws, n, c); None if none can be judged
-
     """
 
     name: str
@@ -110,23 +107,17 @@ class Judge:
         return problem, unaided, self._taken_over(problem, found)
 
     def _taken_over(self, problem: LeastSquares, found: FitState) -> FitState:
-        """
-        Return a training fit whose effects alone stand for their numbers.
-
-        Only they are taken to the withheld test. What a tolerance has of them would be lost.
-        """
+        """Return a training fit whose effects alone stand for their numbers."""
+        # Only they are taken to the withheld test. What a tolerance has of them would be lost.
         at, _ = self._problem.machine.nuisances.take_over(found.point(), self._best.forms)
         if at == found.point():
             return found
         return problem.start(found.parameters, at, found.jacobian)
 
     def _finished(self, problem: LeastSquares, found: FitState) -> FitState:
-        """
-        Go on with a training fit while it is in a local minimum and gains.
-
-        It gets fresh derivatives. Initial conditions that were chosen before the fit may not be
-        the best after it, and are chosen again.
-        """
+        """Go on with a training fit while it is in a local minimum and gains."""
+        # It gets fresh derivatives. Initial conditions that were chosen before the fit may not be
+        # the best after it, and are chosen again.
         options = self._settings.held_out
         for _ in range(options.further_passes):
             if not self._in_local_minimum(problem, found):
@@ -143,11 +134,8 @@ class Judge:
         return found
 
     def _added(self, problem: LeastSquares, part: Part, unaided: FitState) -> FitState:
-        """
-        Fit the effects on top of a fit without them.
-
-        A fit of everything at once may bend the nuisances to what a ripple does, and stop there.
-        """
+        """Fit the effects on top of a fit without them."""
+        # A fit of everything at once may bend the nuisances to what a ripple does, and stop there.
         own = part.parameters([p for p in self._best.state.parameters if p.name in self._effects])
         point = {**unaided.point(), **self._start}
         state = problem.start_from(
@@ -277,12 +265,9 @@ class Judge:
 
     def _unseen(self, problem: LeastSquares, point: dict[str, float], residual: FloatArray,
                 reasons: Mapping[str, str]) -> dict[str, str]:
-        """
-        Return the reasons why effects cannot be judged that a withheld test does not show.
-
-        A limit that a test does not reach changes nothing there, whatever its derivative says.
-        `residual` is that at the point.
-        """
+        """Return the reasons why effects cannot be judged that a withheld test does not show."""
+        # A limit that a test does not reach changes nothing there, whatever its derivative says.
+        # `residual` is that at the point.
         unseen = {}
         for effect, form in zip(self._best.effects, self._best.forms, strict=True):
             if effect not in reasons:
@@ -304,14 +289,11 @@ class Judge:
     def _completed(self, fold: Withheld, problem: LeastSquares, point: Mapping[str, float],
                    residual: FloatArray, found: FitState, posterior: FloatArray,
                    followed: Callable[[FloatArray], FloatArray] = lambda drawn: drawn) -> Withheld:
-        """
-        Return a fold with what remains, and with draws of the numbers that can be judged.
-
-        `point` and `residual`, shape (n c,), are where the withheld test is judged; `found` and
-        `posterior` are the fit to the training data and its covariance. `followed` returns, of
-        residuals with draws, shape (draws, n c), those that are left once the nuisances have
-        followed.
-        """
+        """Return a fold with what remains, and with draws of the numbers that can be judged."""
+        # `point` and `residual`, shape (n c,), are where the withheld test is judged; `found` and
+        # `posterior` are the fit to the training data and its covariance. `followed` returns, of
+        # residuals with draws, shape (draws, n c), those that are left once the nuisances have
+        # followed.
         numbers = self._numbers(fold.reasons)
         if not numbers:
             return fold

@@ -48,12 +48,9 @@ def implausibility(hypothesis: Hypothesis, settings: Settings) -> dict[str, floa
 
 
 def _slow_excess(problem: LeastSquares, state: FitState) -> float:
-    """
-    Return the slow excess of the residual, averaged over tests and signals.
-
-    It is relative to white noise with the same fast part, so that a sensor that is noisier than
-    its sheet says raises no alarm.
-    """
+    """Return the slow excess of the residual, averaged over tests and signals."""
+    # It is relative to white noise with the same fast part, so that a sensor that is noisier than
+    # its sheet says raises no alarm.
     settings = problem.settings.lack_of_fit
     found = []
     for k, experiment in enumerate(problem.experiments):
@@ -71,12 +68,10 @@ def _slow_excess(problem: LeastSquares, state: FitState) -> float:
 
 
 def _regular(problem: LeastSquares, state: FitState) -> tuple[str, float]:
-    """
-    Return the signal whose residual repeats itself most in a test, and by how much.
-
-    A hum, a ripple or a resonance may be no louder than a sensor's noise may be. But what remains
-    of noise is white, because its colour is known. What is quieter than noise counts less.
-    """
+    """Return the signal whose residual repeats itself most in a test, and by how much."""
+    # A hum, a ripple or a resonance may be no louder than a sensor's noise may be. But what
+    # remains of noise is white, because its colour is known. What is quieter than noise counts
+    # less.
     settings = problem.settings.lack_of_fit
     signal, greatest = '', 0.0
     for k, experiment in enumerate(problem.experiments):

@@ -5,12 +5,12 @@ Where an unknown input acts: the part of the machine that a gap sits in, whateve
 
 An input of any course over time is let into each part in turn: a torque on a shaft, a voltage in
 an amplifier, a wrong reading. The machine's response to it is taken pulse by pulse, and the
-responses are fitted to what the nuisances leave of the gap. The part whose input explains the
-gap with the least effort is the likeliest. Pulses that are far enough apart for the machine to
-settle between them share a run.
+responses are fitted to what the nuisances leave of the gap. The part whose input explains the gap
+with the least effort is the likeliest. Pulses that are far enough apart for the machine to settle
+between them share a run.
 
-The measure is the evidence (marginal likelihood) of a linear model whose inputs are random, with
-a variance chosen for each place (D. J. C. MacKay, Bayesian interpolation, Neural Computation 4,
+The measure is the evidence (marginal likelihood) of a linear model whose inputs are random, with a
+variance chosen for each place (D. J. C. MacKay, Bayesian interpolation, Neural Computation 4,
 1992, Eq. 2.9 and 3.2). The nuisances, with their priors, are projected out.
 """
 
@@ -36,13 +36,10 @@ class Place:
     """
     A place where an unknown input may act.
 
-    Attributes
-    ----------
     name : for people
     component : the part of the machine
     evidence : natural logarithm of how much likelier the gap is with an input there than without
     explained : share of the gap's energy that an input there explains, 0 to 1
-
     """
 
     name: str
@@ -93,11 +90,8 @@ def courses(problem: LeastSquares, point: Mapping[str, float],
 
 def _columns(problem: LeastSquares, point: Mapping[str, float], place: DisturbanceInput,
              residual: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
-    """
-    Return the response to each pulse at a place, and when each pulse has its peak [s].
-
-    Both are for each experiment; responses have the shape (n c, pulses), peaks (pulses,).
-    """
+    """Return the response to each pulse at a place, and when each pulse has its peak [s]."""
+    # Both are for each experiment; responses have the shape (n c, pulses), peaks (pulses,).
     here, scales = dict(point), problem.machine.time_scales
     responses: list[list[FloatArray]] = [[] for _ in problem.experiments]
     peaks: list[list[float]] = [[] for _ in problem.experiments]

@@ -29,8 +29,6 @@ class LackOfFit:
     """
     What a hypothesis leaves unexplained.
 
-    Attributes
-    ----------
     slow_excess : power of the slow residual over that of white noise, less one; 0 for noise
     left : share of the gap, 0 to 1
     fast : variance of the fast part of the loudest signal, over that of its sensor's noise
@@ -43,7 +41,6 @@ class LackOfFit:
     named : False if the hypothesis names nothing that could have closed the gap
     regular : greatest autocorrelation of a signal's residual, less if it is quieter than noise
     most_regular : signal that it is of
-
     """
 
     slow_excess: float
@@ -64,13 +61,10 @@ class Answer:
     """
     What hypotheses that may name the same effects say.
 
-    Attributes
-    ----------
     hypothesis : the fit with these effects alone; if there is none, the best that may name them
     score : its score
     probability : of all of them
     effects : that it names: those that are larger than their tolerances
-
     """
 
     hypothesis: Hypothesis
@@ -84,14 +78,11 @@ class Decision:
     """
     What a diagnosis concludes.
 
-    Attributes
-    ----------
     word : no_gap, too_few_to_judge, explained, partly_explained or unknown_effect
     answers : the likeliest first, with probabilities that leave room for `unknown`
     unknown : probability of something outside the catalogue
     lack : what the best hypothesis leaves
     confusable : groups of effects that the data cannot tell apart
-
     """
 
     word: str
@@ -106,17 +97,10 @@ def decide(hypotheses: Sequence[Hypothesis], lack: LackOfFit, settings: Settings
     """
     Conclude from fits.
 
-    Parameters
-    ----------
-    hypotheses
-        fitted ones, the nuisances alone among them
-    lack
-        what the best of them leaves
-    settings
-        thresholds
-    inflation
-        of the cost's differences
-
+    hypotheses : fitted ones, the nuisances alone among them
+    lack : what the best of them leaves
+    settings : thresholds
+    inflation : of the cost's differences
     """
     unknown = unknown_probability(lack, settings.verdict)
     answers = rank(hypotheses, unknown, settings, inflation)
@@ -138,13 +122,8 @@ def which(decision: Decision, settings: VerdictSettings,
     """
     Return the likeliest answers for the JSON, 'none' and 'unknown' among them.
 
-    Parameters
-    ----------
-    decision, settings
-        from `decide`, and its thresholds
-    values
-        returns the parameters of an answer
-
+    decision, settings : from `decide`, and its thresholds
+    values : returns the parameters of an answer
     """
     entries: list[dict[str, Any]] = []
     likeliest = set(decision.answers[0].effects)
@@ -273,17 +252,10 @@ def rank(hypotheses: Sequence[Hypothesis], unknown: float, settings: Settings,
 
     A hypothesis whose effects are in doubt gives some of its probability to fewer of them.
 
-    Parameters
-    ----------
-    hypotheses
-        fitted ones, the nuisances alone among them
-    unknown
-        probability of something else, from `unknown_probability`
-    settings
-        thresholds
-    inflation
-        of the cost's differences
-
+    hypotheses : fitted ones, the nuisances alone among them
+    unknown : probability of something else, from `unknown_probability`
+    settings : thresholds
+    inflation : of the cost's differences
     """
     score = _Scores(hypotheses, settings, inflation)
     scores = np.array([score(h) for h in hypotheses])
