@@ -51,14 +51,12 @@ class FitSettings:
     local_step: float = _setting(
         1.0, 'noise sigma', 'change of the prediction by the step of a fresh difference quotient',
         TRIAL_6)
-    least_step: float = _setting(
-        1e-3, '1', 'the least such step, as a share of the usual one')
+    least_step: float = _setting(1e-3, '1', 'the least such step, as a share of the usual one')
     good_step: float = _setting(
         0.5, '1', 'share of the expected gain from which a step counts as good')
     least_gain: float = _setting(
         1.0, 'half chi-square', 'gain of an iteration below which a fit is idle')
-    worth_a_step: float = _setting(
-        0.3, '1', 'share of least_gain that a step must promise')
+    worth_a_step: float = _setting(0.3, '1', 'share of least_gain that a step must promise')
     idle_iterations: int = _setting(1, '1', 'idle iterations that a fit goes on through')
     stale_weights: float = _setting(
         0.02, '1', 'mean change of the weights after which the Hessian is made anew')
@@ -75,8 +73,7 @@ class FitSettings:
 class SearchSettings:
     """The search for effects."""
 
-    singles: int = _setting(
-        12, '1', 'effects that are fitted after the screening', PRACTICE)
+    singles: int = _setting(12, '1', 'effects that are fitted after the screening', PRACTICE)
     finalists: int = _setting(5, '1', 'single effects that are fitted further', PRACTICE)
     most_finalists: int = _setting(
         7, '1', 'fits that go on at lower noise, and where the best of them leaves much', TRIAL_9)
@@ -169,8 +166,7 @@ class VerdictSettings:
 
     temperature: float = _setting(
         8.0, 'half chi-square', 'cost that makes a hypothesis e times less probable', PRACTICE)
-    second_effect: float = _setting(
-        60.0, 'half chi-square', 'price of a second effect', PRACTICE)
+    second_effect: float = _setting(60.0, 'half chi-square', 'price of a second effect', PRACTICE)
     second_share: float = _setting(
         0.015, '1', 'the same as a share of what the first effect gains', TRIAL_0)
     twin_share: float = _setting(
@@ -218,8 +214,7 @@ class LackOfFitSettings:
 
     clip: float = _setting(
         6.0, 'noise sigma', 'residual beyond which a sample says no more about slow excess')
-    clip_fast: float = _setting(
-        10.0, 'noise sigma', 'the same for every other statistic')
+    clip_fast: float = _setting(10.0, 'noise sigma', 'the same for every other statistic')
     least_samples: int = _setting(50, '1', 'samples up to which a channel is not tested')
     block: int = _setting(10, 'samples', 'length of the blocks whose means are the slow part')
     least_blocks: int = _setting(4, '1', 'blocks below which a channel is not tested')
@@ -245,10 +240,8 @@ class NoiseSettings:
     model_error_hz: float = _setting(0.3, 'Hz', "corner of a model's error in planned tests")
     greatest_level: float = _setting(
         3.0, 'stated noise', 'upper bound of the levels of white and of slow noise')
-    same_level: float = _setting(
-        0.05, '1', 'change of a level up to which it is the same')
-    worth_a_colour: float = _setting(
-        8.0, 'log evidence', 'evidence below which noise is white')
+    same_level: float = _setting(0.05, '1', 'change of a level up to which it is the same')
+    worth_a_colour: float = _setting(8.0, 'log evidence', 'evidence below which noise is white')
     clip: float = _setting(5.0, 'residual level', 'residual beyond which a sample is an outlier')
     least_samples: int = _setting(50, '1', 'samples below which an experiment tells no noise')
 
@@ -257,8 +250,7 @@ class NoiseSettings:
 class IntervalSettings:
     """Intervals of fitted values."""
 
-    derivative_error: float = _setting(
-        0.1, '1', 'share of a derivative that may be wrong', WILD)
+    derivative_error: float = _setting(0.1, '1', 'share of a derivative that may be wrong', WILD)
     model_error: float = _setting(
         3e-3, '1', 'standard deviation that every value has, as a share of itself', WILD)
     sure: float = _setting(

@@ -86,8 +86,7 @@ def updated(jacobian: Jacobian, errors: Sequence[FloatArray],
     """Return a Jacobian with Broyden's rank-one updates."""
     if not errors:
         return jacobian
-    return np.asarray(jacobian + np.array(errors, np.float32).T
-                      @ np.array(directions, np.float32))
+    return np.asarray(jacobian + np.array(errors, np.float32).T @ np.array(directions, np.float32))
 
 
 def transposed_product(jacobian: Jacobian, vector: FloatArray) -> FloatArray:

@@ -128,8 +128,7 @@ class LeastSquares:
         z = np.abs(residual[self.valid]) * self.scale
         level = float(np.sqrt(np.mean(z ** 2)))
         for _ in range(10):
-            level = float(np.sqrt(np.mean(
-                np.minimum(z, self.settings.fit.outlier * level) ** 2)))
+            level = float(np.sqrt(np.mean(np.minimum(z, self.settings.fit.outlier * level) ** 2)))
         return level
 
     def leaves_much(self, state: FitState) -> bool:
@@ -233,8 +232,7 @@ class LeastSquares:
         return self._state(everything, x, self.residuals(point_of(everything, x)),
                            np.column_stack([state.jacobian, columns]), state.weight)
 
-    def with_columns(self, state: FitState, indices: Sequence[int],
-                     columns: Jacobian) -> FitState:
+    def with_columns(self, state: FitState, indices: Sequence[int], columns: Jacobian) -> FitState:
         """Return the state with other derivatives by some of its parameters."""
         jacobian = state.jacobian.copy()
         jacobian[:, indices] = columns

@@ -98,8 +98,7 @@ def estimated(residuals: Sequence[FloatArray], interval_s: float, slow_limit: fl
 
     white = power(0.0, 0.0)
     poles = [math.exp(-2.0 * math.pi * corner * interval_s) for corner in _CORNERS_HZ]
-    best, pole, gain = min((power(pole, gain), pole, gain)
-                           for pole in poles for gain in _GAINS)
+    best, pole, gain = min((power(pole, gain), pole, gain) for pole in poles for gain in _GAINS)
     if 0.5 * sizes.size * math.log(white / max(best, 1e-12)) < settings.worth_a_colour:
         best, pole, gain = white, 0.0, 0.0
     slow = gain * best * (1.0 - pole ** 2 * (1.0 - gain)) / (1.0 - pole ** 2)

@@ -80,8 +80,7 @@ def point_of(parameters: Sequence[Parameter], x: FloatArray) -> dict[str, float]
 
 def prior_precision(parameters: Sequence[Parameter]) -> FloatArray:
     """Return 1 / prior_sigma^2 of each parameter, 0 without a prior, shape (m,)."""
-    return np.array([1.0 / p.prior_sigma ** 2 if p.prior_sigma > 0.0 else 0.0
-                     for p in parameters])
+    return np.array([1.0 / p.prior_sigma ** 2 if p.prior_sigma > 0.0 else 0.0 for p in parameters])
 
 
 def proper_precision(parameters: Sequence[Parameter]) -> FloatArray:

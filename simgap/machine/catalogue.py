@@ -70,8 +70,7 @@ class Catalogue(dict[str, Effect]):
         for whole in self.values():
             if effect.id in whole.parts:
                 yield whole, 1.0 / len(whole.parts)
-                yield from ((self[part], 1.0) for part in whole.parts
-                            if part != effect.id)
+                yield from ((self[part], 1.0) for part in whole.parts if part != effect.id)
 
     def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
         """Return the form of an effect's part that corresponds to a form of the effect."""

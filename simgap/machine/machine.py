@@ -127,8 +127,7 @@ class Machine(ABC):
     @property
     def time_scales(self) -> TimeScales:
         """Return how fast the machine is; by default in proportion to the longest test."""
-        return TimeScales.of_duration(max(
-            float(e.time[-1] - e.time[0]) for e in self.experiments))
+        return TimeScales.of_duration(max(float(e.time[-1] - e.time[0]) for e in self.experiments))
 
     def motion(self, experiment: int) -> Motion:
         """Return how it moves in an experiment; by default nothing is known."""

@@ -3,10 +3,9 @@
 """
 The design of the next test: which of the tests that a machine may run tells most.
 
-What a test may be is the machine's to say, see `TestSpace`. The search knows nothing of waveforms.
-It draws tests of every family, keeps those within the limits, judges the most promising ones with
-all tolerances free, and varies the best. Last, each rival is fitted to the simulated readings of
-the others: what derivatives promise is not always kept.
+The search knows nothing of waveforms. It draws tests of every family from a `TestSpace`, keeps
+those within the limits, judges the most promising with all tolerances free, and varies the best.
+Last, each rival is fitted to the simulated readings of the others: derivatives promise too much.
 """
 
 from __future__ import annotations
@@ -61,38 +60,23 @@ def objective_for(findings: Findings, settings: Settings = DEFAULT) -> str:
 
 @dataclass(frozen=True)
 class DesignEffort:
-    """
-    How much is searched.
+    """How much is searched."""
 
-    drawn : tests of each family
-    judged : of all, those that are judged with all tolerances free
-    varied : of these, those that are varied
-    variants : of each of them
-    confirmed : of the best, those that every rival is fitted to at a time
-    rounds : of that at most, while another test promises more than the best of those
-    margin : share of each limit that a test may use
-    """
-
-    drawn: int = 12
-    judged: int = 14
-    varied: int = 3
-    variants: int = 4
-    confirmed: int = 2
-    rounds: int = 3
-    margin: float = 0.9
+    drawn: int = 12  # tests of each family
+    judged: int = 14  # tests that are judged with all tolerances free
+    varied: int = 3  # of these, the best that are varied
+    variants: int = 4  # of each of them
+    confirmed: int = 2  # of the best, those that every rival is fitted to at a time
+    rounds: int = 3  # of that at most, while another test promises more
+    margin: float = 0.9  # share of each limit that a test may use
 
 
 class TestDesign:
     """
-    The search for the next test.
+    The search for the next test, after the `findings` of the tests so far.
 
-    space : the tests that the machine may run
-    findings : of the tests so far
-    objective : one of `OBJECTIVES`, or `D_OPTIMAL` or `RANDOM` to compare with
-    suspected : for `detect`, ids of effects; empty for all
-    threads : tests at once
-    settings, effort : thresholds, and how much is searched
-    seed : of the tests that are drawn
+    `objective` is one of `OBJECTIVES`, or `D_OPTIMAL` or `RANDOM` to compare with. `suspected` has
+    ids of effects for `detect`, empty for all. `threads` tests are simulated at once.
     """
 
     __test__ = False
@@ -111,11 +95,7 @@ class TestDesign:
             DETECT: self._detected, RANDOM: lambda test: test}[objective]
 
     def run(self, progress: Progress = lambda share, doing: None) -> Proposal:
-        """
-        Search, and return what was found.
-
-        Raises KeyError if the machine's catalogue lacks an effect or a form of a rival.
-        """
+        """Search; KeyError if the catalogue lacks an effect or a form of a rival."""
         effort = self._effort
         drawn = [Candidate(family, self._space.draw(family, self._random), {})
                  for _ in range(effort.drawn) for family in self._space.families]
@@ -134,8 +114,7 @@ class TestDesign:
                 chosen = self._random.permutation(len(allowed))[:1]
                 return self._proposal([allowed[i] for i in chosen], refused, (), len(drawn))
             progress(0.3, 'the best with all tolerances free')
-            judged = self._compared(pool.map(self._judge, of_each_family(
-                allowed, effort.judged)))
+            judged = self._compared(pool.map(self._judge, of_each_family(allowed, effort.judged)))
             progress(0.55, 'variants of the best')
             variants = [replace(test, test=self._space.nearby(test.family, test.test,
                                                               self._random))

@@ -38,8 +38,7 @@ def tooth_torque(twist: float, twist_rate: float, half_gap: float, stiffness: fl
 
 
 @inner
-def steps_for(span: float, stiffness: float, damping: float, inertia: float,
-              load: float) -> int:
+def steps_for(span: float, stiffness: float, damping: float, inertia: float, load: float) -> int:
     """
     Return in how many steps a span has to be integrated for the shaft's own motion.
 

@@ -75,8 +75,7 @@ def drag(friction: Friction, rate: float) -> float:
     """Return the drag per rate at a rate [N m s/rad]."""
     slope = friction.viscous
     if friction.viscous_asymmetry != 0.0:
-        slope *= 1.0 + (friction.viscous_asymmetry if rate >= 0.0
-                        else -friction.viscous_asymmetry)
+        slope *= 1.0 + (friction.viscous_asymmetry if rate >= 0.0 else -friction.viscous_asymmetry)
     if friction.thinning != 0.0:
         # below a thousandth of the rate at which it holds, the drag counts as proportional
         slope *= max(abs(rate) / friction.thinning_rate, 1e-3) ** -friction.thinning

@@ -44,11 +44,9 @@ from simgap.search.single_fits import added, added_at, gone_on, moved, others_th
 
 class Search:
     """
-    The search for the effects that a model lacks.
+    The search for the effects that a model lacks, with `threads` fits at once.
 
-    `progress` is called with the share that is done, 0 to 1, and what is being done. `threads`
-    hypotheses are fitted at once, and those of `earlier`, answers of a verdict on some of the
-    tests, beside all others.
+    `progress` gets the share done and what is being done; answers `earlier` join the others.
     """
 
     def __init__(self, problem: LeastSquares, progress: Callable[[float, str], None],
@@ -131,12 +129,9 @@ class Search:
         return state
 
     def _freed(self, none: Hypothesis, best: Hypothesis) -> Hypothesis | None:
-        """
-        Return the nuisances alone from where the best single effect has ended; None if as before.
-
-        An effect of next to no size may gain much, because its fit went round what held the fit
-        of the nuisances alone. By its curvature the effect itself gains little.
-        """
+        """Return the nuisances from where the best single effect ended; None if as before."""
+        # An effect of next to no size may gain much, because its fit went round what held the fit
+        # of the nuisances alone. By its curvature the effect itself gains little.
         gain = none.cost - best.cost
         own = self.settings.stuck * gain
         if best.has_course or best.loss_without(best.effects[0]) > own:
@@ -216,12 +211,9 @@ class Search:
         return [*leading[:options.bases], *(h.without_jacobian() for h in leading[options.bases:])]
 
     def _led_by_tests(self, none: Hypothesis, known: Collection[str]) -> list[Hypothesis]:
-        """
-        Return the effects that single tests promise, each fitted to its test and then to all.
-
-        A creep in which motors stick holds every fit to all tests in one of its minima, and what
-        it promises there is wrong. Another test alone may still show what is missing.
-        """
+        """Return the effects that tests promise, each fitted to its test and then to all."""
+        # A creep in which motors stick holds every fit to all tests in one of its minima, and what
+        # it promises there is wrong. Another test alone may still show what is missing.
         asked: dict[str, tuple[int, Form]] = {}
         for k in range(len(self.problem.experiments)):
             weight = np.zeros_like(none.state.weight)
@@ -270,12 +262,9 @@ class Search:
         return sorted([*leading, *hypotheses[count:]], key=self._priced)
 
     def _with_relatives(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """
-        Return hypotheses with those whose effects do the same in other places, the best first.
-
-        Each begins with the nuisances of the best and at a size that does as much. From far away
-        its fit may have ended elsewhere, and 'both motors' then lost to one.
-        """
+        """Return hypotheses with the same effects in other places added, the best first."""
+        # Each begins with the nuisances of the best and at a size that does as much. From far away
+        # its fit may have ended elsewhere, and 'both motors' then lost to one.
         best = hypotheses[0]
         return self._with_better(hypotheses, self._pool.map(
             lambda item: moved(self.problem, best, *item),
@@ -284,12 +273,9 @@ class Search:
              if item[0].id not in best.effects]))
 
     def _exchanged(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """
-        Return hypotheses with those that a scan finds in the place of an effect of the best one.
-
-        The nuisances alone were bent by the effect that is missing. With those of the best effect
-        another one may fit better: gravity in place of a steady wind.
-        """
+        """Return hypotheses with those that a scan finds in the place of a best effect."""
+        # The nuisances alone were bent by the effect that is missing. With those of the best
+        # effect another one may fit better: gravity in place of a steady wind.
         best = hypotheses[0]
         if best.has_course:
             return list(hypotheses)

@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-How far the gap shrinks once an effect is added, judged on data whose effect is withheld.
-
-Each test is withheld in turn, see `judge`. What the tests say together is here.
-"""
+"""How far the gap shrinks on withheld data: what all tests, each withheld, say together."""
 
 from __future__ import annotations
 
@@ -33,11 +29,8 @@ def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads:
     """
     Return the gap before and after, on data whose effect is withheld, for the JSON.
 
-    problem : the whole tests
-    none, best, threads : the hypotheses without and with the likeliest effects, and how many tests
-        go at once
-    groups, what : group of each test, withheld together, and its name for people; None if each is
-        its own
+    `groups` has the group of each test, withheld together; None if each is its own. `what` is
+    their name for people.
     """
     single = len(problem.experiments) == 1
     judge = Judge(problem, none, best, groups or [e.name for e in problem.experiments])
@@ -165,12 +158,7 @@ def _after(fold: Withheld) -> FloatArray:
 
 
 def explained_fraction(sums: FloatArray, no_gap: float) -> float:
-    """
-    Return the explained share of the energy above the noise, from -1 to 1.
-
-    `sums` has the energy before, after, and of the noise. Up to a share `no_gap` of the energy
-    there is no gap, and the explained share is 0.
-    """
+    """Return the explained share, -1 to 1, of energy above noise, from (before, after, noise)."""
     before, after, noise = sums
     # with a floor above the energy that is left, more than all would be explained
     gap = before - min(noise, after)

@@ -3,10 +3,9 @@
 """
 What an intervention changes: the numbers of the named effects under each value of a label.
 
-For each label the named effects are fitted once more, with a size of their own under each of its
-values, beside all else that the best hypothesis has. The difference between two values has an
-interval of its own, because the sizes share the nuisances. Withholding by label says whether an
-effect that was learned under one value is there under another.
+For each label the named effects are fitted once more, with a size of their own under each value.
+The difference of two values has an interval of its own, because the sizes share the nuisances.
+Withholding by label says whether an effect learned under one value exists under another.
 """
 
 from __future__ import annotations
@@ -38,12 +37,9 @@ def interventions(problem: LeastSquares, none: Hypothesis, best: Hypothesis,
 
 def simplified(problem: LeastSquares, hypotheses: Sequence[Hypothesis],
                best: Hypothesis) -> tuple[list[Hypothesis], Hypothesis]:
-    """
-    Return hypotheses whose best has sizes by label only for effects that differ between them.
-
-    The search takes an effect's form where others are still missing, and a missing effect that
-    differs makes it look as if this one did.
-    """
+    """Return hypotheses whose best has sizes by label only where these differ."""
+    # The search takes an effect's form where others are still missing, and a missing effect that
+    # differs makes it look as if this one did.
     machine = problem.machine
     if not isinstance(machine, ByLabel):
         return list(hypotheses), best
@@ -134,8 +130,7 @@ def _fitted(problem: LeastSquares, best: Hypothesis, forms: Sequence[Form],
                   *(p for form in forms for p in form.parameters))
     state = problem.start(parameters, {p.name: point[p.name] for p in parameters}, central=True)
     for _ in range(_ROUNDS):
-        state = problem.refreshed(problem.fit(
-            state, problem.settings.search.full_iterations))
+        state = problem.refreshed(problem.fit(state, problem.settings.search.full_iterations))
     return state
 
 

@@ -3,9 +3,8 @@
 """
 Judge effects on a test that is withheld from the fit of their numbers.
 
-Those numbers come from the other tests alone: their fit begins at the model as configured. The
-offsets within the tolerance are no part of the effect. They are fitted to the withheld test, with
-the effect and without.
+The numbers come from the other tests alone, in a fit from the model as configured. Offsets within
+the tolerance are fitted to the withheld test, with the effect and without.
 """
 
 from __future__ import annotations
@@ -29,32 +28,20 @@ from simgap.verdict.intervals import covariance, inflation
 
 @dataclass(frozen=True)
 class Withheld:
-    """
-    A test that was withheld.
+    """A test that was withheld."""
 
-    name : of the test
-    time : shape (n,) [s]
-    gap_before : measured minus predicted without the effects, in the readings' own units, shape
-        (n, c); NaN where nothing is judged
-    before : the same in standard deviations of the noise, whitened
-    gap_after, after : with those effects that can be judged; None if none can
-    judged : ids of these
-    reasons : why the others cannot be judged, by id
-    names, values : numbers of the judged effects
-    drawn : `after` with draws of these numbers, shape (draws, n, c); None if none can be judged
-    """
-
-    name: str
-    time: FloatArray
+    name: str  # of the test
+    time: FloatArray  # shape (n,) [s]
+    # measured minus predicted without effects, as read, shape (n, c); NaN: not judged
     gap_before: FloatArray
-    before: FloatArray
-    gap_after: FloatArray | None = None
-    after: FloatArray | None = None
-    judged: tuple[str, ...] = ()
-    reasons: Mapping[str, str] = field(default_factory=dict)
-    names: tuple[str, ...] = ()
-    values: FloatArray = field(default_factory=lambda: np.zeros(0))
-    drawn: FloatArray | None = None
+    before: FloatArray  # in standard deviations of the noise, whitened
+    gap_after: FloatArray | None = None  # with the effects that can be judged; None if none can
+    after: FloatArray | None = None  # in standard deviations likewise
+    judged: tuple[str, ...] = ()  # ids of these effects
+    reasons: Mapping[str, str] = field(default_factory=dict)  # why others cannot be judged
+    names: tuple[str, ...] = ()  # numbers of the judged effects
+    values: FloatArray = field(default_factory=lambda: np.zeros(0))  # of these numbers
+    drawn: FloatArray | None = None  # `after` with draws of them, shape (draws, n, c)
 
 
 class Judge:
@@ -98,8 +85,7 @@ class Judge:
             problem.start(bare, found.point(), self._without.for_part(part, bare)),
             self._settings.held_out.iterations)
         search = self._settings.search
-        if (unaided.cost < (1.0 + search.doubtful) * found.cost
-                or problem.leaves_much(found)):
+        if (unaided.cost < (1.0 + search.doubtful) * found.cost or problem.leaves_much(found)):
             options = self._settings.held_out
             unaided = settled(problem, unaided, search, options.passes, options.iterations)
             found = self._finished(problem, min(
@@ -138,16 +124,12 @@ class Judge:
         # A fit of everything at once may bend the nuisances to what a ripple does, and stop there.
         own = part.parameters([p for p in self._best.state.parameters if p.name in self._effects])
         point = {**unaided.point(), **self._start}
-        state = problem.start_from(
-            part.parameters(self._nuisances), unaided.jacobian, own, point)
+        state = problem.start_from(part.parameters(self._nuisances), unaided.jacobian, own, point)
         return trained(part, state.parameters, point, [state.jacobian], self._settings)
 
     def _in_local_minimum(self, problem: LeastSquares, found: FitState) -> bool:
-        """
-        Return whether the values of the fit to all tests fit some tests better than `found` does.
-
-        Those values have seen what is withheld. A training fit takes nothing from them.
-        """
+        """Return whether the fit to all tests fits some of them better than `found` does."""
+        # Those values have seen what is withheld. A training fit takes nothing from them.
         of_all = problem.start(found.parameters, self._best.state.point(), found.base_jacobian)
         return of_all.cost < found.cost - self._settings.penalty.parameter
 

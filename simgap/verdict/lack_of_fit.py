@@ -24,8 +24,8 @@ def lack_of_fit(problem: LeastSquares, raw: FloatArray, best: Hypothesis,
     """
     Return what the best hypothesis leaves of the whole tests, after a fit that has converged.
 
-    `raw` has the residuals of the model as configured, shape (n,). `explained` is the upper end of
-    the interval of what the hypothesis explains of withheld data, None without effects.
+    `raw` has the residuals of the model as configured, shape (n,); `explained` is the upper end of
+    the explained share of withheld data, None without effects.
     """
     loudest, fast, fast_left = _fast(problem, raw, best)
     signal, regular = _regular(problem, best.state)
@@ -116,11 +116,7 @@ def _left(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> float:
 
 
 def _fast(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> tuple[str, float, float]:
-    """
-    Return the signal with the loudest fast part, how loud it is, and the share that was there.
-
-    Loudness is a variance over that of the sensor's noise, averaged over the tests.
-    """
+    """Return the signal with the loudest fast part, its variance over noise, and its share."""
     settings = problem.settings.lack_of_fit
     signal, loudest, share = '', 0.0, 1.0
     for c, channel in enumerate(problem.experiments[0].channels):
@@ -131,8 +127,7 @@ def _fast(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> tuple[str
                 continue
             first = raw[problem.rows(k)].reshape(experiment.measured.shape)[:, c]
             # a quantised reading at rest is off by a fraction of a digit, slow or fast
-            loud = (statistics.power if channel in experiment.quantised
-                    else statistics.fast_power)
+            loud = (statistics.power if channel in experiment.quantised else statistics.fast_power)
             pairs.append([loud(z, settings), loud(first, settings)])
         if pairs:
             now, before = np.mean(pairs, axis=0)
@@ -144,11 +139,7 @@ def _fast(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> tuple[str
 
 def remainders(problem: LeastSquares, state: FitState,
                limits: Mapping[str, float]) -> dict[str, dict[str, Any]]:
-    """
-    Return what a hypothesis leaves of each signal, in its own unit, for the JSON.
-
-    For some signals `limits` has the remainder beyond noise from which it matters.
-    """
+    """Return what a hypothesis leaves of each signal, for the JSON; `limits` say what matters."""
     predicted = problem.machine.simulate([state.point()])[0]
     found: dict[str, dict[str, Any]] = {}
     first = problem.experiments[0]
