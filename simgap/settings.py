@@ -3,10 +3,9 @@
 """
 Every threshold of the diagnosis: its unit, what it decides, and the trial that set it.
 
-`Settings()` is what a diagnosis uses unless it is given another record. `lab thresholds` prints
-the table and says what halving and doubling a threshold does to the score of a trial. Trials are
-listed in lab/notebook/history.md. 'Practice cases' are those before the first sealed trial;
-'design' means that the value was chosen without any.
+`lab thresholds` prints the table and the effect of halving and doubling each. Trials are in
+lab/notebook/history.md. 'Practice cases' came before the first sealed trial; 'design' means
+without any.
 """
 
 from __future__ import annotations
@@ -365,11 +364,7 @@ class Settings:
                 yield f'{group.name}.{item.name}', item, getattr(values, item.name)
 
     def changed(self, name: str, value: Any) -> Settings:
-        """
-        Return the settings with one threshold changed.
-
-        Raises KeyError if there is no threshold of that name.
-        """
+        """Return the settings with one threshold changed; KeyError if there is none."""
         if name not in {known for known, _, _ in self.entries()}:
             raise KeyError(name)
         group, _, key = name.partition('.')

@@ -19,8 +19,7 @@ class BoxQuadratic:
     """
     A quadratic programme within bounds, for one gradient or several.
 
-    hessian : symmetric and positive semidefinite, shape (m, m)
-    low, high : bounds of the step, low <= 0 <= high, shape (m,)
+    `hessian` is symmetric and positive semidefinite, shape (m, m); low <= 0 <= high, shape (m,).
     """
 
     def __init__(self, hessian: FloatArray, low: FloatArray, high: FloatArray) -> None:
@@ -37,8 +36,7 @@ class BoxQuadratic:
         """
         Return the step d within bounds that maximises gradient d - d hessian d / 2, shape (m,).
 
-        The search begins with what `near` leaves free, the step of a similar gradient: that takes
-        a few factors where dozens are needed without it.
+        The search begins with what `near`, the step of a similar gradient, leaves free.
         """
         hessian, low, high, scale = self._hessian, self._low, self._high, self._scale
         if near is None:

@@ -31,11 +31,9 @@ class LeastSquares:
     """
     The residuals of a machine in its experiments.
 
-    machine : what is fitted
     used : for each experiment the samples that are fitted, shape (n,) of bool; None for all
-    scale : factor of the expected noise; while the model lacks something strong, the misfit counts
-        as noise, so that the nuisances are not bent to imitate it
-    settings : thresholds
+    scale : factor of the expected noise, above 1 while something strong is missing, so that the
+        nuisances are not bent to imitate it
     """
 
     def __init__(self, machine: Machine, used: Sequence[NDArray[np.bool_]] | None = None,
@@ -143,8 +141,8 @@ class LeastSquares:
         """
         Return the derivative of the prediction at a point by difference quotients, shape (n, m).
 
-        `residual` is that at the point, for one-sided differences; `central` takes central ones
-        where the bounds leave room. `steps` has the steps, by name, that are not the usual ones.
+        `residual`, at the point, serves one-sided differences; `central` takes central ones where
+        the bounds leave room. `steps` has unusual steps by name.
         """
         variants, only, plan = [], [], []
         sizes = [steps.get(item.name, item.step) for item in parameters]
@@ -201,13 +199,9 @@ class LeastSquares:
         return self.start((*known, *others), point, np.column_stack([columns, fresh]))
 
     def refreshed(self, state: FitState) -> FitState:
-        """
-        Return the state with a fresh Jacobian and fresh weights.
-
-        Where sticking and slipping bend the prediction, a difference quotient over many standard
-        deviations is not a derivative. The data that have been fitted show how small a step may
-        be.
-        """
+        """Return the state with a fresh Jacobian and fresh weights."""
+        # Where sticking and slipping bend the prediction, a difference quotient over many standard
+        # deviations is not a derivative. The fitted data show how small a step may be.
         jacobian = self.jacobian(state.point(), state.parameters, state.residual, False,
                                  self.local_steps(state))
         return self._state(state.parameters, state.x, state.residual, jacobian,

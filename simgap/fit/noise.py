@@ -3,12 +3,12 @@
 """
 The noise of a channel as a recording shows it: its level and its colour.
 
-A test sheet tells a level, and means white noise. Real noise is louder or quieter and partly slow,
-and no model is its machine to the last digit. Both are described by one process: white noise plus
-a part behind a first-order low-pass. Its two levels and its corner are estimated from a residual
-by the prediction error method (L. Ljung, System Identification, 2nd edition, chapter 7), within
-bounds: what is beyond them is not noise. The innovations of the process are white. Fits and tests
-use them, so that a slow residual counts once and not with each of its samples.
+Real noise is louder or quieter than a test sheet says and partly slow, and no model is exact. Both
+are described as white noise plus a part behind a first-order low-pass. The two levels and the
+corner are estimated from a residual by the prediction error method (L. Ljung, System
+Identification, 2nd edition, chapter 7), within bounds: what is beyond them is not noise. Fits and
+tests use the innovations, which are white, so that a slow residual counts once and not with each
+of its samples.
 """
 
 from __future__ import annotations
@@ -53,11 +53,7 @@ class Process:
 
 
 def whitened(z: FloatArray, colour: Colour) -> FloatArray:
-    """
-    Return the innovations of a residual at even times, shape (n,), with variance 1.
-
-    It is NaN where there is none.
-    """
+    """Return the innovations of a residual at even times, shape (n,), with variance 1, or NaN."""
     found = np.full(z.size, np.nan)
     there = np.isfinite(z)
     if there.all():
@@ -81,8 +77,7 @@ def estimated(residuals: Sequence[FloatArray], interval_s: float, slow_limit: fl
     Return the noise process of a channel from the residuals of each experiment.
 
     These are in standard deviations of the stated noise, shape (n,), NaN where there is none, at
-    an interval [s]. The slow part may have the variance `slow_limit`: more is neither noise nor a
-    model's error.
+    an interval [s]. The slow part has the variance `slow_limit` at most: more is not noise.
     """
     usable = [z for z in residuals if np.isfinite(z).sum() >= settings.least_samples]
     if not usable:
@@ -111,8 +106,7 @@ def with_estimated_noise(experiments: Sequence[Experiment], residuals: Sequence[
     """
     Return experiments whose noise is as loud and as coloured as a residual shows.
 
-    They come with the noise that their sensors should have. The residuals are measured minus
-    predicted by the best hypothesis, shape (n, c) each.
+    The residuals are measured minus predicted by the best hypothesis, shape (n, c) each.
     """
     colours: list[Colour] = []
     for c, channel in enumerate(experiments[0].channels):
@@ -132,8 +126,7 @@ def found_noise(experiments: Sequence[Experiment]) -> dict[str, dict[str, float]
     """
     Return the noise that a diagnosis has found, by signal, for the JSON.
 
-    Each has the variances `white` and `slow`, in variances of the stated noise, and `corner_hz` of
-    the slow part, 0 if there is none.
+    `white` and `slow` are in variances of the stated noise, `corner_hz` is of the slow part or 0.
     """
     first = experiments[0]
     interval = float(np.median(np.diff(first.time)))
@@ -149,11 +142,7 @@ def found_noise(experiments: Sequence[Experiment]) -> dict[str, dict[str, float]
 
 def with_found_noise(experiments: Sequence[Experiment],
                      found: Mapping[str, Mapping[str, float]]) -> tuple[Experiment, ...]:
-    """
-    Return planned experiments with the noise that other ones have shown, see `found_noise`.
-
-    A signal that was not found has the noise that it should have.
-    """
+    """Return planned experiments with the noise of `found_noise`, or that which is stated."""
     def colour(channel: str, interval: float) -> Colour:
         if channel not in found:
             return Colour()

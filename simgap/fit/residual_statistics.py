@@ -76,8 +76,7 @@ def dependences(channels: Sequence[str], covariates: Sequence[Mapping[str, Float
     """
     Return what the residuals of the signals depend on, the strongest first.
 
-    Each experiment has covariates by name, shape (n,) each, and residuals in standard deviations,
-    shape (n, c).
+    Each experiment has covariates by name, shape (n,), and residuals in deviations, shape (n, c).
     """
     found = []
     for c, channel in enumerate(channels):

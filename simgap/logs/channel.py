@@ -3,8 +3,7 @@
 """
 The samples of one signal, each with its own time stamp.
 
-Time is kept in whole nanoseconds, as in ROS 2 and MCAP, so that stamps survive every file format
-exactly and equal stamps compare equal.
+Time is in whole nanoseconds, as in ROS 2 and MCAP: stamps survive every file format exactly.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ def nanoseconds(seconds: ArrayLike) -> Any:
     """
     Return seconds as whole nanoseconds, rounded to the nearest.
 
-    Raises RecordingError if not finite, or beyond the 292 years that 64 bits hold.
+    Raises RecordingError if one is not finite, or beyond the 292 years that 64 bits hold.
     """
     scaled = np.asarray(seconds, dtype=np.float64)
     # whole seconds and the rest apart: one product would lose bits of long stamps
@@ -65,14 +64,11 @@ def _frozen(array: ArrayLike, dtype: Any) -> Any:
 @dataclass(frozen=True, eq=False)
 class Channel:
     """
-    The samples of one signal.
+    The samples of one signal; RecordingError if they are not as below.
 
     unit : SI unit; '' if unknown
     time_ns : array of shape (n,), int64 [ns]; strictly increasing, spacing as uneven as it was
     values : array of shape (n,), float64 [unit]; finite: where there is no sample there is none
-
-    Raises RecordingError if the shapes differ, a time stamp is not later than the one before, or a
-    value is not finite.
     """
 
     unit: str
@@ -131,13 +127,9 @@ class Channel:
 
     def at(self, time_ns: IntArray, method: Method = 'linear') -> FloatArray:
         """
-        Return the values at other times; see METHODS for what each method does.
+        Return the values [unit] at other times `time_ns` [ns], shape (m,), by one of METHODS.
 
-        time_ns : array of shape (m,), int64 [ns]; inside the span of the samples
-        method : one of METHODS
-
-        Returns array of shape (m,) [unit]. Raises RecordingError if no such method, or a time
-        outside the span: nothing is extrapolated.
+        Raises RecordingError if there is no such method, or at a time outside the samples.
         """
         if method not in METHODS:
             raise RecordingError(f'no method {method!r}: choose one of {", ".join(METHODS)}')
@@ -160,11 +152,7 @@ class Channel:
 
 
 def check_name(name: str) -> None:
-    """
-    Check that a name can be a ROS 2 topic: words, perhaps with slashes between them.
-
-    Raises RecordingError if it cannot.
-    """
+    """Raise RecordingError if a name cannot be a ROS 2 topic: words, slashes between them."""
     parts = name.split('/') if isinstance(name, str) else []
     if not parts or not all(part.isascii() and part.isidentifier() for part in parts):
         raise RecordingError(f'{one_line(repr(name))}: no name of a signal, such as '
@@ -172,11 +160,7 @@ def check_name(name: str) -> None:
 
 
 def make_channel(name: str, unit: str, time_ns: ArrayLike, values: ArrayLike) -> Channel:
-    """
-    Make a channel, and name the signal when its samples are refused.
-
-    Raises RecordingError if see Channel; the message begins with `name`.
-    """
+    """Make a channel; RecordingError, as of Channel, begins with its name."""
     try:
         return Channel(unit, time_ns, values)  # type: ignore[arg-type]
     except (RecordingError, TypeError, ValueError) as error:

@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-A map from somebody else's file to signals: columns, units, signs, clocks.
-
-docs/recording.md describes the map's entries with an example.
-"""
+"""A map from somebody else's file to signals, see docs/recording.md: columns, units, clocks."""
 
 from __future__ import annotations
 
@@ -77,12 +73,10 @@ class TimeMap:
 @dataclass(frozen=True)
 class SignalMap:
     """
-    How one signal is written: SI value = factor * (sign * scale * number + offset).
+    How one signal is written: SI value = factor * (gain * number + offset), gain = sign * scale.
 
     number : the columns, and the number that they give
-    unit : SI unit of the signal
-    factor : SI units in the unit of the column
-    gain : sign * scale
+    unit, factor : SI unit of the signal, and SI units in the unit of the column
     offset : in the unit of the column
     time_column : column of this signal's own time stamps; None for the common one
     clock_offset_ns : added to this signal's time stamps [ns]
@@ -111,13 +105,7 @@ class ImportMap:
 
 @dataclass(frozen=True)
 class KnownSignals:
-    """
-    Signals that a program knows already, before it reads a map.
-
-    owner : who has them, for messages
-    units : their SI units by name
-    aliases : other names by which a map may call them
-    """
+    """Signals that the program `owner` knows before a map: SI units by name, and aliases."""
 
     owner: str = ''
     units: Mapping[str, str] = field(default_factory=dict)
@@ -129,10 +117,7 @@ NO_SIGNALS = KnownSignals()
 
 def load_map(path: str | Path, known: KnownSignals = NO_SIGNALS) -> ImportMap:
     """
-    Read a map.
-
-    path : of the map
-    known : signals whose units need not be stated
+    Read a map; the units of known signals need not be stated.
 
     Raises ParameterError if the file cannot be read or an entry is not allowed; one line names the
     file, the key and what is allowed.
@@ -146,12 +131,7 @@ def load_map(path: str | Path, known: KnownSignals = NO_SIGNALS) -> ImportMap:
 
 
 def parse_map(tree: object, known: KnownSignals = NO_SIGNALS) -> ImportMap:
-    """
-    Check the plain data of a map; parameters as in `load_map`.
-
-    Raises ParameterError if an entry is missing, unknown or not allowed; the message names the
-    key.
-    """
+    """Check the plain data of a map, as `load_map`; ParameterError names a wrong key."""
     top = mapping_of('the map', tree, _TOP)
     texts = {key: _text(key, top[key]) for key in _TEXT_ENTRIES if key in top}
     for key, allowed in (('delimiter', ',;\t| '), ('decimal', '.,')):

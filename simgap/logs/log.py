@@ -36,11 +36,9 @@ class Log:
     """
     What was recorded in one test.
 
-    name : for people
     time : of the samples, rising, shape (n,) [s]
     columns : shape (n,) each, as recorded; NaN where there is no sample
-    constants : what the tester knows of this test, such as a mass
-    labels : what was different in this test, such as load: A
+    constants, labels : what the tester knows, such as a mass, and what was different: load: A
     """
 
     name: str
@@ -51,11 +49,7 @@ class Log:
     _held: dict[str, FloatArray] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
-        """
-        Make the samples arrays of numbers.
-
-        Raises LogError if the time does not rise, or a column has another number of samples.
-        """
+        """Make arrays; LogError if the time does not rise or a column differs in length."""
         time = np.array(self.time, float)
         if time.ndim != 1 or time.size < _LEAST_SAMPLES or not np.all(np.diff(time) > 0.0):
             raise LogError(f'{self.name}: time: two or more increasing times are needed')
@@ -69,11 +63,7 @@ class Log:
         object.__setattr__(self, '_held', {name: _held(v) for name, v in columns.items()})
 
     def __getitem__(self, column: str) -> FloatArray:
-        """
-        Return a column, shape (n,); where it has no sample, the last one before holds.
-
-        Raises LogError if there is no such column.
-        """
+        """Return a column, shape (n,), the last sample held; LogError if there is none."""
         try:
             return self._held[column]
         except KeyError:
@@ -128,12 +118,10 @@ def read_log(path: str | Path, import_map: ImportMap | None = None) -> Log:
     """
     Read a log, and NAME.yaml beside it if it is there: constants and labels of the test.
 
-    path : a file of any kind that `recording.tables` knows; without a map its columns keep their
-        names, and time_s, time or t is the time
+    path : a file of any kind that `tables` knows; without a map, time_s, time or t is the time
     import_map : which column is which, and how it is written
 
-    Raises LogError, RecordingError if a cell, a row or a column cannot be read; one line says
-    where.
+    Raises LogError or RecordingError, in one line, if a cell, a row or a column cannot be read.
     """
     path = Path(path)
     time, columns = _mapped(path, import_map) if import_map else _plain(path)
@@ -145,12 +133,7 @@ def read_log(path: str | Path, import_map: ImportMap | None = None) -> Log:
 
 
 def read_logs(paths: Sequence[str | Path], map_path: str | Path | None = None) -> list[Log]:
-    """
-    Read several files with one map.
-
-    Raises LogError, RecordingError, ParameterError if as `read_log` and `load_map`; two files of
-    one name.
-    """
+    """Read several files with one map; errors of `read_log` and `load_map`, or of equal names."""
     import_map = load_map(map_path) if map_path else None
     logs = [read_log(path, import_map) for path in paths]
     names = [log.name for log in logs]

@@ -3,10 +3,9 @@
 """
 MATLAB's .mat files, up to version 7: the variables that are plain real numbers.
 
-scipy reads them. It takes the type that a file states for the numbers of a variable as an index
-into a table of 20 pointers, without a look: in a damaged file that is a crash of the process
-(scipy pull request 25829). So the types are looked at first. Format: The MathWorks, 'MAT-File
-Format', level 5.
+scipy takes a number's type in a file as an index into a table of 20 pointers, without a look: a
+damaged file crashes the process (scipy pull request 25829). So the types are looked at first.
+Format: The MathWorks, 'MAT-File Format', level 5.
 """
 
 from __future__ import annotations
@@ -36,13 +35,10 @@ _NAMELESS = '__function_workspace__'
 
 def read_mat(path: Path) -> dict[str, Any]:
     """
-    Return the variables of a file that are plain real numbers.
+    Return a .mat file's plain real variables, as arrays of two axes or more, as in MATLAB.
 
-    path : a .mat file, version 4 to 7
-
-    Returns names with arrays, shape as in MATLAB: at least two axes. Raises RecordingError if if
-    it is of version 7.3, or has more numbers than `antenna_drive.limits` allows. Raises
-    ValueError, or another error of scipy's if if it is damaged.
+    Raises RecordingError if it is of version 7.3 or has more numbers than allowed, ValueError or
+    another error of scipy's if it is damaged.
     """
     from scipy.io import loadmat, whosmat
     from scipy.io.matlab import matfile_version, MatReadError

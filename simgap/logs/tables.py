@@ -3,9 +3,8 @@
 """
 Tables as they come: text, .npy, .npz, .mat, JSON, JSON lines and Parquet, as rows of cells.
 
-Each kind becomes the same: names of columns, and rows whose cells are texts, empty where there is
-no sample, or vectors of texts. A number becomes the shortest text that is read back to its last
-bit, so a file means the same whatever its kind.
+Cells are texts, empty without a sample, or vectors of texts. A number becomes the shortest text
+that is read back to its last bit, so a file means the same whatever its kind.
 """
 
 from __future__ import annotations
@@ -44,7 +43,6 @@ class Layout:
 
     delimiter, decimal : between cells, and in numbers
     comment : rows that begin with it are left out; '' for none
-    encoding : of the text
     skip_lines : lines before the header
     header : False if the columns have no names
     """
@@ -62,12 +60,10 @@ class Table:
     """
     An open file.
 
-    names : of the columns; empty texts where they have none
-    rows : the rows, each with the number of its line
-    start : where the names stand, for errors
-    counted : what the number of a row counts
+    names, rows : of the columns, empty without names; rows, each with the number of its line
+    start, counted : where the names stand, and what a row's number counts, for errors
     lengths : of columns that need not be equally long, by name
-    is_text : whether a cell that is no number is a mistake, and no column of another kind
+    is_text : whether a cell that is not a number is a mistake
     """
 
     names: Sequence[str]
@@ -81,10 +77,9 @@ class Table:
 @contextmanager
 def open_table(path: Path, layout: Layout = Layout()) -> Iterator[Table]:
     """
-    Open a file of any kind, told by its suffix; what is no array, JSON or Parquet is text.
+    Open a file by its suffix; what is not array, JSON or Parquet is text.
 
-    Raises RecordingError if it cannot be opened, is not what its suffix says, or is larger than
-    allowed.
+    Raises RecordingError if it cannot be opened, is not what its suffix says, or is too large.
     """
     reader = _READERS.get(path.suffix.lower())
     if reader is None:

@@ -37,11 +37,7 @@ class Cell(NamedTuple):
 
 
 def parse_number(text: str, cell: Cell) -> float:
-    """
-    Read one number.
-
-    Raises RecordingError if no finite number; the message names file, line and column.
-    """
+    """Read one finite number; RecordingError names file, line and column."""
     if not _NUMBER.fullmatch(text):
         raise cell.refuse(f'{one_line(repr(text), 40)} is no number; leave the cell empty where '
                           'there is no sample')
@@ -53,13 +49,9 @@ def parse_number(text: str, cell: Cell) -> float:
 
 def parse_nanoseconds(text: str, cell: Cell, per_unit: int = NANOSECONDS) -> int:
     """
-    Read a time stamp, exact up to the nanosecond that it is rounded to.
+    Read a decimal time stamp, rounded to the nanosecond, by default from seconds.
 
-    text : decimal number
-    cell : where it stands
-    per_unit : nanoseconds in the unit of the number; seconds if not given
-
-    Raises RecordingError if no number, or beyond 9.2e9 s; the message names file, line and column.
+    Raises RecordingError if it is not a number, or beyond 9.2e9 s; it names file, line and column.
     """
     value = parse_number(text, cell)
     if abs(value) * per_unit > _LATEST_S * NANOSECONDS:
@@ -79,7 +71,7 @@ def rows(path: Path, stream: TextIO, delimiter: str = ',') -> Iterator[tuple[int
     Yield the rows of a CSV file with the number of the line that each ends on.
 
     Empty lines are left out. Warns if the last line is not ended: it may have been cut. Raises
-    RecordingError if no CSV, no text or too long a line; the message names file and line.
+    RecordingError, with file and line, if it is not CSV or text, or a line is too long.
     """
     last = ''
 
@@ -121,11 +113,7 @@ def open_text(path: Path, encoding: str = 'utf-8-sig') -> TextIO:
 
 
 def read_text(path: Path) -> bytes:
-    """
-    Read a file of text that lies beside a recording.
-
-    Raises OSError if it cannot be read. Raises RecordingError if it is longer than allowed.
-    """
+    """Read a file of text; OSError, or RecordingError if it is longer than allowed."""
     most = TEXT.value()
     with path.open('rb') as file:
         text = file.read(most + 1)

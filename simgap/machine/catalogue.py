@@ -13,11 +13,7 @@ from simgap.machine.experiment import Experiment
 
 
 class Catalogue(dict[str, Effect]):
-    """
-    Effects by id.
-
-    effects : in the order in which they are tried
-    """
+    """Effects by id, in the order in which they are tried."""
 
     def __init__(self, effects: Iterable[Effect] = ()) -> None:
         super().__init__({effect.id: effect for effect in effects})
@@ -40,11 +36,7 @@ class Catalogue(dict[str, Effect]):
 
     def forms(self, effect: Effect, experiments: Sequence[Experiment],
               residuals: Sequence[FloatArray]) -> Sequence[Form]:
-        """
-        Return the forms of an effect that are worth a fit.
-
-        The residuals of each experiment are measured minus predicted without the effect, (n, c).
-        """
+        """Return the forms of an effect worth a fit; residuals are measured minus predicted."""
         return effect.forms
 
     def typical_form(self, effect: Effect) -> Form:
@@ -52,11 +44,7 @@ class Catalogue(dict[str, Effect]):
         return effect.forms[0]
 
     def form_named(self, effect: Effect, name: str) -> Form:
-        """
-        Return the form of an effect by its name.
-
-        Raises KeyError if the effect has no such form.
-        """
+        """Return the form of an effect by its name; KeyError if there is no such form."""
         for form in effect.forms:
             if form.name == name:
                 return form

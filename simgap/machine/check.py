@@ -21,11 +21,7 @@ class MachineError(UserError):
 
 
 def check_machine(machine: Machine) -> None:
-    """
-    Check what a machine declares, and what it predicts without any effect.
-
-    Raises MachineError if something is missing or wrong.
-    """
+    """Check what a machine declares and predicts; MachineError if something is wrong."""
     if not machine.experiments:
         raise MachineError('experiments: there is none')
     for k, experiment in enumerate(machine.experiments):
@@ -51,8 +47,8 @@ def idle_effects(machine: Machine) -> Iterator[str]:
     """
     Yield what is wrong with effects in these experiments, an effect a line.
 
-    Each effect is simulated: one that changes no reading at half of its bounds cannot be found,
-    and one that changes a reading while its size is zero is not neutral.
+    One that changes no reading at half of its bounds cannot be found; one that changes a reading
+    while its size is zero is not neutral.
     """
     neutral = machine.simulate([{}])[0]
     for effect in machine.catalogue.values():

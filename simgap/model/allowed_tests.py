@@ -19,12 +19,7 @@ import yaml
 
 
 class OwnTests(TestSpace):
-    """
-    The tests that a model of one's own declares.
-
-    model : with its `tests` and `limits`
-    duration_s : of a test [s]
-    """
+    """The tests of `duration_s` [s] that a model of one's own declares, within its limits."""
 
     def __init__(self, model: Model, duration_s: float) -> None:
         """Take the model."""

@@ -29,12 +29,7 @@ _RUNS = 6000
 
 @dataclass(frozen=True)
 class Checked:
-    """
-    What a check found.
-
-    faults : what has to be mended, a line each
-    remarks : what should be known, a line each
-    """
+    """What a check found: faults that have to be mended, and remarks, a line each."""
 
     faults: Sequence[str]
     remarks: Sequence[str]

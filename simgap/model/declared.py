@@ -35,9 +35,8 @@ class Number:
     """
     A number of the simulation.
 
-    value : as configured
+    value, unit : as configured
     low, high : bounds; equal to the value for a known number
-    unit : of the value
     step : of the difference quotient, which then never steps over less; 0 for one that is chosen
     sigma : standard deviation about the value; 0 if nothing is known but the bounds
     is_shape : True for a number of an effect that means nothing while the effect is absent
@@ -69,13 +68,10 @@ class Reading:
     """
     A reading of a sensor, which the simulation predicts.
 
-    unit : of the reading
-    noise : standard deviation of the sensor's white noise; at least that of its digit
+    noise, digit : standard deviation of white noise; smallest step, 0 for none
     model_error : slow error that a right model may have; None for 0.3 percent of the motion
-    digit : smallest step of the sensor; 0 for none
     column : of the logs; empty for the reading's own name
-    zero : how far the sensor's zero may be off, in each test
-    gain : share by which its scale may be off
+    zero, gain : how far the zero may be off in each test, and by which share the scale
     """
 
     unit: str
@@ -97,10 +93,8 @@ class Push:
     """
     A place where something unknown may enter, such as a force on a carriage.
 
-    component : part of the machine
-    label : for people
-    unit : of what enters
-    size : what moves the machine a little, well above the noise and far from any limit
+    component, label : part of the machine; for people
+    unit, size : of what enters; what moves the machine a little, well above noise, below limits
     """
 
     component: str
@@ -122,10 +116,8 @@ class Ripple:
     """
     A wave by an angle, whose order is given or found.
 
-    stem : its numbers are stem_cosine, stem_sine and stem_order, and of harmonic k stem_cosine_k
-        and stem_sine_k
+    stem : of stem_cosine, stem_sine and stem_order; harmonic k has stem_cosine_k and stem_sine_k
     amplitude : bounds of each amplitude
-    angle : that it follows
     orders : cycles per revolution that are tried; empty to find them
     harmonics : how many the wave has, its fundamental counted
     """
@@ -153,12 +145,9 @@ class OwnEffect:
     """
     Something that the model may lack.
 
-    name : 'component.effect'
-    cause : its physical cause, one sentence
-    look : what it looks like in the readings, one sentence
-    forms : alternatives; the best one counts
-    ripple : set in the place of forms for a wave by an angle
-    simpler : name of the effect that it becomes at an end of its range; empty if there is none
+    name, simpler : 'component.effect', and what it becomes at an end of its range or ''
+    cause, look : its physical cause, and what the readings show, one sentence each
+    forms, ripple : alternatives of which the best counts, or a wave by an angle
     """
 
     name: str
@@ -180,23 +169,19 @@ class Model:
     A simulation, and what may differ from it; with the logs of its tests it becomes a machine.
 
     simulate : f(numbers, test) -> {reading: shape (n,)}. `numbers.name` is a number; `test.time`
-        [s] and `test['column']` are arrays of shape (n,), `test.push['name']` is what enters
-        there. A test may be shorter than its log, because a search looks at its beginning first
+        [s], `test['column']` and `test.push['name']`, what enters there, have shape (n,). A test
+        may be shorter than its log, because a search looks at its beginning first
     base : numbers of the model by name: `known`, `within` or `free`
-    readings : by name: `reading`
+    readings, push : by name: `reading`, and places where something unknown may enter: `push`
     effects : what the model may lack: `effect` or `ripple`
     per_test : numbers that each test has of its own, such as where it starts
-    push : places where something unknown may enter: `push` by name
-    settles_s : time in which the machine settles after a push [s]; None for 5 percent of the
-        longest test
+    settles_s : time to settle after a push [s]; None for 5 percent of the longest test
     judged_hz : samples per second that are compared; None for at most 3000 samples of a test
     blocks : the components in the order in which the signal passes them, for the picture
     advice : tests that settle what is open, a sentence each
     parallel : True if `simulate` may run in several threads at once, as compiled functions may
-    log : makes of a log as it was read the log that the simulation wants, e.g. with further
-        columns
-    tests : what a further test may be, by kind: f(duration_s, random) -> a log with its commands
-        and without readings, drawn with `random`, a numpy Generator
+    log : makes of a log as it was read the one that the simulation wants
+    tests : by kind: f(duration_s, random), with a numpy Generator -> a log with its commands
     limits : greatest size that a reading may have in such a test, by reading
 
     Raises ModelError if a name is there twice, or an entry is not what it should be.

@@ -3,9 +3,9 @@
 """
 The diagnosis of a machine of one's own.
 
-Examples -------- >>> from simgap.model import diagnose_logs, load_model, read_log # doctest: +SKIP
->>> found = diagnose_logs(load_model('my_machine.py'), [read_log('a.csv')]) # doctest: +SKIP >>>
-print(found.summary()) # doctest: +SKIP
+>>> from simgap.model import diagnose_logs, load_model, read_log  # doctest: +SKIP
+>>> found = diagnose_logs(load_model('my_machine.py'), [read_log('a.csv')])     # doctest: +SKIP
+>>> print(found.summary())                                                      # doctest: +SKIP
 """
 
 from __future__ import annotations
@@ -42,19 +42,15 @@ def diagnose_logs(model: Model, logs: Sequence[Log],
     """
     Say where a machine and its model part, which effect is behind it, and how far it goes.
 
-    model : of the machine
-    logs : of its tests
     progress : called with the share that is done, 0 to 1, and what is being done
     threads : how many hypotheses are fitted at once
-    settings : thresholds
     without : effects that the catalogue shall lack
     limits : for some readings, the remainder beyond noise from which it matters
     earlier : answers of a verdict on some of the logs, see `diagnosis.diagnose`
 
-    Returns the diagnosis. Its result has two more entries than docs/diagnosis.md lists: `numbers`,
-    the simulation's numbers as fitted, and, where something enters that no effect names, `pushes`:
-    test, place, from_s, until_s, size and unit of each push. Raises UserError if model or logs
-    cannot be used; the message says what is wrong.
+    The result has two more entries than docs/diagnosis.md lists: `numbers` as fitted and, where
+    something enters that no effect names, `pushes`: test, place, from_s, until_s, size and unit of
+    each. Raises UserError if model or logs cannot be used; the message says what is wrong.
     """
     machine = OwnMachine(model, logs)
     for effect in without:

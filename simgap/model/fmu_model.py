@@ -3,8 +3,8 @@
 """
 An FMU for co-simulation (FMI 2 or 3) as the simulation of a machine.
 
-A place, an input and an output are variables of its modelDescription.xml by their names. A step
-calls the FMU's own functions with addresses of arrays, without a wrapper between.
+Ports are names in its modelDescription.xml. A step calls the FMU's own functions with addresses of
+arrays, without a wrapper between.
 """
 
 from __future__ import annotations
@@ -40,12 +40,9 @@ _Step = Callable[[float, float], bool]
 
 class FmuModel:
     """
-    A simulation with an FMU; see `Simulator`.
+    A simulation with an .fmu file; see `Simulator`.
 
-    path : of the .fmu file
-    ports : names of its variables
-
-    Raises ModelError if the file cannot be read or instantiated, or has no such variable.
+    Raises ModelError if the file cannot be read or instantiated, or lacks a variable.
     """
 
     parallel = False

@@ -3,8 +3,8 @@
 """
 A model file: a few lines of YAML make a machine of a MuJoCo model or an FMU.
 
-The entries are those of `declaration.machine`. Each number also says what it does in the
-simulation program: it changes a parameter, or delays an input (docs/own-machine.md).
+The entries are those of `declaration.machine`. Each number also changes a parameter of the
+simulation, or delays an input (docs/own-machine.md).
 """
 
 from __future__ import annotations
@@ -42,15 +42,7 @@ _SAME = 1e-6
 
 @dataclass(frozen=True)
 class _Action:
-    """
-    What a number does to a place or an input.
-
-    key : the entry that says it
-    number : its name
-    act : one of _ACTS
-    target : place or input
-    factor : of the number
-    """
+    """What a number does, by a factor, to a place or an input: one of _ACTS."""
 
     key: str
     number: str
@@ -63,8 +55,8 @@ def load_model_file(path: Path) -> Model:
     """
     Return the model that a YAML file describes.
 
-    Raises ModelError if the file or the model that it names cannot be used; one line names file
-    and entry. Raises ModuleNotFoundError if mujoco or fmpy is not installed.
+    Raises ModelError, in a line with file and entry, if the file or its model cannot be used, and
+    ModuleNotFoundError if mujoco or fmpy is not installed.
     """
     try:
         return _model(path, mapping_of('', read_yaml(path), _TOP))

@@ -11,11 +11,7 @@ from simgap.model.declared import ModelError
 
 
 class Numbers(Mapping[str, float]):
-    """
-    Numbers of a simulation as attributes; it remembers which were asked for.
-
-    asked_for : names that the simulation has read
-    """
+    """Numbers of a simulation as attributes; `asked_for` has those it has read."""
 
     def __init__(self, values: Mapping[str, float]) -> None:
         """Take the values by name."""

@@ -24,10 +24,7 @@ def likely_orders(experiments: Sequence[Experiment], residuals: Sequence[FloatAr
     """
     Return the orders that stand out most, half of them by their peak and half by their energy.
 
-    experiments : the tests
-    residuals : of each, shape (n, c) in the readings' units
-    angles : that the wave follows in each, shape (n,) [rad]
-    count : how many
+    `residuals` have shape (n, c) in the readings' units, `angles` shape (n,) [rad] in each test.
     """
     orders = np.arange(_STEP, _GREATEST + _STEP, _STEP)
     energy = np.zeros(orders.size)

@@ -61,8 +61,8 @@ def derivative_error(machine: OwnMachine) -> float:
     """
     Return the share of a derivative of the readings that may be wrong, by the worst number.
 
-    It is how much a difference quotient changes where its step is doubled: next to nothing where a
-    simulation is smooth, and much where it sticks and slips.
+    It is the change of a difference quotient where its step is doubled: small in a smooth
+    simulation, and large where it sticks and slips.
     """
     places: list[tuple[Parameter, Point]] = [(parameter, {}) for parameter in machine.nuisances]
     places += [(parameter, where_it_acts(form, parameter))

@@ -17,9 +17,7 @@ class Ports:
     Names in a simulation program, each with the entry of the model file that gives it.
 
     places : parameters and initial states that are written before a run
-    inputs : what the log feeds in
-    pushes : where something unknown may enter
-    outputs : what is read
+    inputs, pushes, outputs : what the log feeds in, what may enter unknown, and what is read
     """
 
     places: Mapping[str, str]
@@ -44,13 +42,9 @@ class Simulator(Protocol):
     def run(self, values: FloatArray, start_s: float, step_s: float,
             inputs: FloatArray) -> FloatArray:
         """
-        Simulate from the start, with each input held during a step.
+        Return the outputs as each step begins, shape (n, outputs); NaN from a failure on.
 
         values : of the places, in their order; NaN leaves a place as it is
-        start_s : time of the first row
-        step_s : time from row to row
-        inputs : inputs, then pushes, shape (n, inputs + pushes)
-
-        Returns the outputs at the beginning of each step, shape (n, outputs); NaN from a failure
-        on.
+        start_s, step_s : time of the first row, and from row to row [s]
+        inputs : inputs, then pushes, held in a step, shape (n, inputs + pushes)
         """

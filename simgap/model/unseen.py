@@ -3,8 +3,8 @@
 """
 The proof of a diagnosis: a log that it never saw, predicted without fitting anything to it.
 
-A diagnosis weighs whitened residuals, in which a slow error counts little. A free run is judged by
-its rms, so the numbers are fitted once more to the diagnosed logs, by plain least squares.
+A free run is judged by its rms, in which a slow error counts, unlike in whitened residuals. So the
+numbers are fitted once more to the diagnosed logs, by plain least squares.
 """
 
 from __future__ import annotations
@@ -31,9 +31,8 @@ class Unseen:
     How far a reading of an unseen log is from its predictions, as rms in the reading's unit.
 
     configured : of the model as configured
-    before : of the model fitted to the logs of the diagnosis by least squares, without any effect
+    before : fitted by least squares, without any effect
     after : the same with the effects of the best answer
-    unit : of the reading
     """
 
     configured: float
@@ -47,12 +46,9 @@ def unseen(diagnosis: Diagnosis, log: Log,
     """
     Return how well a log that was not used is predicted, by reading.
 
-    Nothing is fitted to the log: a number that each test has of its own is the mean of those of
-    the diagnosed tests. An effect that has a size by label has that of the log's label.
-
-    diagnosis : from `diagnose_logs`
-    log : another test of the same machine
-    push : what is known to have entered at some of the model's places, shape (n,) each
+    A number that each test has of its own is the mean of those of the diagnosed tests; an effect
+    with a size by label has that of the log's label. `push` is known to enter, shape (n,) by
+    place.
     """
     whole, machine = diagnosis.machine, without_labels(diagnosis.machine)
     assert isinstance(machine, OwnMachine)

@@ -88,11 +88,7 @@ class Rival:
 
     @classmethod
     def of_data(cls, data: Mapping[str, Any]) -> Rival:
-        """
-        Take a rival from plain data.
-
-        Raises KeyError, TypeError, ValueError, AttributeError if it is not a rival.
-        """
+        """Take a rival from plain data; KeyError, TypeError, ValueError or AttributeError."""
         names = tuple(data['names'])
         lower = np.zeros((len(names), len(names)))
         for i, row in enumerate(data['covariance']):

@@ -6,12 +6,17 @@ Ready parts of real drives for a simulation of your own, compiled.
 Write the loop over time as a function of plain numbers and arrays, put `compiled` over it, and
 call the parts in it:
 
->>> from simgap.parts import compiled, friction >>> @compiled ... def coasting(rate, step, count):
-... for _ in range(count): ... rate = friction.rate_after(step, rate, 0.0, 0.2, 0.0, 1.0) ...
-return rate >>> round(coasting(1.0, 0.01, 100), 6) 0.8
+>>> from simgap.parts import compiled, friction
+>>> @compiled
+... def coasting(rate, step, count):
+...     for _ in range(count):
+...         rate = friction.rate_after(step, rate, 0.0, 0.2, 0.0, 1.0)
+...     return rate
+>>> round(coasting(1.0, 0.01, 100), 6)
+0.8
 
-Numbers are in SI units. Each part is a function of numbers; those with many take them in a named
-tuple of floats, whose annotations are its units.
+Each part is a function of numbers in SI units; those with many take them in a named tuple of
+floats, whose annotations are its units.
 """
 
 from __future__ import annotations
@@ -34,10 +39,9 @@ _Function = TypeVar('_Function', bound=Callable[..., Any])
 
 def compiled(function: _Function) -> _Function:
     """
-    Compile a function that Python calls and that may call parts.
+    Compile a function that Python calls and that may call parts and `inner` functions.
 
-    The result is kept on disk until a part or a file beside the function's own changes. Inside the
-    function, numbers, arrays, tuples, `math` and what is compiled with `inner` can be used.
+    It may use numbers, arrays, tuples and `math`. It is kept on disk until a source changes.
     """
     file = Path(inspect.getfile(function)).resolve()
     # typed in by hand: there is no folder to watch, and nothing is kept

@@ -40,12 +40,11 @@ def tooth_torque(twist: float, twist_rate: float, half_gap: float, stiffness: fl
 @inner
 def steps_for(span: float, stiffness: float, damping: float, inertia: float, load: float) -> int:
     """
-    Return in how many steps a span has to be integrated for the shaft's own motion.
+    Return in how many steps a span [s] has to be integrated for the shaft's own motion.
 
-    A twentieth of the period and a fifth of the time in which damping decays are enough for a
-    semi-implicit Euler method to be within a percent.
+    A twentieth of the period and a fifth of the time in which damping decays keep a semi-implicit
+    Euler method within a percent.
 
-    span : [s]
     stiffness, damping : [N m/rad], [N m s/rad]
     inertia, load : of the two ends [kg m^2]
     """
