@@ -103,11 +103,7 @@ def estimated(residuals: Sequence[FloatArray], interval_s: float, slow_limit: fl
 
 def with_estimated_noise(experiments: Sequence[Experiment], residuals: Sequence[FloatArray],
                          settings: NoiseSettings) -> tuple[Experiment, ...]:
-    """
-    Return experiments whose noise is as loud and as coloured as a residual shows.
-
-    The residuals are measured minus predicted by the best hypothesis, shape (n, c) each.
-    """
+    """Return experiments with the noise of residuals, measured minus predicted, shape (n, c)."""
     colours: list[Colour] = []
     for c, channel in enumerate(experiments[0].channels):
         zs = [r[:, c] / e.noise[:, c] for e, r in zip(experiments, residuals, strict=True)]
@@ -123,11 +119,7 @@ def with_estimated_noise(experiments: Sequence[Experiment], residuals: Sequence[
 
 
 def found_noise(experiments: Sequence[Experiment]) -> dict[str, dict[str, float]]:
-    """
-    Return the noise that a diagnosis has found, by signal, for the JSON.
-
-    `white` and `slow` are in variances of the stated noise, `corner_hz` is of the slow part or 0.
-    """
+    """Return the noise found, by signal: variances of the stated noise, and a corner [Hz]."""
     first = experiments[0]
     interval = float(np.median(np.diff(first.time)))
     found = {}

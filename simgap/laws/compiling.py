@@ -61,7 +61,6 @@ class Compiled:
             numba.config.CACHE_DIR = before
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call the compiled function."""
         return self.dispatcher(*arguments)
 
 
@@ -105,11 +104,7 @@ class Keeping:
 
 
 def generated(keeping: Keeping, name: str, text: str, names: Mapping[str, Any]) -> Any:
-    """
-    Return the module of a program's compiled text, kept on disk with its results.
-
-    `text` has the decorators of this module, and refers to `names`.
-    """
+    """Return the module of a text of functions that refers to `names`, kept on disk compiled."""
     digest = _digest(keeping.sources, text)
     module = ModuleType(f'{keeping.owner}.generated.{name}_{digest}')
     sys.modules[module.__name__] = module  # where numba looks for it when it loads what it kept

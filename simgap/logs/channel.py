@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The samples of one signal, each with its own time stamp.
-
-Time is in whole nanoseconds, as in ROS 2 and MCAP: stamps survive every file format exactly.
-"""
+"""The samples of one signal, each with its own time stamp in whole nanoseconds, as in MCAP."""
 
 from __future__ import annotations
 
@@ -37,11 +33,7 @@ class RecordingWarning(UserWarning):
 
 
 def nanoseconds(seconds: ArrayLike) -> Any:
-    """
-    Return seconds as whole nanoseconds, rounded to the nearest.
-
-    Raises RecordingError if one is not finite, or beyond the 292 years that 64 bits hold.
-    """
+    """Return seconds as nanoseconds; RecordingError if not finite or beyond 64 bits."""
     scaled = np.asarray(seconds, dtype=np.float64)
     # whole seconds and the rest apart: one product would lose bits of long stamps
     if not np.all(np.isfinite(scaled)) or np.any(np.abs(scaled) > 9.2e9):
@@ -97,7 +89,6 @@ class Channel:
                                  f'{self.values[k]}, no finite number')
 
     def __repr__(self) -> str:
-        """Return a line instead of the arrays."""
         unit = f' [{self.unit}]' if self.unit else ''
         if not len(self):
             return f'Channel{unit}: no sample'
@@ -110,7 +101,6 @@ class Channel:
         return Channel, (self.unit, self.time_ns, self.values)
 
     def __len__(self) -> int:
-        """Return the number of samples."""
         return len(self.values)
 
     def __eq__(self, other: object) -> bool:
@@ -126,11 +116,7 @@ class Channel:
         return result
 
     def at(self, time_ns: IntArray, method: Method = 'linear') -> FloatArray:
-        """
-        Return the values [unit] at other times `time_ns` [ns], shape (m,), by one of METHODS.
-
-        Raises RecordingError if there is no such method, or at a time outside the samples.
-        """
+        """Return values [unit] at times [ns], shape (m,); RecordingError outside the samples."""
         if method not in METHODS:
             raise RecordingError(f'no method {method!r}: choose one of {", ".join(METHODS)}')
         if len(time_ns) == 0:

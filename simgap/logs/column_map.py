@@ -174,7 +174,6 @@ def _text(key: str, value: object, choices: tuple[str, ...] | None = None) -> st
 
 
 def _column(key: str, value: object) -> str | int:
-    """Return a column's name, or its place."""
     if isinstance(value, int) and not isinstance(value, bool):
         return int(_PLACE.check(key, plain_value(value)))  # type: ignore[arg-type]
     if not isinstance(value, str) or not value:
@@ -242,7 +241,6 @@ def _signal(key: str, name: str, body: object, known: KnownSignals) -> SignalMap
 
 
 def _expression(key: str, entries: Mapping[str, Any]) -> Expression:
-    """Return what a signal is in the columns of the file."""
     index = _whole(key, 'index', entries)
     if 'expression' not in entries:
         return Expression.of_column(Reference(_column(f'{key}.column', entries.get('column')),

@@ -53,7 +53,6 @@ class Reference:
     index: int | None = None
 
     def __str__(self) -> str:
-        """Return the column as a person would call it."""
         column = self.column if isinstance(self.column, str) else f'number {self.column}'
         return column if self.index is None else f'{column}[{self.index}]'
 
@@ -77,11 +76,7 @@ class Expression:
 
 
 def parse_expression(key: str, text: str) -> Expression:
-    """
-    Read an expression such as '0.1 * current - 0.02 * sign(rate)'.
-
-    Raises ParameterError, with the key of the entry, if it holds what is not allowed.
-    """
+    """Read an expression such as '0.1 * current'; ParameterError names the key."""
     if len(text) > LONGEST:
         raise ParameterError(f'{key}: {len(text)} characters given, allowed are {LONGEST}')
     try:
@@ -148,7 +143,6 @@ class _Parser:
         return lambda numbers: function(*[term(numbers) for term in terms])
 
     def _reference(self, node: ast.expr) -> Reference:
-        """Return the column that a part names."""
         if isinstance(node, ast.Subscript):
             index = node.slice.value if isinstance(node.slice, ast.Constant) else None
             inner = self._reference(node.value)

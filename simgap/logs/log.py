@@ -99,7 +99,6 @@ class OneTest:
         return self.log.constants
 
     def __getitem__(self, column: str) -> FloatArray:
-        """Return a column of the log, shape (n,)."""
         return self.log[column]
 
 

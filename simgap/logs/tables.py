@@ -76,11 +76,7 @@ class Table:
 
 @contextmanager
 def open_table(path: Path, layout: Layout = Layout()) -> Iterator[Table]:
-    """
-    Open a file by its suffix; what is not array, JSON or Parquet is text.
-
-    Raises RecordingError if it cannot be opened, is not what its suffix says, or is too large.
-    """
+    """Open a file by its suffix, else as text; RecordingError if it is damaged or too large."""
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         with open_text(path, layout.encoding) as stream:

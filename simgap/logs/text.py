@@ -48,11 +48,7 @@ def parse_number(text: str, cell: Cell) -> float:
 
 
 def parse_nanoseconds(text: str, cell: Cell, per_unit: int = NANOSECONDS) -> int:
-    """
-    Read a decimal time stamp, rounded to the nanosecond, by default from seconds.
-
-    Raises RecordingError if it is not a number, or beyond 9.2e9 s; it names file, line and column.
-    """
+    """Read a decimal time stamp [ns]; RecordingError, with its place, beyond 9.2e9 s."""
     value = parse_number(text, cell)
     if abs(value) * per_unit > _LATEST_S * NANOSECONDS:
         raise cell.refuse(f'{one_line(repr(text), 40)} is beyond {_LATEST_S:g} s')

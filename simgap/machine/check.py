@@ -44,12 +44,7 @@ def check_machine(machine: Machine) -> None:
 
 
 def idle_effects(machine: Machine) -> Iterator[str]:
-    """
-    Yield what is wrong with effects in these experiments, an effect a line.
-
-    One that changes no reading at half of its bounds cannot be found; one that changes a reading
-    while its size is zero is not neutral.
-    """
+    """Yield, a line each, effects that change no reading, or one while their size is zero."""
     neutral = machine.simulate([{}])[0]
     for effect in machine.catalogue.values():
         form = machine.catalogue.typical_form(effect)

@@ -97,11 +97,7 @@ class Form:
                 for share in _SHARES if share > 0.0 or size.low < 0.0]
 
     def implausibility(self, point: Point, deviations: Point) -> float:
-        """
-        Return how little values look like the effect, implausible above 1.
-
-        `deviations` has their standard deviations; it is empty where they are not known.
-        """
+        """Return how implausible values are, above 1 too much; `deviations` may be empty."""
         return 0.0
 
 

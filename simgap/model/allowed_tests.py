@@ -22,7 +22,6 @@ class OwnTests(TestSpace):
     """The tests of `duration_s` [s] that a model of one's own declares, within its limits."""
 
     def __init__(self, model: Model, duration_s: float) -> None:
-        """Take the model."""
         self.families = tuple(model.tests)
         self._model, self._duration = model, duration_s
         self.limits = model.limits

@@ -204,7 +204,6 @@ class Model:
     limits: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check the entries."""
         _check(self)
 
 

@@ -39,11 +39,7 @@ _Step = Callable[[float, float], bool]
 
 
 class FmuModel:
-    """
-    A simulation with an .fmu file; see `Simulator`.
-
-    Raises ModelError if the file cannot be read or instantiated, or lacks a variable.
-    """
+    """A simulation with an .fmu file; ModelError if it cannot be used or lacks a variable."""
 
     parallel = False
     longest_step_s = math.inf

@@ -117,11 +117,7 @@ class OwnMachine(Machine):
 
     def pushed(self, point: Point, experiment: int, push: Mapping[str, FloatArray],
                until: float = math.inf) -> FloatArray:
-        """
-        Return the readings of one test in which something pushes, as `predict` does.
-
-        `push` is by place and sample of the log; readings later than `until` [s] are NaN.
-        """
+        """Return a test's readings with pushes by place and sample, NaN later than `until` [s]."""
         log = self.logs[experiment]
         part = beginning(log, until) if math.isfinite(until) else log
         count = part.time.size

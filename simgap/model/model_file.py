@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-A model file: a few lines of YAML make a machine of a MuJoCo model or an FMU.
-
-The entries are those of `declaration.machine`. Each number also changes a parameter of the
-simulation, or delays an input (docs/own-machine.md).
-"""
+"""A model file: YAML that makes a machine of a MuJoCo model or FMU, see docs/own-machine.md."""
 
 from __future__ import annotations
 
@@ -149,7 +144,6 @@ class _Simulation:
                 for reading, source in zip(self.readings, self.sources, strict=True)}
 
     def _values(self, numbers: Numbers, test: OneTest) -> FloatArray:
-        """Return the values of the places."""
         values = dict(zip(self.places, self.simulator.defaults.tolist(), strict=True))
         for place, name in self.constants.items():
             if name not in test.constants:
@@ -325,7 +319,6 @@ def _fields(kind: type) -> tuple[str, ...]:
 
 def _bodies(where: str, top: Mapping[str, Any], allowed: Collection[str] | None,
             before: str = '') -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the entries of a mapping of mappings."""
     for name, body in mapping_of(f'{before}{where}', top.get(where) or {}).items():
         yield str(name), mapping_of(f'{before}{where}.{name}', body, allowed)
 

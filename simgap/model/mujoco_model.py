@@ -59,7 +59,6 @@ class MujocoModel:
     parallel = True
 
     def __init__(self, path: Path, ports: Ports) -> None:
-        """Read the file and find the ports."""
         try:
             self._model = mujoco.MjModel.from_xml_path(str(path))
         except ValueError as error:

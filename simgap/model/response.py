@@ -58,12 +58,7 @@ def where_it_acts(form: Form, parameter: Parameter) -> dict[str, float]:
 
 
 def derivative_error(machine: OwnMachine) -> float:
-    """
-    Return the share of a derivative of the readings that may be wrong, by the worst number.
-
-    It is the change of a difference quotient where its step is doubled: small in a smooth
-    simulation, and large where it sticks and slips.
-    """
+    """Return by which share the worst difference quotient changes where its step is doubled."""
     places: list[tuple[Parameter, Point]] = [(parameter, {}) for parameter in machine.nuisances]
     places += [(parameter, where_it_acts(form, parameter))
                for effect in machine.catalogue.values() for form in effect.forms

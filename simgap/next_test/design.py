@@ -240,7 +240,6 @@ class TestDesign:
             for name, (size, unit) in self._sizes(self._planned(test)).items()})
 
     def _sizes(self, machine: Machine) -> dict[str, tuple[float, str]]:
-        """Return the smallest size of each effect that shows in a test, and its unit."""
         machine = machine.with_experiments([
             replace(e, measured=machine.predict({}, k))
             for k, e in enumerate(machine.experiments)])
@@ -286,7 +285,6 @@ class TestDesign:
     # -- what no test tells --------------------------------------------------------------------
 
     def _alike(self, judged: Sequence[Candidate]) -> list[tuple[int, int, Mapping[str, float]]]:
-        """Return the pairs of rivals that no judged test tells apart."""
         compared = [test for test in judged if test.separation is not None]
         limit = self._settings.planning.alike * self._temperature
         found = []

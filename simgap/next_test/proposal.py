@@ -60,7 +60,6 @@ def as_data(proposal: Proposal, space: TestSpace, settings: Settings = DEFAULT) 
 
 
 def _told(test: Candidate, rivals: Sequence[Rival], settings: Settings) -> dict[str, Any]:
-    """Return what a test is expected to tell, as plain data."""
     found: dict[str, Any] = {'score': test.score}
     if test.deviations:
         found['deviations'] = {name: {'before': before, 'after': after}

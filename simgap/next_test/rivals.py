@@ -138,11 +138,8 @@ class Findings:
 
     @classmethod
     def of_data(cls, planning: Mapping[str, Any]) -> Findings:
-        """
-        Take the findings from the entry `planning` of a verdict, perhaps of an earlier version.
-
-        Raises KeyError, TypeError, ValueError or AttributeError if it holds none.
-        """
+        """Take the findings from `planning` of a verdict, with the errors of `Rival.of_data`."""
+        # an earlier version lacks some entries
         return cls([Rival.of_data(item) for item in planning['rivals']],
                    float(planning['inflation']), dict(planning.get('noise', {})),
                    {effect: float(size) for effect, size in planning.get('shown', {}).items()},
@@ -164,11 +161,7 @@ def rivals_of(problem: LeastSquares, answers: Sequence[Answer], inflated: float,
               settings: PlanningSettings,
               doubted: Callable[[Hypothesis], Mapping[str, Doubt]] = lambda hypothesis: {},
               ) -> list[Rival]:
-    """
-    Return the likeliest answers of a verdict with what is known of their numbers.
-
-    `answers` has the likeliest first; `inflated` is the variance over that with independent noise.
-    """
+    """Return the likeliest of sorted answers with what is known of their numbers, see `Rival`."""
     found = []
     for answer in answers[:settings.rivals]:
         if answer.probability < settings.least_probability:

@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-A cascaded loop as drives have it: position, velocity, current, each with its gain and limit.
-
-Call it once per sample and hold its output until the next. The caller digitises what it reads.
-"""
+"""A cascaded loop as drives have it, called once per sample: position, velocity, current."""
 
 from __future__ import annotations
 

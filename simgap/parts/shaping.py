@@ -35,11 +35,7 @@ def rate_limited(value: float, wanted: float, limit: float, step: float) -> floa
 
 @inner
 def lagged(value: float, source: float, time_constant: float, step: float) -> float:
-    """
-    Return the output of a first-order lag after a step [s] in which its input stands still.
-
-    `value` is before the step; `source` is the input; `time_constant` is in s, 0 for none.
-    """
+    """Return a first-order lag's output after a step [s]; `time_constant` [s] is 0 for none."""
     if time_constant <= 0.0:
         return source
     return source + (value - source) * math.exp(-step / time_constant)

@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Stepwise selection: whether each effect of a hypothesis is needed, and whether another one is.
-
-A fit of a hundred nuisances that has not converged looks like a weak effect. Where an effect gains
-little, the fit without it is therefore run until it has converged.
-"""
+"""Stepwise selection: whether each effect of a hypothesis is needed, and whether another is."""
 
 from __future__ import annotations
 

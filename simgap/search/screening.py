@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Screening: how much of the residual each effect could explain, by its derivative alone.
-
-It promises far more than a fit gains, but the true effect is nearly always in the first dozen.
-"""
+"""Screening: how much of the residual each effect could explain, by its derivative alone."""
 
 from __future__ import annotations
 

@@ -43,11 +43,7 @@ from simgap.search.single_fits import added, added_at, gone_on, moved, others_th
 
 
 class Search:
-    """
-    The search for the effects that a model lacks, with `threads` fits at once.
-
-    `progress` gets the share done and what is being done; answers `earlier` join the others.
-    """
+    """The search for missing effects; `progress` gets the share done and what is being done."""
 
     def __init__(self, problem: LeastSquares, progress: Callable[[float, str], None],
                  threads: int = 1, earlier: Sequence[Rival] = ()) -> None:
@@ -171,7 +167,6 @@ class Search:
 
     def _sorted(self, fitted: Callable[[Any], Hypothesis], of: Iterable[Any],
                 full: int | None = None) -> list[Hypothesis]:
-        """Fit several hypotheses at once; return the best first."""
         # Only the first `full` keep their Jacobians, which take most of the memory; None for all.
         found: list[Hypothesis] = []
         for hypothesis in self._pool.map(fitted, of):
@@ -236,7 +231,6 @@ class Search:
         return list(self._pool.map(fitted, asked.items()))
 
     def _fitted_again(self, hypothesis: Hypothesis) -> Hypothesis:
-        """Fit with a fresh Jacobian."""
         point = with_initial_conditions(self.problem, hypothesis.state.point())
         state = self.problem.start(hypothesis.state.parameters, point)
         return replace(hypothesis, state=self.problem.fit(
@@ -302,7 +296,6 @@ class Search:
     # -- pairs ---------------------------------------------------------------------------------
 
     def _pairs(self, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Give the best singles a few partners each."""
         options = self.settings
         best = singles[0]
         # beside the best, another effect may look different: it may have hidden a ripple

@@ -149,7 +149,6 @@ def _rests(fits: FullFits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
 
 
 def _least_costs(hypotheses: Sequence[Hypothesis]) -> dict[frozenset[str], float]:
-    """Return the least cost of a fit with each set of effects."""
     return {frozenset(h.effects): h.cost
             for h in sorted(hypotheses, key=lambda h: h.cost, reverse=True)}
 

@@ -92,7 +92,6 @@ def _judged(effects: Sequence[str], folds: Sequence[Withheld]) -> dict[str, Any]
 
 
 def _reason(folds: Sequence[Withheld]) -> str:
-    """Return why nothing could be judged."""
     reasons = dict.fromkeys(f'{effect}: {reason}' for fold in folds
                             for effect, reason in fold.reasons.items())
     return '; '.join(reasons) or 'no effect was found'

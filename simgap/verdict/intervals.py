@@ -93,11 +93,7 @@ def jackknife(values: Sequence[float]) -> float:
 def deviations(hypothesis: Hypothesis, inflated: Callable[[str], float],
                settings: IntervalSettings,
                between_tests: Mapping[str, float] = MappingProxyType({})) -> dict[str, float]:
-    """
-    Return the standard deviations of the values of a converged hypothesis' effects, by name.
-
-    `inflated` returns the inflation of a variance; `between_tests` has some jackknife deviations.
-    """
+    """Return the deviations of a converged hypothesis' effect values, robust and by name."""
     state = hypothesis.state
     names = [p.name for p in state.parameters]
     known = _known(state, settings)

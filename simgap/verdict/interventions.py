@@ -114,7 +114,6 @@ def _of_value(form: Form, key: str, value: str) -> list[Parameter]:
 
 
 def _in_common(problem: LeastSquares, machine: ByLabel, best: Hypothesis) -> Hypothesis:
-    """Return the best hypothesis with one size for all tests."""
     forms = tuple(machine.labels.base_of(form) for form in best.forms)
     if forms == best.forms:
         return best

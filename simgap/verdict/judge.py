@@ -260,7 +260,6 @@ class Judge:
         return unseen
 
     def _numbers(self, reasons: Mapping[str, str]) -> list[Parameter]:
-        """Return the numbers of the effects that can be judged."""
         return [p for effect, form in zip(self._best.effects, self._best.forms, strict=True)
                 if effect not in reasons for p in form.parameters]
 
@@ -298,7 +297,6 @@ class Judge:
 
     def _fitted(self, testing: Part, nuisances: Sequence[Parameter], held: Mapping[str, float],
                 begin: Mapping[str, float], slopes: Slopes) -> FitState:
-        """Fit the nuisances to a withheld test, with some values held."""
         own = testing.parameters(nuisances)
         return trained(testing.holding(held), own, begin, [slopes.for_part(testing, own)],
                        self._settings)

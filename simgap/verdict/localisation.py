@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Where a gap lies: the parts of the machine, the signals it shows in, and the regimes of motion.
-
-With effects, the parts are theirs; without, those where an unknown input may act.
-"""
+"""Where a gap lies: parts (of the effects, or of an unknown input), signals and regimes."""
 
 from __future__ import annotations
 
@@ -36,11 +32,8 @@ def of_effects(problem: LeastSquares, answers: Sequence[Answer], none: FitState,
 
 def parts_of_the_unknown(problem: LeastSquares, none: FitState, lack: LackOfFit,
                          ) -> tuple[dict[str, float], list[unknown_input.Place]]:
-    """
-    Return how likely something unnamed acts in each part, and its places, the likeliest first.
-
-    What is too fast for a pulse, or repeats itself, shows in one reading, and is put there.
-    """
+    """Return how likely something unnamed acts in each part, and its places, likeliest first."""
+    # what is too fast for a pulse, or repeats itself, shows in one reading, and is put there
     settings = problem.settings
     truncated = LeastSquares(problem.machine.truncated(), settings=settings)
     found = unknown_input.places(truncated, none.point())

@@ -126,7 +126,6 @@ class _Scores:
         self._inflation = inflation
 
     def __call__(self, hypothesis: Hypothesis) -> float:
-        """Return the cost of a hypothesis with all penalties."""
         settings = self._settings.verdict
         count = len(hypothesis.effects)
         total = hypothesis.penalised(self._settings.penalty) - hypothesis.cost
