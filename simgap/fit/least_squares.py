@@ -3,11 +3,10 @@
 """
 The residuals of a machine in its experiments, as a nonlinear least-squares problem.
 
-    minimise  sum_i rho((measured_i - predicted_i(x)) / sigma_i) + sum_j (x_j / prior_j)^2 / 2
-    within    low <= x <= high
+minimise  sum_i rho((measured_i - predicted_i(x)) / sigma_i) + sum_j (x_j / prior_j)^2 / 2
+within    low <= x <= high, with rho from `robust_loss` and the solver `levenberg_marquardt`
 
-The loss rho is in `robust_loss`, the solver in `levenberg_marquardt`. A run of the machine is
-expensive and a Jacobian takes many runs. A fit therefore starts from the Jacobian of a fit nearby.
+A Jacobian takes many runs. A fit therefore starts from the Jacobian of a fit nearby.
 """
 
 from __future__ import annotations

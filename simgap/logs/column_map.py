@@ -53,44 +53,29 @@ _PLACE = Entry('1', 0, MOST_COLUMNS, whole=True)
 
 @dataclass(frozen=True)
 class TimeMap:
-    """
-    How the time is written.
+    """How the time is written."""
 
-    column : name of the column, or its place, counted from 0
-    unit : one of TIME_UNITS, or iso8601 (without a zone it is taken for UTC)
-    offset_ns : added to every time stamp [ns]
-    from_first : count from the first time stamp of the file
-    duplicates : which row counts where a time stamp is repeated: refuse, first or last
-    """
-
-    column: str | int
-    unit: str = 's'
-    offset_ns: int = 0
-    from_first: bool = False
+    column: str | int  # its name, or its place, counted from 0
+    unit: str = 's'  # one of TIME_UNITS, or iso8601 (without a zone it is taken for UTC)
+    offset_ns: int = 0  # added to every time stamp [ns]
+    from_first: bool = False  # count from the first time stamp of the file
+    # row that counts where a time stamp is repeated: refuse, first or last
     duplicates: str = 'refuse'
 
 
 @dataclass(frozen=True)
 class SignalMap:
-    """
-    How one signal is written: SI value = factor * (gain * number + offset), gain = sign * scale.
+    """How one signal is written: SI value = factor * (gain * number + offset)."""
 
-    number : the columns, and the number that they give
-    unit, factor : SI unit of the signal, and SI units in the unit of the column
-    offset : in the unit of the column
-    time_column : column of this signal's own time stamps; None for the common one
-    clock_offset_ns : added to this signal's time stamps [ns]
-    sign_bit : value of the bit that is the sign of a sign-magnitude register; 0 for none
-    """
-
-    number: Expression
-    unit: str
-    factor: float = 1.0
-    gain: float = 1.0
-    offset: float = 0.0
+    number: Expression  # of the columns
+    unit: str  # SI unit of the signal
+    factor: float = 1.0  # SI units in the unit of the column
+    gain: float = 1.0  # sign * scale
+    offset: float = 0.0  # in the unit of the column
+    # of this signal's own time stamps; None for the common one
     time_column: str | int | None = None
-    clock_offset_ns: int = 0
-    sign_bit: int = 0
+    clock_offset_ns: int = 0  # added to this signal's time stamps [ns]
+    sign_bit: int = 0  # value of the bit that is the sign of a sign-magnitude register; 0 for none
 
 
 @dataclass(frozen=True)

@@ -38,40 +38,27 @@ _DAMAGE = (ValueError, TypeError, BadZipFile, EOFError, zlib.error, ArithmeticEr
 
 @dataclass(frozen=True)
 class Layout:
-    """
-    How text is laid out; other kinds of files need no such help.
+    """How text is laid out; other kinds of files need no such help."""
 
-    delimiter, decimal : between cells, and in numbers
-    comment : rows that begin with it are left out; '' for none
-    skip_lines : lines before the header
-    header : False if the columns have no names
-    """
-
-    delimiter: str = ','
-    decimal: str = '.'
-    comment: str = ''
+    delimiter: str = ','  # between cells
+    decimal: str = '.'  # in numbers
+    comment: str = ''  # rows that begin with it are left out; '' for none
     encoding: str = 'utf-8-sig'
-    skip_lines: int = 0
-    header: bool = True
+    skip_lines: int = 0  # lines before the header
+    header: bool = True  # False if the columns have no names
 
 
 @dataclass(frozen=True)
 class Table:
-    """
-    An open file.
+    """An open file."""
 
-    names, rows : of the columns, empty without names; rows, each with the number of its line
-    start, counted : where the names stand, and what a row's number counts, for errors
-    lengths : of columns that need not be equally long, by name
-    is_text : whether a cell that is not a number is a mistake
-    """
-
-    names: Sequence[str]
-    rows: Iterator[tuple[int, Sequence[Text]]]
-    start: str = ''
-    counted: str = 'row'
+    names: Sequence[str]  # of the columns; empty texts where they have none
+    rows: Iterator[tuple[int, Sequence[Text]]]  # with the number of each one's line
+    start: str = ''  # where the names stand, for errors
+    counted: str = 'row'  # what the number of a row counts
+    # of columns that need not be equally long
     lengths: Mapping[str, int] = field(default_factory=dict)
-    is_text: bool = False
+    is_text: bool = False  # whether a cell that is not a number is a mistake
 
 
 @contextmanager

@@ -77,11 +77,7 @@ class Form:
 
     @property
     def trials(self) -> list[dict[str, float]]:
-        """
-        Return sizes, far from zero, that may be tried out before a fit.
-
-        A single size gives shares of its bounds; a wave gives amplitudes in several phases.
-        """
+        """Return sizes to try: shares of a single one's bounds, or amplitudes of a wave."""
         if self.is_wave and len(self.sizes) == 2:  # with labels there are more
             sine, cosine = self.sizes
             least = _LEAST_AMPLITUDE * sine.step

@@ -32,25 +32,17 @@ class ModelError(UserError):
 
 @dataclass(frozen=True)
 class Number:
-    """
-    A number of the simulation.
+    """A number of the simulation."""
 
-    value, unit : as configured
-    low, high : bounds; equal to the value for a known number
-    step : of the difference quotient, which then never steps over less; 0 for one that is chosen
-    sigma : standard deviation about the value; 0 if nothing is known but the bounds
-    is_shape : True for a number of an effect that means nothing while the effect is absent
-    tolerance : size up to which an effect's number is usual and not worth a name
-    """
-
-    value: float
-    low: float
-    high: float
-    unit: str = '1'
+    value: float  # as configured
+    low: float  # bound; the value for a known number
+    high: float  # bound; the value for a known number
+    unit: str = '1'  # of the value
+    # of the difference quotient, which then never steps over less; 0: one is chosen
     step: float = 0.0
-    sigma: float = 0.0
-    is_shape: bool = False
-    tolerance: float = 0.0
+    sigma: float = 0.0  # standard deviation about the value; 0: unknown but for the bounds
+    is_shape: bool = False  # means nothing while its effect is absent
+    tolerance: float = 0.0  # size up to which an effect's number is usual and not worth a name
 
     @property
     def is_known(self) -> bool:
@@ -65,22 +57,15 @@ class Number:
 
 @dataclass(frozen=True)
 class Reading:
-    """
-    A reading of a sensor, which the simulation predicts.
+    """A reading of a sensor, which the simulation predicts."""
 
-    noise, digit : standard deviation of white noise; smallest step, 0 for none
-    model_error : slow error that a right model may have; None for 0.3 percent of the motion
-    column : of the logs; empty for the reading's own name
-    zero, gain : how far the zero may be off in each test, and by which share the scale
-    """
-
-    unit: str
-    noise: float
-    model_error: float | None = None
-    digit: float = 0.0
-    column: str = ''
-    zero: float = 0.0
-    gain: float = 0.0
+    unit: str  # of the reading
+    noise: float  # standard deviation of white noise; at least that of the digit
+    model_error: float | None = None  # slow error of a right model; None for 0.3 percent of motion
+    digit: float = 0.0  # smallest step of the sensor; 0 for none
+    column: str = ''  # of the logs; empty for the reading's own name
+    zero: float = 0.0  # how far the sensor's zero may be off, in each test
+    gain: float = 0.0  # share by which its scale may be off
 
     @property
     def sigma(self) -> float:
@@ -90,17 +75,12 @@ class Reading:
 
 @dataclass(frozen=True)
 class Push:
-    """
-    A place where something unknown may enter, such as a force on a carriage.
+    """A place where something unknown may enter, such as a force on a carriage."""
 
-    component, label : part of the machine; for people
-    unit, size : of what enters; what moves the machine a little, well above noise, below limits
-    """
-
-    component: str
-    label: str
-    unit: str
-    size: float
+    component: str  # part of the machine
+    label: str  # for people
+    unit: str  # of what enters
+    size: float  # what moves the machine a little, well above noise and below limits
 
 
 @dataclass(frozen=True)
@@ -113,20 +93,13 @@ class OwnForm:
 
 @dataclass(frozen=True)
 class Ripple:
-    """
-    A wave by an angle, whose order is given or found.
+    """A wave by an angle, whose order is given or found."""
 
-    stem : of stem_cosine, stem_sine and stem_order; harmonic k has stem_cosine_k and stem_sine_k
-    amplitude : bounds of each amplitude
-    orders : cycles per revolution that are tried; empty to find them
-    harmonics : how many the wave has, its fundamental counted
-    """
-
-    stem: str
-    amplitude: Number
-    angle: Angle
-    orders: tuple[float, ...]
-    harmonics: int = 1
+    stem: str  # of stem_cosine, stem_sine, stem_order; harmonics have stem_cosine_k, stem_sine_k
+    amplitude: Number  # bounds of each amplitude
+    angle: Angle  # that it follows
+    orders: tuple[float, ...]  # cycles per revolution that are tried; empty to find them
+    harmonics: int = 1  # how many the wave has, its fundamental counted
 
     @property
     def fundamental(self) -> tuple[str, str]:
@@ -142,20 +115,14 @@ class Ripple:
 
 @dataclass(frozen=True)
 class OwnEffect:
-    """
-    Something that the model may lack.
+    """Something that the model may lack."""
 
-    name, simpler : 'component.effect', and what it becomes at an end of its range or ''
-    cause, look : its physical cause, and what the readings show, one sentence each
-    forms, ripple : alternatives of which the best counts, or a wave by an angle
-    """
-
-    name: str
-    cause: str
-    look: str
-    forms: tuple[OwnForm, ...] = ()
-    ripple: Ripple | None = None
-    simpler: str = ''
+    name: str  # 'component.effect'
+    cause: str  # its physical cause, one sentence
+    look: str  # what it looks like in the readings, one sentence
+    forms: tuple[OwnForm, ...] = ()  # alternatives; the best one counts
+    ripple: Ripple | None = None  # in the place of forms
+    simpler: str = ''  # what it becomes at an end of its range
 
     @property
     def component(self) -> str:

@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The doubt whether an effect of a fit is larger than its tolerance.
-
-A fit may also have an effect because it mends what is a little wrong elsewhere. It is in doubt if
-it exceeds its tolerance by few standard deviations and gains little.
-"""
+"""The doubt whether an effect of a fit is larger than its tolerance, or mends something else."""
 
 from __future__ import annotations
 
