@@ -132,8 +132,6 @@ class LeastSquares:
         """Return whether a fit leaves more than the sensors' noise."""
         return self.noise_level(state.residual) > self.settings.search.wanting
 
-    # -- beginning a fit -----------------------------------------------------------------------
-
     def jacobian(self, point: dict[str, float], parameters: Sequence[Parameter],
                  residual: FloatArray, central: bool,
                  steps: Mapping[str, float] = MappingProxyType({})) -> Jacobian:
@@ -235,8 +233,6 @@ class LeastSquares:
                jacobian: Jacobian, weight: FloatArray) -> FitState:
         return FitState(parameters, x, residual, jacobian, weight,
                         self.cost(residual, x, prior_precision(parameters)))
-
-    # -- fitting -------------------------------------------------------------------------------
 
     def fit(self, state: FitState, iterations: int = 10) -> FitState:
         """Run Levenberg-Marquardt iterations until they gain nothing, or this many of them."""

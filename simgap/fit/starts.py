@@ -29,9 +29,8 @@ def led(problem: LeastSquares, state: FitState, options: SearchSettings) -> FitS
     """
     Return a fit that was led out of a local minimum, or the given one if that gains nothing.
 
-    Where motors stick and slip, a slow test holds the fit to all tests in one of its many minima.
-    A test that moves smoothly leads to its optimum. So the test that fits best is fitted alone,
-    and all from there. If another one then fits best, it leads in its turn.
+    Where motors stick and slip, a slow test holds the fit in one of many minima. The test that
+    fits best, alone, leads all to its optimum. If another one then fits best, it leads in turn.
     """
     def fitted(part: LeastSquares, point: Point, target: float = math.inf) -> FitState:
         begun = part.start(state.parameters, with_initial_conditions(part, dict(point)))

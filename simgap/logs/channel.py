@@ -55,13 +55,7 @@ def _frozen(array: ArrayLike, dtype: Any) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """
-    The samples of one signal; RecordingError if they are not as below.
-
-    unit : SI unit; '' if unknown
-    time_ns : array of shape (n,), int64 [ns]; strictly increasing, spacing as uneven as it was
-    values : array of shape (n,), float64 [unit]; finite: where there is no sample there is none
-    """
+    """The samples of one signal: time_ns rises, values are finite, or RecordingError is raised."""
 
     unit: str
     time_ns: IntArray

@@ -25,7 +25,7 @@ from simgap.logs.text import Cell, parse_nanoseconds, parse_number
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=timezone.utc)
 _BETWEEN = re.compile(r'[\s,;]+')
-# a comma is no separator where it is the decimal point
+# a comma is not a separator where it is the decimal point
 _BETWEEN_DECIMAL_COMMAS = re.compile(r'[\s;]+')
 
 
@@ -143,7 +143,7 @@ def _number_of(text: str, cell: Cell, decimal: str, sign_bit: int) -> float:
 
 
 def _point(text: str, decimal: str) -> str:
-    """Return a number with a point; one that has a point already is no number."""
+    """Return a number with a point; one that has a point already is not a number."""
     return text if decimal == '.' else text.replace('.', ' ').replace(decimal, '.')
 
 

@@ -35,10 +35,24 @@ _NAMELESS = '__function_workspace__'
 
 def read_mat(path: Path) -> dict[str, Any]:
     """
-    Return a .mat file's plain real variables, as arrays of two axes or more, as in MATLAB.
+    Return the variables of a file that are plain real numbers.
 
-    Raises RecordingError if it is of version 7.3 or has more numbers than allowed, ValueError or
-    another error of scipy's if it is damaged.
+    Parameters
+    ----------
+    path
+        a .mat file, version 4 to 7
+
+    Returns
+    -------
+    names with arrays, shape as in MATLAB: at least two axes
+
+    Raises
+    ------
+    RecordingError
+        if it is of version 7.3, or has more numbers than `antenna_drive.limits` allows
+    ValueError, or another error of scipy's
+        if it is damaged
+
     """
     from scipy.io import loadmat, whosmat
     from scipy.io.matlab import matfile_version, MatReadError

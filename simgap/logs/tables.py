@@ -276,7 +276,7 @@ def _cell(value: Any) -> Text:
 
 
 def _text(value: Any) -> str:
-    """Return a single value as a text; NaN and null are no sample."""
+    """Return a single value as a text; NaN and null are not samples."""
     if value is None or value != value:
         return ''
     if isinstance(value, (bool, int, float)):

@@ -184,8 +184,6 @@ class ByLabel(Machine):
         self.disturbance_inputs, self.notes = inner.disturbance_inputs, inner.notes
         self.diagram, self.advice = inner.diagram, inner.advice
 
-    # -- readings ------------------------------------------------------------------------------
-
     def predict(self, point: Point, experiment: int) -> FloatArray:
         return self.inner.predict(self.labels.in_test(point, experiment), experiment)
 
@@ -212,8 +210,6 @@ class ByLabel(Machine):
             return self.inner.simulate_disturbed(point, place, course)
         return [self.inner.simulate_disturbed(self.labels.in_test(point, k), place, course)[k]
                 for k in range(len(self.experiments))]
-
-    # -- what the machine within knows ---------------------------------------------------------
 
     @property
     def time_scales(self) -> TimeScales:

@@ -23,7 +23,7 @@ from simgap.model.response import NO_RESPONSE, StepResponse, tests_of, where_it_
 # simulation is smooth.
 _ROUGH = 0.5
 _LEAST_SAMPLES = 50
-# Simulations of a usual diagnosis, by which its duration is told.
+# Simulations of a usual diagnosis, from which its duration is estimated.
 _RUNS = 6000
 
 

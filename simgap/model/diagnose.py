@@ -42,15 +42,35 @@ def diagnose_logs(model: Model, logs: Sequence[Log],
     """
     Say where a machine and its model part, which effect is behind it, and how far it goes.
 
-    progress : called with the share that is done, 0 to 1, and what is being done
-    threads : how many hypotheses are fitted at once
-    without : effects that the catalogue shall lack
-    limits : for some readings, the remainder beyond noise from which it matters
-    earlier : answers of a verdict on some of the logs, see `diagnosis.diagnose`
+    Parameters
+    ----------
+    model
+        of the machine
+    logs
+        of its tests
+    progress
+        called with the share that is done, 0 to 1, and what is being done
+    threads
+        how many hypotheses are fitted at once
+    settings
+        thresholds
+    without
+        effects that the catalogue shall lack
+    limits
+        for some readings, the remainder beyond noise from which it matters
+    earlier
+        answers of a verdict on some of the logs, see `diagnosis.diagnose`
 
-    The result has two more entries than docs/diagnosis.md lists: `numbers` as fitted and, where
-    something enters that no effect names, `pushes`: test, place, from_s, until_s, size and unit of
-    each. Raises UserError if model or logs cannot be used; the message says what is wrong.
+    Returns
+    -------
+    the diagnosis. Its result has two more entries than docs/diagnosis.md lists: `numbers`, the
+    simulation's numbers as fitted, and, where something enters that no effect names, `pushes`:
+    test, place, from_s, until_s, size and unit of each push
+
+    Raises
+    ------
+    UserError : model or logs cannot be used; the message says what is wrong
+
     """
     machine = OwnMachine(model, logs)
     for effect in without:

@@ -63,7 +63,7 @@ class MujocoModel:
             self._model = mujoco.MjModel.from_xml_path(str(path))
         except ValueError as error:
             raise ModelError(f'{path}: {error}') from None
-        # a run that diverges ends in NaN, and does not begin anew
+        # a run that diverges ends in NaN, and does not begin again
         self._model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         self.longest_step_s = float(self._model.opt.timestep)
         self._places = tuple(ports.places)

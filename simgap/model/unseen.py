@@ -46,9 +46,18 @@ def unseen(diagnosis: Diagnosis, log: Log,
     """
     Return how well a log that was not used is predicted, by reading.
 
-    A number that each test has of its own is the mean of those of the diagnosed tests; an effect
-    with a size by label has that of the log's label. `push` is known to enter, shape (n,) by
-    place.
+    Nothing is fitted to the log: a number that each test has of its own is the mean of those of
+    the diagnosed tests. An effect that has a size by label has that of the log's label.
+
+    Parameters
+    ----------
+    diagnosis
+        from `diagnose_logs`
+    log
+        another test of the same machine
+    push
+        what is known to have entered at some of the model's places, shape (n,) each
+
     """
     whole, machine = diagnosis.machine, without_labels(diagnosis.machine)
     assert isinstance(machine, OwnMachine)

@@ -3,10 +3,9 @@
 """
 Which effects a set of tests can and cannot tell apart, before the tests are made.
 
-An effect shows if it does more than its price even where the nuisances imitate as much of it as
-their tolerances allow. All derivatives are taken at one point, and what may be their error shows
-nothing. The angle between what the nuisances cannot imitate of two effects says whether one passes
-for the other.
+An effect shows if it does more than its price where the nuisances imitate as much of it as their
+tolerances allow. Derivatives are taken at one point; their possible error shows nothing. The angle
+between what cannot be imitated of two effects says whether one passes for the other.
 """
 
 from __future__ import annotations

@@ -166,8 +166,6 @@ class TestDesign:
         return machine.with_experiments(with_found_noise(
             machine.experiments, self._findings.noise))
 
-    # -- judging one test ----------------------------------------------------------------------
-
     def _screened(self, test: Candidate) -> Candidate:
         """Simulate a test with each rival; no rival's numbers follow yet."""
         machine = self._planned(test).low_fidelity()
@@ -281,8 +279,6 @@ class TestDesign:
         information = test.kept * self._score(test.separation)
         return ((1.0 - unlisted) * math.log(max(information, _NOTHING))
                 - unlisted * math.log(coarseness))
-
-    # -- what no test tells --------------------------------------------------------------------
 
     def _alike(self, judged: Sequence[Candidate]) -> list[tuple[int, int, Mapping[str, float]]]:
         compared = [test for test in judged if test.separation is not None]

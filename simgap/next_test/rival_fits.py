@@ -27,7 +27,7 @@ def confirmed_separation(machine: Machine, rivals: Sequence[Rival], inflated: fl
     Return how well tests tell rivals apart, with each fitted to the readings of each other one.
 
     The true rival is fitted as well, from a standard deviation away along each direction: what
-    such a fit leaves because it sticks is no evidence against the others. `shrunk` comes from
+    such a fit leaves because it sticks is not evidence against the others. `shrunk` comes from
     `separation`, whose parameters the others are.
     """
     points = [known_to(machine, rival) for rival in rivals]

@@ -3,17 +3,12 @@
 """
 The search for effects: from the nuisances alone over single effects to pairs.
 
-1. The nuisances are fitted without any effect: the hypothesis 'none'. While something strong is
-   missing, the misfit counts as noise, and the nuisances stay close to their priors.
-2. A screening by derivatives says how much of the residual each effect could explain.
-3. The best dozen are fitted, each together with all nuisances. While they leave much, the
-   effect that each single test promises most of is fitted, too. If the best explains much, the
-   noise is lowered to what it leaves, and the best are fitted again.
-4. Several of the best are given partners, and the pairs are fitted.
-
-The answers of an earlier verdict on some of the tests are fitted as well, each from where it has
-ended there.
-
+The nuisances are fitted without any effect: the hypothesis 'none'. While something strong is
+missing, the misfit counts as noise, and the nuisances stay close to their priors. A screening by
+derivatives chooses a dozen effects, which are fitted, each together with all nuisances. While they
+leave much, so is the effect that each single test promises most of. If the best explains much, the
+noise is lowered to what it leaves, and the best are fitted again. Several of the best are given
+partners, and the pairs are fitted. Answers of an earlier verdict are fitted from where they ended.
 All this is done with coarser steps of the simulation. The best are then fitted to the whole tests
 and compared (`full_fits`).
 """

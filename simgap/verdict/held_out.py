@@ -117,8 +117,6 @@ def _per_signal(problem: LeastSquares, folds: Sequence[Withheld], known: bool) -
     return found
 
 
-# -- the interval --------------------------------------------------------------------------------
-
 def block_sums(time_s: FloatArray, before: FloatArray, after: FloatArray,
                block_s: float) -> FloatArray:
     """Return the energy before, after and of the noise in each block, shape (blocks, 3)."""

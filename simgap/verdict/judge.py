@@ -3,8 +3,7 @@
 """
 Judge effects on a test that is withheld from the fit of their numbers.
 
-The numbers come from the other tests alone, in a fit from the model as configured. Offsets within
-the tolerance are fitted to the withheld test, with the effect and without.
+Offsets within the tolerance are fitted to the withheld test, with the effect and without.
 """
 
 from __future__ import annotations
@@ -63,8 +62,6 @@ class Judge:
         if best.effects or len(problem.experiments) == 1:
             at = with_initial_conditions(problem, self._start)
             self._neutral = Slopes.of(problem, problem.start(best.state.parameters, at))
-
-    # -- training ------------------------------------------------------------------------------
 
     def _trained(self, part: Part) -> tuple[LeastSquares, FitState, FitState]:
         """Return a part's problem, and its fits without and with the effects."""
@@ -168,8 +165,6 @@ class Judge:
                         e.labels.get(key, '') == value for e in training.experiments):
                     reasons[effect] = f'no other test has the label {key}: {value}'
         return reasons
-
-    # -- judging -------------------------------------------------------------------------------
 
     def withheld(self, k: int) -> Withheld:
         """Judge on test k what the other tests have taught."""
