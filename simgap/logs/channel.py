@@ -57,9 +57,9 @@ def _frozen(array: ArrayLike, dtype: Any) -> Any:
 class Channel:
     """The samples of one signal: time_ns rises, values are finite, or RecordingError is raised."""
 
-    unit: str
-    time_ns: IntArray
-    values: FloatArray
+    unit: str  # SI unit; '' if unknown
+    time_ns: IntArray  # shape (n,), int64 [ns]
+    values: FloatArray  # shape (n,), float64 [unit]
 
     def __post_init__(self) -> None:
         """Check the samples, and keep read-only copies of them."""

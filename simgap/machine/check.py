@@ -44,7 +44,7 @@ def check_machine(machine: Machine) -> None:
 
 
 def idle_effects(machine: Machine) -> Iterator[str]:
-    """Yield, a line each, effects that change no reading, or one while their size is zero."""
+    """Yield effects that change no reading, or that change one while they are absent."""
     neutral = machine.simulate([{}])[0]
     for effect in machine.catalogue.values():
         form = machine.catalogue.typical_form(effect)

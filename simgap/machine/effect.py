@@ -93,7 +93,8 @@ class Form:
                 for share in _SHARES if share > 0.0 or size.low < 0.0]
 
     def implausibility(self, point: Point, deviations: Point) -> float:
-        """Return how implausible values are, above 1 too much; `deviations` may be empty."""
+        """Return how little values look like the effect; above 1 is implausible."""
+        # `deviations` has their standard deviations; it is empty where they are not known
         return 0.0
 
 

@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-An FMU for co-simulation (FMI 2 or 3) as the simulation of a machine.
-
-Ports are names in its modelDescription.xml. A step calls the FMU's own functions with addresses of
-arrays, without a wrapper between.
-"""
+"""An FMU for co-simulation (FMI 2 or 3) as a simulation, called without a wrapper between."""
 
 from __future__ import annotations
 

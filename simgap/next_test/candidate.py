@@ -23,7 +23,7 @@ class Candidate:
     """A test and what it is expected to tell."""
 
     family: str  # as drawn from the test space
-    test: Any  # the test itself
+    test: Any
     use: Mapping[str, float]  # share of each limit that it uses, the worst of all rivals
     score: float = 0.0  # by the criterion; the larger the better
     # smallest sizes that show over those in the best test, geometric mean; NaN if unknown

@@ -11,7 +11,7 @@ from simgap.laws.compiling import inner
 
 @inner
 def wave(angle: float, order: float, cosine: float, sine: float) -> float:
-    """Return a wave by an angle [rad], in the unit of its amplitudes `cosine` and `sine`."""
+    """Return a wave by an angle [rad], `order` cycles per revolution, in its amplitudes' unit."""
     if cosine == 0.0 and sine == 0.0:
         return 0.0
     return cosine * math.cos(order * angle) + sine * math.sin(order * angle)

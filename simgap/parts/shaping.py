@@ -35,7 +35,7 @@ def rate_limited(value: float, wanted: float, limit: float, step: float) -> floa
 
 @inner
 def lagged(value: float, source: float, time_constant: float, step: float) -> float:
-    """Return a first-order lag's output after a step [s]; `time_constant` [s] is 0 for none."""
+    """Return a lag's output a step [s] after `value`, at input `source`; 0 [s] for no lag."""
     if time_constant <= 0.0:
         return source
     return source + (value - source) * math.exp(-step / time_constant)

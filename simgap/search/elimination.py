@@ -106,12 +106,7 @@ def converged_rivals(fits: FullFits, hypotheses: Sequence[Hypothesis], best: Hyp
 
 def forward_selection(fits: FullFits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
                       settings: Settings) -> tuple[list[Hypothesis], Hypothesis]:
-    """
-    Add effects one after the other, until none is worth its price.
-
-    A single effect that leaves only noise stays alone: the search has tried its partners. Return
-    the hypotheses, and the best of them with a fit that has converged.
-    """
+    """Add effects one after the other, until none is worth its price or only noise remains."""
     found = list(hypotheses)
     while (0 < len(best.effects) < settings.search.most_effects
            and (len(best.effects) > 1 or fits.leaves_much(best))):

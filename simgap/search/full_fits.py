@@ -206,6 +206,5 @@ class FullFits:
 
     def _refitted(self, shared: SharedJacobian, keep_hessian: bool,
                   hypothesis: Hypothesis) -> Hypothesis:
-        """Fit a hypothesis to the whole tests and drop its Jacobian."""
         return refitted(self.problem, shared, self.settings.full_iterations,
                         hypothesis).without_jacobian(keep_hessian)

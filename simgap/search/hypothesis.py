@@ -107,12 +107,9 @@ class Hypothesis:
 
 
 def penalty(forms: Sequence[Form], point: Point, settings: PenaltySettings) -> float:
-    """
-    Return the penalty of effects in these forms with these values, in halves of a chi-square.
-
-    An effect pays for itself, for each parameter, and for looking like a tolerance; the last falls
-    to zero as the effect outgrows the tolerance.
-    """
+    """Return the penalty of effects in these forms with these values [half chi-square]."""
+    # An effect as small as its number's tolerance is that tolerance, and pays for it; the payment
+    # falls to zero as the effect outgrows the tolerance.
     total = 0.0
     for form in forms:
         total += settings.effect + settings.scanned * form.scanned

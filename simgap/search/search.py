@@ -85,10 +85,7 @@ class Search:
         """Return the earlier answers as they fit all tests, with costs at the present noise."""
         return [replace(h, state=self.problem.rescaled(h.state, 1.0)) for h in self._earlier_fits]
 
-    # -- the nuisances, and the noise ------------------------------------------------------------
-
     def _nuisances_alone(self) -> Hypothesis:
-        """Fit the nuisances alone; the misfit counts as noise."""
         iterations = self.settings.iterations
         point = self._beginning()
         first = self.problem.start(self.machine.nuisances, point)
@@ -154,8 +151,6 @@ class Search:
             found = self._sorted(partial(
                 refitted, problem, shared, self.settings.iterations), finalists)
         return found
-
-    # -- single effects ------------------------------------------------------------------------
 
     def _take_sensitivities(self, state: FitState) -> None:
         self.sensitivities = sensitivities(self.problem, state, self._pool.map)
@@ -287,8 +282,6 @@ class Search:
             if key not in found or self._priced(new) < self._priced(found[key]):
                 found[key] = new
         return sorted(found.values(), key=self._priced)
-
-    # -- pairs ---------------------------------------------------------------------------------
 
     def _pairs(self, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
         options = self.settings

@@ -21,12 +21,7 @@ from simgap.settings import Settings
 
 
 class Part(Machine):
-    """
-    A machine in some of its experiments; what is not among them cannot reach a fit.
-
-    `chosen` has indices of experiments, `experiments` what was measured in them (None for all),
-    and `held` values by name that are not fitted.
-    """
+    """A machine in some of its experiments; what is not among them cannot reach a fit."""
 
     def __init__(self, machine: Machine, chosen: Sequence[int],
                  experiments: Sequence[Experiment] | None = None,

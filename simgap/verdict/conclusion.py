@@ -123,7 +123,6 @@ def _decided(fits: FullFits, none: Hypothesis, best: Hypothesis,
 
 
 def _implausible_courses(best: Hypothesis, settings: Settings) -> tuple[str, ...]:
-    """Return the effects whose course over time looks like no real one."""
     found = implausibility(best, settings)
     return tuple(effect for effect, form in zip(best.effects, best.forms, strict=True)
                  if form.is_course and found[effect] > 1.0)

@@ -26,12 +26,7 @@ BOUNDS = (-1.0, 1.0)
 
 def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads: int = 1,
              groups: Sequence[str] | None = None, what: str = _TURNS) -> dict[str, Any]:
-    """
-    Return the gap before and after, on data whose effect is withheld, for the JSON.
-
-    `groups` has the group of each test, withheld together; None if each is its own. `what` is
-    their name for people.
-    """
+    """Return the gap before and after, where each group's effect is withheld, for the JSON."""
     single = len(problem.experiments) == 1
     judge = Judge(problem, none, best, groups or [e.name for e in problem.experiments])
     with ThreadPoolExecutor(threads) as pool:

@@ -93,7 +93,7 @@ def jackknife(values: Sequence[float]) -> float:
 def deviations(hypothesis: Hypothesis, inflated: Callable[[str], float],
                settings: IntervalSettings,
                between_tests: Mapping[str, float] = MappingProxyType({})) -> dict[str, float]:
-    """Return the deviations of a converged hypothesis' effect values, robust and by name."""
+    """Return robust standard deviations of the effects of a converged hypothesis, by name."""
     state = hypothesis.state
     names = [p.name for p in state.parameters]
     known = _known(state, settings)

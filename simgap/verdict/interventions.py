@@ -85,7 +85,6 @@ def _effects(numbers: Sequence[Mapping[str, Any]], differ: bool) -> list[str]:
 
 def _numbers(problem: LeastSquares, machine: ByLabel, best: Hypothesis,
              key: str) -> list[dict[str, Any]]:
-    """Return the sizes of the named effects under each value, and their differences."""
     bases = {effect: machine.labels.base_of(form) for effect, form in zip(
         best.effects, best.forms, strict=True)}
     chosen = {effect: machine.labels.split(form, key) for effect, form in bases.items()

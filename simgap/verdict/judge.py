@@ -82,7 +82,7 @@ class Judge:
             problem.start(bare, found.point(), self._without.for_part(part, bare)),
             self._settings.held_out.iterations)
         search = self._settings.search
-        if (unaided.cost < (1.0 + search.doubtful) * found.cost or problem.leaves_much(found)):
+        if unaided.cost < (1.0 + search.doubtful) * found.cost or problem.leaves_much(found):
             options = self._settings.held_out
             unaided = settled(problem, unaided, search, options.passes, options.iterations)
             found = self._finished(problem, min(

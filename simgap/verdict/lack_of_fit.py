@@ -88,7 +88,6 @@ def _regular(problem: LeastSquares, state: FitState) -> tuple[str, float]:
 
 
 def _enough(problem: LeastSquares) -> bool:
-    """Return whether a signal has so many samples that its residual can be judged."""
     least = problem.settings.lack_of_fit.least_samples
     return any((np.isfinite(e.measured).sum(axis=0) > least).any() for e in problem.experiments)
 
@@ -127,7 +126,7 @@ def _fast(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> tuple[str
                 continue
             first = raw[problem.rows(k)].reshape(experiment.measured.shape)[:, c]
             # a quantised reading at rest is off by a fraction of a digit, slow or fast
-            loud = (statistics.power if channel in experiment.quantised else statistics.fast_power)
+            loud = statistics.power if channel in experiment.quantised else statistics.fast_power
             pairs.append([loud(z, settings), loud(first, settings)])
         if pairs:
             now, before = np.mean(pairs, axis=0)

@@ -68,7 +68,7 @@ def _located(problem: LeastSquares, parts: Mapping[str, float],
         for c, channel in enumerate(experiment.channels):
             for r, name in enumerate(regimes.names):
                 key = (channel, name)
-                shares[key] = (shares.get(key, 0.0) + float(sample[regimes.labels == r, c].sum()))
+                shares[key] = shares.get(key, 0.0) + float(sample[regimes.labels == r, c].sum())
     positive = {key: max(value, 0.0) for key, value in shares.items()}
     whole = sum(positive.values()) or 1.0
     found: list[Located] = [

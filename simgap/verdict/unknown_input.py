@@ -57,12 +57,7 @@ def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
 
 def courses(problem: LeastSquares, point: Mapping[str, float],
             place: DisturbanceInput) -> list[tuple[FloatArray, FloatArray]]:
-    """
-    Return what would have to enter at a place to explain a gap, over time.
-
-    For each experiment these are times [s] and values in the unit of `simulate_disturbed`, shape
-    (m,) each, with straight lines between.
-    """
+    """Return what would have to enter at a place, by test: times [s] and values, (m,) each."""
     evidence = _Evidence.at(problem, point)
     responses, times = _columns(problem, point, place, evidence.residual)
     _, _, heights = evidence.weighed(responses, problem)
