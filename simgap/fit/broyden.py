@@ -48,8 +48,7 @@ class BroydenModel:
     def update(self, step: FloatArray, diagonal: FloatArray, change: FloatArray,
                weight: FloatArray) -> None:
         """Correct the Jacobian along a step by Broyden's rule, in the metric of the Hessian."""
-        # A step whose prediction was all wrong, past a contact that was or was not made, is not
-        # used.
+        # a step whose prediction was all wrong, past a contact made or lost, is not used
         metric = step * diagonal
         length = float(step @ metric)
         predicted = (self.jacobian @ step.astype(np.float32)).astype(np.float64)

@@ -7,8 +7,7 @@ Real noise is louder or quieter than a test sheet says and partly slow, and no m
 are described as white noise plus a part behind a first-order low-pass. The two levels and the
 corner are estimated from a residual by the prediction error method (L. Ljung, System
 Identification, 2nd edition, chapter 7), within bounds: what is beyond them is not noise. Fits and
-tests use the innovations, which are white, so that a slow residual counts once and not with each
-of its samples.
+tests use the innovations, which are white, so that a slow residual counts just once.
 """
 
 from __future__ import annotations

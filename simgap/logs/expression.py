@@ -59,15 +59,10 @@ class Reference:
 
 @dataclass(frozen=True)
 class Expression:
-    """
-    A number as a function of columns.
+    """A number as a function of columns."""
 
-    references : the columns, each of them once
-    value : the number from those, in this order; ArithmeticError or ValueError if none, as 1 / 0
-    """
-
-    references: tuple[Reference, ...]
-    value: _Term
+    references: tuple[Reference, ...]  # the columns, each of them once
+    value: _Term  # of those, in this order; ArithmeticError or ValueError if none, as 1 / 0
 
     @classmethod
     def of_column(cls, reference: Reference) -> Expression:

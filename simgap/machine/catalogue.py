@@ -19,7 +19,8 @@ class Catalogue(dict[str, Effect]):
         super().__init__({effect.id: effect for effect in effects})
 
     def without(self, effects: Collection[str]) -> Catalogue:
-        """Return the catalogue without effects, and without what is made of them; or KeyError."""
+        """Return the catalogue without effects and what depends on them; KeyError if unknown."""
+        # their parts, what they are parts of, and what becomes one of them at an end of its range
         # also without their parts, and what becomes one of them at an end of its range
         gone = {name for effect in effects for name in (effect, *self[effect].parts)}
         kept = copy(self)

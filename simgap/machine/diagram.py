@@ -19,7 +19,7 @@ class DiagramBlock:
     component: str  # as the effects of the catalogue name it
     label: str  # for people
     x: float  # of its upper left corner
-    y: float  # of its upper left corner
+    y: float
     width: float  # of the block
 
 

@@ -22,8 +22,8 @@ class Parameter:
     """
     A number in which the machine may differ from its model; zero is the model as configured.
 
-    name, unit : unique in its machine; of the value
-    low, high : hard bounds, with zero between them
+    name : unique in its machine
+    low, high : hard bounds in `unit`, with zero between them
     step : of the difference quotient, in the unit of the value
     prior_sigma : standard deviation of a Gaussian prior about zero; 0 for no prior
     experiment : index of the one experiment that it acts on; None for all

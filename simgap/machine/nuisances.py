@@ -32,8 +32,7 @@ class Nuisances(list[Parameter]):
         """
         Return a point at which effects alone stand for their numbers, and what is held at zero.
 
-        A nuisance may stand for the very number that an effect changes, and both are not
-        determined. The effect takes over what such nuisances have in common. By default none is
-        held.
+        A nuisance may stand for the very number that an effect changes; data do not determine
+        both. The effect takes over what such nuisances have in common. By default none is held.
         """
         return dict(point), set()

@@ -18,15 +18,10 @@ NO_RESPONSE = 1e-6
 
 @dataclass(frozen=True)
 class StepResponse:
-    """
-    How readings answer to a step of a number, in standard deviations.
+    """How readings answer to a step of a number, in standard deviations."""
 
-    acts : False if nothing changes
-    roughness : how much the difference quotient changes when its step is doubled, as a share
-    """
-
-    acts: bool
-    roughness: float
+    acts: bool  # False if nothing changes
+    roughness: float  # share by which the difference quotient changes if its step is doubled
 
     @classmethod
     def at(cls, machine: OwnMachine, parameter: Parameter, experiment: int,

@@ -13,31 +13,20 @@ from simgap.machine.contract import FloatArray
 
 @dataclass(frozen=True)
 class Ports:
-    """
-    Names in a simulation program, each with the entry of the model file that gives it.
+    """Names in a simulation program, each with the entry of the model file that gives it."""
 
-    places : parameters and initial states that are written before a run
-    inputs, pushes, outputs : what the log feeds in, what may enter unknown, and what is read
-    """
-
-    places: Mapping[str, str]
-    inputs: Mapping[str, str]
-    pushes: Mapping[str, str]
-    outputs: Mapping[str, str]
+    places: Mapping[str, str]  # parameters and initial states that are written before a run
+    inputs: Mapping[str, str]  # what the log feeds in
+    pushes: Mapping[str, str]  # where something unknown may enter
+    outputs: Mapping[str, str]  # what is read
 
 
 class Simulator(Protocol):
-    """
-    A simulation program with the ports that a model file names.
+    """A simulation program with the ports that a model file names."""
 
-    defaults : of the places, as the program's own file has them, NaN where it has none
-    longest_step_s : of a run
-    parallel : True if several threads may call `run` at once
-    """
-
-    defaults: FloatArray
-    longest_step_s: float
-    parallel: bool
+    defaults: FloatArray  # of the places, by the program's own file; NaN where it has none
+    longest_step_s: float  # of a run
+    parallel: bool  # True if several threads may call `run` at once
 
     def run(self, values: FloatArray, start_s: float, step_s: float,
             inputs: FloatArray) -> FloatArray:

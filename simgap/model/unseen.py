@@ -27,17 +27,11 @@ _RUNS = 40
 
 @dataclass(frozen=True)
 class Unseen:
-    """
-    How far a reading of an unseen log is from its predictions, as rms in the reading's unit.
+    """How far a reading of an unseen log is from its predictions, as rms in the reading's unit."""
 
-    configured : of the model as configured
-    before : fitted by least squares, without any effect
-    after : the same with the effects of the best answer
-    """
-
-    configured: float
-    before: float
-    after: float
+    configured: float  # of the model as configured
+    before: float  # fitted by least squares, without any effect
+    after: float  # the same with the effects of the best answer
     unit: str
 
 

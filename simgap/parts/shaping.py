@@ -35,7 +35,11 @@ def rate_limited(value: float, wanted: float, limit: float, step: float) -> floa
 
 @inner
 def lagged(value: float, source: float, time_constant: float, step: float) -> float:
-    """Return a lag's output a step [s] after `value`, at input `source`; 0 [s] for no lag."""
+    """
+    Return the output of a first-order lag after a step [s] in which its input stands still.
+
+    `value` is before the step, `source` is the input, and `time_constant` is in s; 0 for no lag.
+    """
     if time_constant <= 0.0:
         return source
     return source + (value - source) * math.exp(-step / time_constant)

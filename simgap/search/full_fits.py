@@ -35,8 +35,7 @@ class FullFits:
     def compared(self, none: Hypothesis, singles: Sequence[Hypothesis],
                  pairs: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Fit the best of a search to the whole tests; return 'none', then the best first."""
-        # All share the derivatives by the nuisances, taken again in each pass where the best is
-        # then.
+        # all share the derivatives by the nuisances, taken again where the best is in each pass
         options = self.settings
         chosen = self._chosen(singles, pairs)
         anchor = min(chosen, key=self._priced)
