@@ -22,8 +22,7 @@ def contact_side(
         twist: float, twist_rate: float, half_gap: float, stiffness: float, damping: float,
 ) -> int:
     """Return which flank pushes: +1, -1, or 0 for none; arguments as in `contact_torque`."""
-    # Flanks that move apart faster than they spring back no longer push, if still pressed a
-    # little.
+    # flanks that move apart faster than they spring back no longer push, even if pressed
     if twist > half_gap and stiffness * (twist - half_gap) + damping * twist_rate > 0.0:
         return 1
     if twist < -half_gap and stiffness * (twist + half_gap) + damping * twist_rate < 0.0:

@@ -78,9 +78,9 @@ def next_slip(
     """
     Return the mode that follows `slip`: +1 and -1 slip forward and backward, 0 sticks.
 
-    A slipping body sticks when its rate v [rad/s] changes sign, or slows down within the threshold
-    v_t while stiction T_s can hold it; a sticking body breaks away when the applied torque T_o [N
-    m] exceeds T_s.
+    A slipping body sticks when its rate [rad/s] changes sign, or slows down within the threshold
+    while stiction can hold it; a sticking body breaks away when the applied torque T_o exceeds
+    stiction, [N m].
     """
     if slip == 0:
         if applied > stiction:

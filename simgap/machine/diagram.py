@@ -30,7 +30,7 @@ class Diagram:
     height: ClassVar[int] = 26  # of a block
     blocks: tuple[DiagramBlock, ...]  # in the order in which they are drawn
     lines: tuple[tuple[float, float, float, float], ...] = ()  # x and y of their two ends
-    # components of several blocks, with theirs
+    # components that are several blocks, with the components of those
     several: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @classmethod

@@ -30,7 +30,7 @@ class Experiment:
     measured : shape (n, c); NaN where there is no sample
     noise : standard deviation of the residuals of a perfect model, shape (n, c)
     quantised : names of signals whose residual at rest is a fraction of a digit, not noise
-    model_error : slow error of a right model, shape (c,) in units; None for a usual share
+    model_error : slow error of a right model, shape (c,), as read; None for a usual share
     colours : of the noise of each signal, as a diagnosis finds it; empty for white noise
     labels : what was different in this test, such as load: A; see `interventions`
     """

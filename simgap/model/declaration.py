@@ -44,7 +44,7 @@ def within(value: float, share: float | None = None, unit: str = '1', *,
 def free(low: float, high: float, unit: str = '1', *, start: float | None = None,
          step: float = 0.0) -> Number:
     """
-    Return a number of which nothing is known but its bounds `low` and `high`, in its unit.
+    Return a number of which nothing is known but its bounds `low` and `high`, in `unit`.
 
     start : where a fit begins; None for the middle
     step : of the difference quotient; 0 for a usual one

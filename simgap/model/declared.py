@@ -148,7 +148,8 @@ class Model:
     advice : tests that settle what is open, a sentence each
     parallel : True if `simulate` may run in several threads at once, as compiled functions may
     log : makes of a log as it was read the one that the simulation wants
-    tests : by kind: f(duration_s, random), with a numpy Generator -> a log with its commands
+    tests : by kind: f(duration_s, random) -> a log with commands and without readings; `random` is
+        a numpy Generator
     limits : greatest size that a reading may have in such a test, by reading
 
     Raises ModelError if a name is there twice, or an entry is not what it should be.

@@ -45,7 +45,7 @@ class PushedSpan:
 
 def pushes(problem: LeastSquares, point: Mapping[str, float],
            place: DisturbanceInput) -> list[PushedSpan]:
-    """Return the spans in which something pushes at a place; `point` has no effect."""
+    """Return the spans in which something pushes at a place; `point` is fitted without effects."""
     machine = problem.machine
     assert isinstance(machine, OwnMachine)
     edges = [level_edges(*course) for course in courses(problem, point, place)]

@@ -31,9 +31,9 @@ class Candidate:
     promised: Separation | None = None  # how well it tells the rivals apart to first order
     confirmed: Separation | None = None  # the same with every rival fitted to the others
     kept: float = 1.0  # share of an unconfirmed promise that counts: what its family has kept
-    # before and after, of each number
+    # standard deviation before and after, by number
     deviations: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    # smallest that shows, unit
+    # smallest size that shows and its unit, by effect
     sizes: Mapping[str, tuple[float, str]] = field(default_factory=dict)
 
     @property

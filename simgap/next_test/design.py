@@ -185,8 +185,7 @@ class TestDesign:
 
     def _with_fits(self, judged: Sequence[Candidate], pool: ThreadPoolExecutor) -> list[Candidate]:
         """Confirm the best tests until no other one promises more, and put those first."""
-        # Tests of a family break their promises alike: a promise counts as far as others were
-        # kept.
+        # tests of a family break promises alike: a promise counts as far as others were kept
         best = list(judged)
         for _ in range(self._effort.rounds):
             if not best or best[0].confirmed is not None:

@@ -118,8 +118,8 @@ class Findings:
         """
         Return whether there are answers to tell apart: several, and none of them sure.
 
-        If `unknown`, or its least probability, exceeds all others, it is open whether any effect
-        of the catalogue is true, and there is nothing to tell apart.
+        Nothing can be distinguished if `unknown` is the likeliest, or if all answers but the best
+        together have less than the least probability of `unknown`.
         """
         known = [rival.probability for rival in self.rivals]
         return len(known) > 1 and self.unlisted < max(known) < min(

@@ -36,8 +36,8 @@ class Cascade(NamedTuple):
     """
     The numbers of a cascaded loop.
 
-    position_gain, rate_limit : rate asked for per position error, and its greatest
-    velocity_gain, current_limit : current asked for per rate error, and its greatest
+    position_gain, rate_limit : rate asked for per position error, and its limit
+    velocity_gain, current_limit : current asked for per rate error, and its limit
     velocity_time : integral time of the velocity loop; 0 for none
     """
 

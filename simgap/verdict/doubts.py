@@ -41,10 +41,11 @@ def doubts(hypothesis: Hypothesis, deviating: Mapping[str, float], gained: float
     """
     Return the doubts whether effects are larger than their tolerances, by effect.
 
-    The strongest is not in doubt if `gained`, the gain of all [half chi-square, inflated], is
-    large. A weaker one may only mend its form, and has to exceed its tolerance by more, or to gain
-    more of its own. Courses over time are judged elsewhere. `deviating` has standard deviations;
-    `beyond` is the excess of the strongest, in deviations, at which its doubt is a half.
+    The strongest is not in doubt if `gained`, the gain of all, is large. A weaker one may only
+    mend its form, and has to exceed its tolerance by more, or to gain more of its own. Gains are
+    [half chi-square] over the inflation. Courses over time are judged elsewhere. `deviating` has
+    standard deviations; `beyond` is the excess of the strongest, in deviations, at which its doubt
+    is a half.
     """
     point = hypothesis.state.point()
     found: dict[str, Doubt] = {}

@@ -268,8 +268,7 @@ class Judge:
         """Return a fold with what remains, and with draws of the numbers that can be judged."""
         # `point` and `residual`, shape (n c,), are where the withheld test is judged; `found` and
         # `posterior` are the fit to the training data and its covariance. `followed` returns, of
-        # residuals with draws, shape (draws, n c), those that are left once the nuisances have
-        # followed.
+        # residuals with draws, shape (draws, n c), those left once the nuisances have followed.
         numbers = self._numbers(fold.reasons)
         if not numbers:
             return fold
