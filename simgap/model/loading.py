@@ -23,7 +23,7 @@ def load_model(place: str) -> Model:
     Return the model of 'FILE.py:NAME', 'FILE.py' (NAME is machine) or 'FILE.yaml' (`model_file`).
 
     Raises ModelError if there is no such file or name, or the file fails; the message says at
-    which line. Raises ModuleNotFoundError if a model file needs mujoco or fmpy.
+    which line. Raises ModuleNotFoundError if mujoco or fmpy, which it needs, is missing.
     """
     if place.endswith(_MODEL_FILES):
         return load_model_file(Path(place))

@@ -41,7 +41,7 @@ class Evidence:
 
     @classmethod
     def of_data(cls, data: Sequence[Mapping[str, Any]]) -> Evidence:
-        """Take evidence from plain data. Raises KeyError, TypeError if it is not evidence."""
+        """Take evidence from plain data. Raises KeyError or TypeError if it is not."""
         return cls([_hypothesis(item) for item in data],
                    [LackOfFit(**item['lack_of_fit']) for item in data],
                    data[0].get('inflation', 1.0) if data else 1.0)
