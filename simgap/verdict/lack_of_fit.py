@@ -69,8 +69,8 @@ def _slow_excess(problem: LeastSquares, state: FitState) -> float:
 
 def _regular(problem: LeastSquares, state: FitState) -> tuple[str, float]:
     """Return the signal whose residual repeats itself most in a test, and by how much."""
-    # A hum, a ripple or a resonance may be no louder than a sensor's noise may be. But what remains
-    # of noise is white, because its colour is known. What is quieter than noise counts less.
+    # A hum, a ripple or a resonance may be no louder than a sensor's noise may be. But what is
+    # left of noise is white, because its colour is known. What is quieter than noise counts less.
     settings = problem.settings.lack_of_fit
     signal, greatest = '', 0.0
     for k, experiment in enumerate(problem.experiments):
