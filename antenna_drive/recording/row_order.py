@@ -19,23 +19,11 @@ def sorted_rows(path: Path, time_column: str, stamps: IntArray, lines: IntArray,
     """
     Return the columns with their rows in the order of time, each row once.
 
-    Parameters
-    ----------
-    path, time_column
-        of the table, for messages
-    stamps, lines
-        time stamp and line of each row, shape (rows,)
-    columns
-        stamps and values of each column, which may lack some rows
+    stamps, lines : time stamp and line of each row, shape (rows,)
+    columns : stamps and values of each column, which may lack some rows
 
-    Raises
-    ------
-    RecordingError : two rows have one time stamp and differ
-
-    Warns
-    -----
-    RecordingWarning : rows were sorted, or repeated rows left out
-
+    Raises RecordingError if two rows have one time stamp and differ. Warns with RecordingWarning
+    if rows were sorted, or repeated rows left out.
     """
     steps = np.diff(stamps)
     if np.any(steps < 0):

@@ -3,9 +3,8 @@
 """
 Linear algebra in one thread.
 
-Fits and planned tests go side by side. Matrices of a hundred columns gain nothing from threads of
-their own, and such threads spin while they wait: with two in each of two jobs, a design of a test
-takes five times the processor time.
+Fits go side by side. Matrices of a hundred columns gain nothing from threads of their own, which
+spin while they wait: with two in each of two jobs, a design takes five times the processor time.
 """
 
 from __future__ import annotations

@@ -16,17 +16,7 @@ _LEVEL = 1e-6
 
 
 class BoxQuadratic:
-    """
-    A quadratic programme within bounds, for one gradient or several.
-
-    Parameters
-    ----------
-    hessian
-        symmetric and positive semidefinite, shape (m, m)
-    low, high
-        bounds of the step, low <= 0 <= high, shape (m,)
-
-    """
+    """A positive semidefinite quadratic programme, shape (m, m), within low <= 0 <= high."""
 
     def __init__(self, hessian: FloatArray, low: FloatArray, high: FloatArray) -> None:
         m = len(hessian)
@@ -39,12 +29,8 @@ class BoxQuadratic:
         self._room = (high > low) & ~dead
 
     def step(self, gradient: FloatArray, near: FloatArray | None = None) -> FloatArray:
-        """
-        Return the step d within bounds that maximises gradient d - d hessian d / 2, shape (m,).
-
-        The search begins with what `near` leaves free, the step of a similar gradient: that takes
-        a few factors where dozens are needed without it.
-        """
+        """Return the step d, shape (m,), that maximises gradient d - d hessian d / 2."""
+        # the search begins with what `near`, the step of a similar gradient, leaves free
         hessian, low, high, scale = self._hessian, self._low, self._high, self._scale
         if near is None:
             step = np.zeros(gradient.size)

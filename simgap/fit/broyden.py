@@ -47,12 +47,8 @@ class BroydenModel:
 
     def update(self, step: FloatArray, diagonal: FloatArray, change: FloatArray,
                weight: FloatArray) -> None:
-        """
-        Correct the Jacobian along a step by Broyden's rule, in the metric of the Hessian.
-
-        A step whose prediction was all wrong, past a contact that was or was not made, is not
-        used.
-        """
+        """Correct the Jacobian along a step by Broyden's rule, in the metric of the Hessian."""
+        # a step whose prediction was all wrong, past a contact made or lost, is not used
         metric = step * diagonal
         length = float(step @ metric)
         predicted = (self.jacobian @ step.astype(np.float32)).astype(np.float64)
@@ -86,8 +82,7 @@ def updated(jacobian: Jacobian, errors: Sequence[FloatArray],
     """Return a Jacobian with Broyden's rank-one updates."""
     if not errors:
         return jacobian
-    return np.asarray(jacobian + np.array(errors, np.float32).T
-                      @ np.array(directions, np.float32))
+    return np.asarray(jacobian + np.array(errors, np.float32).T @ np.array(directions, np.float32))
 
 
 def transposed_product(jacobian: Jacobian, vector: FloatArray) -> FloatArray:

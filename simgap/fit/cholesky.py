@@ -16,15 +16,9 @@ def factored(matrix: FloatArray, ridge: float = 0.0) -> FloatArray:
     """
     Return the lower Cholesky factor of a symmetric matrix with a diagonal of ones, shape (m, m).
 
-    A Hessian that was summed in single precision need not be positive definite. Along a direction
-    that is flat within its rounding nothing is known, and a ridge of that size goes nowhere there.
-    `ridge` is added to the diagonal in any case; more is added as long as the matrix is not
-    positive definite.
-
-    Raises
-    ------
-    ValueError : the matrix has NaN or infinity, which no ridge would mend
-
+    `ridge` is added to the diagonal, and more until the matrix is positive definite: a Hessian
+    summed in single precision need not be. Along a direction that is flat within its rounding
+    nothing is known, and such a ridge goes nowhere. Raises ValueError at NaN or infinity.
     """
     np.asarray_chkfinite(matrix)
     while True:

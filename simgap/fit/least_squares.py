@@ -4,10 +4,9 @@
 The residuals of a machine in its experiments, as a nonlinear least-squares problem.
 
     minimise  sum_i rho((measured_i - predicted_i(x)) / sigma_i) + sum_j (x_j / prior_j)^2 / 2
-    within    low <= x <= high
+    within    low <= x <= high, with rho from `robust_loss` and the solver `levenberg_marquardt`
 
-The loss rho is in `robust_loss`, the solver in `levenberg_marquardt`. A run of the machine is
-expensive and a Jacobian takes many runs. A fit therefore starts from the Jacobian of a fit nearby.
+A Jacobian takes many runs. A fit therefore starts from the Jacobian of a fit nearby.
 """
 
 from __future__ import annotations
@@ -31,18 +30,9 @@ class LeastSquares:
     """
     The residuals of a machine in its experiments.
 
-    Parameters
-    ----------
-    machine
-        what is fitted
-    used
-        for each experiment the samples that are fitted, shape (n,) of bool; None for all
-    scale
-        factor of the expected noise; while the model lacks something strong, the misfit counts
-        as noise, so that the nuisances are not bent to imitate it
-    settings
-        thresholds
-
+    used : for each experiment the samples that are fitted, shape (n,) of bool; None for all
+    scale : factor of the expected noise, above 1 while something strong is missing, so that the
+        nuisances are not bent to imitate it
     """
 
     def __init__(self, machine: Machine, used: Sequence[NDArray[np.bool_]] | None = None,
@@ -135,15 +125,12 @@ class LeastSquares:
         z = np.abs(residual[self.valid]) * self.scale
         level = float(np.sqrt(np.mean(z ** 2)))
         for _ in range(10):
-            level = float(np.sqrt(np.mean(
-                np.minimum(z, self.settings.fit.outlier * level) ** 2)))
+            level = float(np.sqrt(np.mean(np.minimum(z, self.settings.fit.outlier * level) ** 2)))
         return level
 
     def leaves_much(self, state: FitState) -> bool:
         """Return whether a fit leaves more than the sensors' noise."""
         return self.noise_level(state.residual) > self.settings.search.wanting
-
-    # -- beginning a fit -----------------------------------------------------------------------
 
     def jacobian(self, point: dict[str, float], parameters: Sequence[Parameter],
                  residual: FloatArray, central: bool,
@@ -151,8 +138,8 @@ class LeastSquares:
         """
         Return the derivative of the prediction at a point by difference quotients, shape (n, m).
 
-        `residual` is that at the point, for one-sided differences; `central` takes central ones
-        where the bounds leave room. `steps` has the steps, by name, that are not the usual ones.
+        `residual`, at the point, serves one-sided differences; `central` takes central ones where
+        the bounds leave room. `steps` has unusual steps by name.
         """
         variants, only, plan = [], [], []
         sizes = [steps.get(item.name, item.step) for item in parameters]
@@ -209,13 +196,9 @@ class LeastSquares:
         return self.start((*known, *others), point, np.column_stack([columns, fresh]))
 
     def refreshed(self, state: FitState) -> FitState:
-        """
-        Return the state with a fresh Jacobian and fresh weights.
-
-        Where sticking and slipping bend the prediction, a difference quotient over many standard
-        deviations is not a derivative. The data that have been fitted show how small a step may
-        be.
-        """
+        """Return the state with a fresh Jacobian and fresh weights."""
+        # Where sticking and slipping bend the prediction, a difference quotient over many standard
+        # deviations is not a derivative. The fitted data show how small a step may be.
         jacobian = self.jacobian(state.point(), state.parameters, state.residual, False,
                                  self.local_steps(state))
         return self._state(state.parameters, state.x, state.residual, jacobian,
@@ -240,8 +223,7 @@ class LeastSquares:
         return self._state(everything, x, self.residuals(point_of(everything, x)),
                            np.column_stack([state.jacobian, columns]), state.weight)
 
-    def with_columns(self, state: FitState, indices: Sequence[int],
-                     columns: Jacobian) -> FitState:
+    def with_columns(self, state: FitState, indices: Sequence[int], columns: Jacobian) -> FitState:
         """Return the state with other derivatives by some of its parameters."""
         jacobian = state.jacobian.copy()
         jacobian[:, indices] = columns
@@ -251,8 +233,6 @@ class LeastSquares:
                jacobian: Jacobian, weight: FloatArray) -> FitState:
         return FitState(parameters, x, residual, jacobian, weight,
                         self.cost(residual, x, prior_precision(parameters)))
-
-    # -- fitting -------------------------------------------------------------------------------
 
     def fit(self, state: FitState, iterations: int = 10) -> FitState:
         """Run Levenberg-Marquardt iterations until they gain nothing, or this many of them."""

@@ -27,22 +27,13 @@ from simgap.settings import FitSettings
 
 @dataclass(frozen=True)
 class LevenbergMarquardt:
-    """
-    The solver of a least-squares problem.
+    """The solver of a least-squares problem."""
 
-    Attributes
-    ----------
-    residuals : returns those at a point, shape (n,)
-    weights : returns those of residuals, shape (n,)
-    cost : returns the sum of the losses and of the priors, given residuals, values and precisions
-    settings : thresholds
-
-    """
-
-    residuals: Callable[[dict[str, float]], FloatArray]
-    weights: Callable[[FloatArray], FloatArray]
+    residuals: Callable[[dict[str, float]], FloatArray]  # at a point, shape (n,)
+    weights: Callable[[FloatArray], FloatArray]  # of residuals, shape (n,)
+    # losses and priors, from residuals, values and precisions
     cost: Callable[[FloatArray, FloatArray, FloatArray], float]
-    settings: FitSettings
+    settings: FitSettings  # thresholds
 
     def minimised(self, state: FitState, iterations: int) -> FitState:
         """Run iterations until they gain nothing, or this many of them."""

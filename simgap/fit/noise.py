@@ -3,12 +3,11 @@
 """
 The noise of a channel as a recording shows it: its level and its colour.
 
-A test sheet tells a level, and means white noise. Real noise is louder or quieter and partly slow,
-and no model is its machine to the last digit. Both are described by one process: white noise plus
-a part behind a first-order low-pass. Its two levels and its corner are estimated from a residual
-by the prediction error method (L. Ljung, System Identification, 2nd edition, chapter 7), within
-bounds: what is beyond them is not noise. The innovations of the process are white. Fits and tests
-use them, so that a slow residual counts once and not with each of its samples.
+Real noise is louder or quieter than a test sheet says and partly slow, and no model is exact. Both
+are described as white noise plus a part behind a first-order low-pass. The two levels and the
+corner are estimated from a residual by the prediction error method (L. Ljung, System
+Identification, 2nd edition, chapter 7), within bounds: what is beyond them is not noise. Fits and
+tests use the innovations, which are white, so that a slow residual counts just once.
 """
 
 from __future__ import annotations
@@ -53,11 +52,7 @@ class Process:
 
 
 def whitened(z: FloatArray, colour: Colour) -> FloatArray:
-    """
-    Return the innovations of a residual at even times, shape (n,), with variance 1.
-
-    It is NaN where there is none.
-    """
+    """Return the innovations of a residual at even times, shape (n,), with variance 1, or NaN."""
     found = np.full(z.size, np.nan)
     there = np.isfinite(z)
     if there.all():
@@ -81,8 +76,7 @@ def estimated(residuals: Sequence[FloatArray], interval_s: float, slow_limit: fl
     Return the noise process of a channel from the residuals of each experiment.
 
     These are in standard deviations of the stated noise, shape (n,), NaN where there is none, at
-    an interval [s]. The slow part may have the variance `slow_limit`: more is neither noise nor a
-    model's error.
+    an interval [s]. The slow part has the variance `slow_limit` at most: more is not noise.
     """
     usable = [z for z in residuals if np.isfinite(z).sum() >= settings.least_samples]
     if not usable:
@@ -98,8 +92,7 @@ def estimated(residuals: Sequence[FloatArray], interval_s: float, slow_limit: fl
 
     white = power(0.0, 0.0)
     poles = [math.exp(-2.0 * math.pi * corner * interval_s) for corner in _CORNERS_HZ]
-    best, pole, gain = min((power(pole, gain), pole, gain)
-                           for pole in poles for gain in _GAINS)
+    best, pole, gain = min((power(pole, gain), pole, gain) for pole in poles for gain in _GAINS)
     if 0.5 * sizes.size * math.log(white / max(best, 1e-12)) < settings.worth_a_colour:
         best, pole, gain = white, 0.0, 0.0
     slow = gain * best * (1.0 - pole ** 2 * (1.0 - gain)) / (1.0 - pole ** 2)
@@ -109,12 +102,7 @@ def estimated(residuals: Sequence[FloatArray], interval_s: float, slow_limit: fl
 
 def with_estimated_noise(experiments: Sequence[Experiment], residuals: Sequence[FloatArray],
                          settings: NoiseSettings) -> tuple[Experiment, ...]:
-    """
-    Return experiments whose noise is as loud and as coloured as a residual shows.
-
-    They come with the noise that their sensors should have. The residuals are measured minus
-    predicted by the best hypothesis, shape (n, c) each.
-    """
+    """Return experiments with the noise of residuals, measured minus predicted, shape (n, c)."""
     colours: list[Colour] = []
     for c, channel in enumerate(experiments[0].channels):
         zs = [r[:, c] / e.noise[:, c] for e, r in zip(experiments, residuals, strict=True)]
@@ -130,12 +118,7 @@ def with_estimated_noise(experiments: Sequence[Experiment], residuals: Sequence[
 
 
 def found_noise(experiments: Sequence[Experiment]) -> dict[str, dict[str, float]]:
-    """
-    Return the noise that a diagnosis has found, by signal, for the JSON.
-
-    Each has the variances `white` and `slow`, in variances of the stated noise, and `corner_hz` of
-    the slow part, 0 if there is none.
-    """
+    """Return the noise found, by signal: variances of the stated noise, and a corner [Hz]."""
     first = experiments[0]
     interval = float(np.median(np.diff(first.time)))
     found = {}
@@ -150,11 +133,7 @@ def found_noise(experiments: Sequence[Experiment]) -> dict[str, dict[str, float]
 
 def with_found_noise(experiments: Sequence[Experiment],
                      found: Mapping[str, Mapping[str, float]]) -> tuple[Experiment, ...]:
-    """
-    Return planned experiments with the noise that other ones have shown, see `found_noise`.
-
-    A signal that was not found has the noise that it should have.
-    """
+    """Return planned experiments with the noise of `found_noise`, or that which is stated."""
     def colour(channel: str, interval: float) -> Colour:
         if channel not in found:
             return Colour()

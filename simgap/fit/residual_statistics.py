@@ -73,12 +73,7 @@ def dependence(z: FloatArray, by: FloatArray,
 def dependences(channels: Sequence[str], covariates: Sequence[Mapping[str, FloatArray]],
                 residuals: Sequence[FloatArray],
                 settings: LackOfFitSettings = DEFAULT.lack_of_fit) -> list[dict[str, Any]]:
-    """
-    Return what the residuals of the signals depend on, the strongest first.
-
-    Each experiment has covariates by name, shape (n,) each, and residuals in standard deviations,
-    shape (n, c).
-    """
+    """Return what residuals, shape (n, c), depend on, of covariates, (n,); the strongest first."""
     found = []
     for c, channel in enumerate(channels):
         z = np.concatenate([r[:, c] for r in residuals])

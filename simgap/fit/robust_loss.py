@@ -23,12 +23,8 @@ def robust_weight(residual: FloatArray, valid: NDArray[np.bool_], outlier: float
 
 
 def robust_loss(residual: FloatArray, outlier: float) -> float:
-    """
-    Return the sum of losses: half the square of small residuals, logarithmic in large ones.
-
-    After a contact that is made too late everything differs for a while. That must not bend what
-    else is known.
-    """
+    """Return the sum of losses: half the square of small residuals, logarithmic in large ones."""
+    # after a contact that is made too late everything differs for a while
     size = np.abs(residual)
     large = np.maximum(size, outlier)
     return float(np.sum(np.where(size < outlier, 0.5 * size ** 2,

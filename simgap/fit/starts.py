@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Where a fit begins and goes on: the initial conditions, fresh derivatives, and a leading test.
-
-All three lead a fit past minima that derivatives do not lead out of.
-"""
+"""Where a fit begins and goes on past minima that derivatives do not lead out of."""
 
 from __future__ import annotations
 
@@ -20,11 +16,7 @@ from simgap.settings import SearchSettings
 
 def settled(problem: LeastSquares, state: FitState, options: SearchSettings, passes: int,
             iterations: int) -> FitState:
-    """
-    Go on with a fit, with fresh derivatives, as long as that gains much.
-
-    At most this many Jacobians are taken, with so many iterations after each.
-    """
+    """Go on with a fit while fresh derivatives, `passes` at most, gain much."""
     for _ in range(passes):
         before = state.cost
         state = problem.fit(problem.refreshed(state), iterations)
@@ -37,10 +29,8 @@ def led(problem: LeastSquares, state: FitState, options: SearchSettings) -> FitS
     """
     Return a fit that was led out of a local minimum, or the given one if that gains nothing.
 
-    Where motors stick and slip, the cost of a test has many minima, and a slow test holds the fit
-    to all of them in one. The cost of a test that moves smoothly leads to its optimum. So the
-    test that fits best is fitted alone, and all of them from there. If another one then fits
-    best, it leads in its turn.
+    Where motors stick and slip, a slow test holds the fit in one of many minima. The test that
+    fits best, alone, leads all to its optimum. If another one then fits best, it leads in turn.
     """
     def fitted(part: LeastSquares, point: Point, target: float = math.inf) -> FitState:
         begun = part.start(state.parameters, with_initial_conditions(part, dict(point)))
@@ -65,11 +55,7 @@ def led(problem: LeastSquares, state: FitState, options: SearchSettings) -> FitS
 
 def least_cost(problem: LeastSquares, trials: Sequence[dict[str, float]], experiment: int,
                until: float) -> tuple[float, dict[str, float]]:
-    """
-    Return the least cost among trial points in one experiment until a time [s], and its point.
-
-    The first point wins a tie.
-    """
+    """Return the least cost in an experiment until a time [s], and the first point with it."""
     here = problem.experiments[experiment]
     early = (here.time - here.time[0] < until)[:, np.newaxis]
     best, least = trials[0], np.inf

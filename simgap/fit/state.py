@@ -15,34 +15,18 @@ from simgap.machine.contract import FloatArray, Parameter
 
 @dataclass(frozen=True)
 class FitState:
-    """
-    Where a fit is.
+    """Where a fit is."""
 
-    Attributes
-    ----------
-    parameters : what is fitted, m of them
-    x : their values, shape (m,)
-    residual : measured minus predicted, in standard deviations, shape (n,); zero where nothing
-        was measured
-    base_jacobian : derivative of the prediction [standard deviations per unit] as last taken,
-        shape (n, m); in single precision, because it is large and gives a direction only
-    weight : weight of each residual in iteratively reweighted least squares, shape (n,)
-    cost : sum of the robust losses (half a chi-square if all are small) and of the priors
-    broyden_errors, broyden_directions : the rank-one updates of the Jacobian since then, shapes
-        (n,) and (m,) each
-    kept_hessian : the Hessian of a state that has dropped its Jacobian
-
-    """
-
-    parameters: tuple[Parameter, ...]
-    x: FloatArray
-    residual: FloatArray
+    parameters: tuple[Parameter, ...]  # what is fitted, m of them
+    x: FloatArray  # their values, shape (m,)
+    residual: FloatArray  # in standard deviations, shape (n,); zero where nothing was measured
+    # of the prediction [deviations per unit] as last taken, shape (n, m), float32
     base_jacobian: Jacobian
-    weight: FloatArray
-    cost: float
-    broyden_errors: tuple[FloatArray, ...] = ()
-    broyden_directions: tuple[FloatArray, ...] = ()
-    kept_hessian: FloatArray | None = None
+    weight: FloatArray  # of each residual in iteratively reweighted least squares, shape (n,)
+    cost: float  # robust losses (half a chi-square if all are small) and priors
+    broyden_errors: tuple[FloatArray, ...] = ()  # of the Jacobian's rank-one updates, (n,) each
+    broyden_directions: tuple[FloatArray, ...] = ()  # of the same updates, (m,) each
+    kept_hessian: FloatArray | None = None  # of a state that has dropped its Jacobian
 
     @property
     def jacobian(self) -> Jacobian:
@@ -83,8 +67,7 @@ def point_of(parameters: Sequence[Parameter], x: FloatArray) -> dict[str, float]
 
 def prior_precision(parameters: Sequence[Parameter]) -> FloatArray:
     """Return 1 / prior_sigma^2 of each parameter, 0 without a prior, shape (m,)."""
-    return np.array([1.0 / p.prior_sigma ** 2 if p.prior_sigma > 0.0 else 0.0
-                     for p in parameters])
+    return np.array([1.0 / p.prior_sigma ** 2 if p.prior_sigma > 0.0 else 0.0 for p in parameters])
 
 
 def proper_precision(parameters: Sequence[Parameter]) -> FloatArray:

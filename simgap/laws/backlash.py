@@ -9,17 +9,7 @@ from simgap.laws.compiling import inner
 
 @inner
 def dead_zone(twist: float, half_gap: float) -> float:
-    """
-    Return how far the teeth are pressed into each other, Eq. (1) with k = 1.
-
-    Parameters
-    ----------
-    twist
-        angle between the two gears, at the shaft of the stiffness [rad]
-    half_gap
-        b, the gap reaches from -b to b [rad]
-
-    """
+    """Return how far teeth are pressed into each other [rad], Eq. (1) with k = 1."""
     if twist > half_gap:
         return twist - half_gap
     if twist < -half_gap:
@@ -31,11 +21,8 @@ def dead_zone(twist: float, half_gap: float) -> float:
 def contact_side(
         twist: float, twist_rate: float, half_gap: float, stiffness: float, damping: float,
 ) -> int:
-    """
-    Return which flank pushes: +1, -1, or 0 for none; arguments as in `contact_torque`.
-
-    Flanks that move apart faster than they spring back no longer push, if still pressed a little.
-    """
+    """Return which flank pushes: +1, -1, or 0 for none; arguments as in `contact_torque`."""
+    # flanks that move apart faster than they spring back no longer push, even if pressed
     if twist > half_gap and stiffness * (twist - half_gap) + damping * twist_rate > 0.0:
         return 1
     if twist < -half_gap and stiffness * (twist + half_gap) + damping * twist_rate < 0.0:
@@ -49,25 +36,12 @@ def contact_torque(
         damping: float,
 ) -> float:
     """
-    Return the torque of the touching flanks, Eq. (1) with a contact damping beside the spring.
+    Return the torque of flanks on the driven gear [N m], Eq. (1) with a contact damping.
 
-    Parameters
-    ----------
-    side
-        the flank that pushes, from `contact_side`
-    twist, twist_rate
-        angle and rate between the two gears [rad], [rad/s]
-    half_gap
-        b [rad]
-    stiffness
-        k [N m/rad]
-    damping
-        torque per rate of approach while in contact [N m s/rad]; not in the article
-
-    Returns
-    -------
-    torque on the driven gear [N m]; a flank that pushes has the sign of its side
-
+    side : the flank that pushes, from `contact_side`; the torque has its sign
+    twist, twist_rate : angle and rate between the two gears [rad], [rad/s]
+    half_gap : b, the gap reaches from -b to b [rad]
+    stiffness, damping : k [N m/rad], [N m s/rad] in contact; the damping is not in the article
     """
     if side > 0:
         return stiffness * (twist - half_gap) + damping * twist_rate

@@ -3,13 +3,10 @@
 """
 How functions are compiled: once for this machine, kept on disk until any of their sources changes.
 
-numba's own disk cache looks only at the file of the function that it keeps, and so a stale
-kernel would survive a correction of a block in another file. The cache folder is therefore
-named after a digest of every source that compiled code is made from.
-
-A function is compiled, and numba itself is loaded, when the function is first called. A program
-that only asks which signals there are, to read a recording say, does not wait for a compiler.
-Without numba the functions run as they are, slowly and with the same numbers.
+numba's own disk cache looks only at the file of the function that it keeps, so the cache folder is
+named after a digest of every source that compiled code is made from. A function is compiled, and
+numba itself is loaded, when it is first called: a program that only reads a recording does not
+wait for a compiler. Without numba the functions run slowly, with the same numbers.
 """
 
 from __future__ import annotations
@@ -64,7 +61,6 @@ class Compiled:
             numba.config.CACHE_DIR = before
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call the compiled function."""
         return self.dispatcher(*arguments)
 
 
@@ -88,29 +84,17 @@ def shared(function: Function) -> Function:
 
 @dataclass(frozen=True)
 class Keeping:
-    """
-    How a package keeps what it compiles.
+    """How a package keeps what it compiles."""
 
-    Attributes
-    ----------
-    owner : name of its folder in the user's cache
-    sources : folders whose sources its functions are compiled with, beside the laws
-
-    """
-
-    owner: str
-    sources: frozenset[Path]
+    owner: str  # name of its folder in the user's cache
+    sources: frozenset[Path]  # folders its functions are compiled with, beside the laws
 
     def compiled(self, function: Function) -> Function:
         """Compile a function that Python calls, and keep the result on disk."""
         return cast(Function, Compiled(function, self.folder))
 
     def compiled_with(self, function: Function, source: Path) -> Function:
-        """
-        Compile a function of a user that Python calls, and keep it on disk.
-
-        It may allocate arrays. What is kept becomes stale with any source in the folder `source`.
-        """
+        """Compile a user's function for Python, kept until a source in the folder changes."""
         keeping = Keeping(self.owner, self.sources | {source})
         return cast(Function, Compiled(function, keeping.folder, _nrt=True))
 
@@ -120,25 +104,7 @@ class Keeping:
 
 
 def generated(keeping: Keeping, name: str, text: str, names: Mapping[str, Any]) -> Any:
-    """
-    Compile functions that a program has written, and keep text and results on disk.
-
-    Parameters
-    ----------
-    keeping
-        of the package whose program it is
-    name
-        of the file
-    text
-        functions with the decorators of this module
-    names
-        what the text refers to
-
-    Returns
-    -------
-    the module that the text defines
-
-    """
+    """Return the module of a text of functions that refers to `names`, kept on disk compiled."""
     digest = _digest(keeping.sources, text)
     module = ModuleType(f'{keeping.owner}.generated.{name}_{digest}')
     sys.modules[module.__name__] = module  # where numba looks for it when it loads what it kept

@@ -3,8 +3,8 @@
 """
 Friction with stiction, Eq. (2)-(8).
 
-A body is in one of three modes: it slips forward (+1), slips backward (-1) or sticks (0). While
-it sticks, friction equals the applied torque T_o of Eq. (8), computed with the rate at zero; it
+A body is in one of three modes: it slips forward (+1), slips backward (-1) or sticks (0). While it
+sticks, friction equals the applied torque T_o of Eq. (8), computed with the rate at zero; it
 breaks away when T_o exceeds the stiction torque, Eq. (4), and then slips against the Coulomb
 torque. `friction_torque` is the law of Eq. (2) itself, as Fig. 3 draws it.
 """
@@ -23,17 +23,9 @@ def friction_torque(
     """
     Return the friction torque on the body [N m], Eq. (2).
 
-    Parameters
-    ----------
-    rate
-        v [rad/s]
-    applied
-        T_o, the torque on the body but for friction [N m]
-    coulomb, stiction
-        T_c and T_s [N m]
-    threshold
-        v_t, below which the rate counts as zero [rad/s]
-
+    rate, threshold : v, and v_t below which it counts as zero [rad/s]
+    applied : T_o, the torque on the body but for friction [N m]
+    coulomb, stiction : T_c and T_s [N m]
     """
     if abs(rate) > threshold:
         return -coulomb * ((rate > 0.0) - (rate < 0.0))
@@ -43,20 +35,11 @@ def friction_torque(
 @inner
 def drag(rate: float, viscous: float, viscous_rate: float, flow_index: float) -> float:
     """
-    Return the size of the viscous friction torque [N m]: a power law of the rate.
+    Return the size of the viscous friction torque [N m]: a power law of the rate [rad/s].
 
-    Parameters
-    ----------
-    rate
-        [rad/s]
-    viscous
-        torque per rate at viscous_rate, zero in the article [N m s/rad]
-    viscous_rate
-        [rad/s]
-    flow_index
-        exponent: 1 for oil, less for grease that thins as it is sheared (2/3 for the bearings
-        of Palmgren, Ball and Roller Bearing Engineering, 1959), 2 for windage [1]
-
+    viscous, viscous_rate : torque per rate at that rate, zero in the article [N m s/rad], [rad/s]
+    flow_index : exponent [1]: 1 for oil, 2 for windage, less than 1 for grease (2/3 for the
+        bearings of Palmgren, Ball and Roller Bearing Engineering, 1959)
     """
     torque = viscous * abs(rate)
     if viscous != 0.0 and flow_index != 1.0 and rate != 0.0:
@@ -72,23 +55,12 @@ def slip_level(
     """
     Return the size of the friction torque of a slipping body [N m].
 
-    Parameters
-    ----------
-    rate
-        [rad/s]; where it is zero the level of forward slip is given
-    coulomb
-        T_c [N m]
-    dragging
-        viscous friction torque, from `drag` [N m]
-    stribeck
-        how much more torque slipping begins with than it settles at, zero in the article
-        [N m]; it fades as exp(-(rate / stribeck_rate)^stribeck_shape)
-    stribeck_rate, stribeck_shape
-        [rad/s], [1]
-    asymmetry
-        share by which forward friction exceeds, and backward friction falls short of,
-        the mean of both, zero in the article [1]
-
+    rate : [rad/s]; where it is zero the level of forward slip is given
+    coulomb, dragging : T_c, and viscous torque from `drag` [N m]
+    stribeck : excess of torque as slipping begins, zero in the article [N m]; it fades as
+        exp(-(rate / stribeck_rate)^stribeck_shape), [rad/s], [1]
+    asymmetry : share by which forward friction exceeds, and backward friction falls short of, the
+        mean of both, zero in the article [1]
     """
     level = coulomb
     if stribeck != 0.0:
@@ -104,24 +76,11 @@ def next_slip(
         threshold: float,
 ) -> int:
     """
-    Return the mode that follows: +1 and -1 slip forward and backward, 0 sticks.
+    Return the mode that follows `slip`: +1 and -1 slip forward and backward, 0 sticks.
 
-    A slipping body sticks when its rate changes sign, or when it slows down within the threshold
-    and stiction can hold it; a sticking body breaks away when T_o exceeds the stiction torque.
-
-    Parameters
-    ----------
-    slip
-        the mode so far
-    rate
-        v [rad/s]
-    applied
-        T_o [N m]
-    coulomb, stiction
-        T_c and T_s [N m]
-    threshold
-        v_t [rad/s]
-
+    A slipping body sticks when its rate [rad/s] changes sign, or slows down within the threshold
+    while stiction can hold it; a sticking body breaks away when the applied torque T_o exceeds
+    stiction, [N m].
     """
     if slip == 0:
         if applied > stiction:

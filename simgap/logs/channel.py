@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The samples of one signal, each with its own time stamp.
-
-Time is kept in whole nanoseconds, as in ROS 2 and MCAP, so that stamps survive every file format
-exactly and equal stamps compare equal.
-"""
+"""The samples of one signal, each with its own time stamp in whole nanoseconds, as in MCAP."""
 
 from __future__ import annotations
 
@@ -38,14 +33,7 @@ class RecordingWarning(UserWarning):
 
 
 def nanoseconds(seconds: ArrayLike) -> Any:
-    """
-    Return seconds as whole nanoseconds, rounded to the nearest.
-
-    Raises
-    ------
-    RecordingError : not finite, or beyond the 292 years that 64 bits hold
-
-    """
+    """Return seconds as nanoseconds; RecordingError if not finite or beyond 64 bits."""
     scaled = np.asarray(seconds, dtype=np.float64)
     # whole seconds and the rest apart: one product would lose bits of long stamps
     if not np.all(np.isfinite(scaled)) or np.any(np.abs(scaled) > 9.2e9):
@@ -67,25 +55,11 @@ def _frozen(array: ArrayLike, dtype: Any) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """
-    The samples of one signal.
+    """The samples of one signal: time_ns rises, values are finite, or RecordingError is raised."""
 
-    Attributes
-    ----------
-    unit : SI unit; '' if unknown
-    time_ns : array of shape (n,), int64 [ns]; strictly increasing, spacing as uneven as it was
-    values : array of shape (n,), float64 [unit]; finite: where there is no sample there is none
-
-    Raises
-    ------
-    RecordingError : the shapes differ, a time stamp is not later than the one before, or a
-        value is not finite
-
-    """
-
-    unit: str
-    time_ns: IntArray
-    values: FloatArray
+    unit: str  # SI unit; '' if unknown
+    time_ns: IntArray  # shape (n,), int64 [ns]
+    values: FloatArray  # shape (n,), float64 [unit]
 
     def __post_init__(self) -> None:
         """Check the samples, and keep read-only copies of them."""
@@ -109,7 +83,6 @@ class Channel:
                                  f'{self.values[k]}, no finite number')
 
     def __repr__(self) -> str:
-        """Return a line instead of the arrays."""
         unit = f' [{self.unit}]' if self.unit else ''
         if not len(self):
             return f'Channel{unit}: no sample'
@@ -122,7 +95,6 @@ class Channel:
         return Channel, (self.unit, self.time_ns, self.values)
 
     def __len__(self) -> int:
-        """Return the number of samples."""
         return len(self.values)
 
     def __eq__(self, other: object) -> bool:
@@ -138,25 +110,7 @@ class Channel:
         return result
 
     def at(self, time_ns: IntArray, method: Method = 'linear') -> FloatArray:
-        """
-        Return the values at other times; see METHODS for what each method does.
-
-        Parameters
-        ----------
-        time_ns
-            array of shape (m,), int64 [ns]; inside the span of the samples
-        method
-            one of METHODS
-
-        Returns
-        -------
-        array of shape (m,) [unit]
-
-        Raises
-        ------
-        RecordingError : no such method, or a time outside the span: nothing is extrapolated
-
-        """
+        """Return values [unit] at times [ns], shape (m,); RecordingError outside the samples."""
         if method not in METHODS:
             raise RecordingError(f'no method {method!r}: choose one of {", ".join(METHODS)}')
         if len(time_ns) == 0:
@@ -178,14 +132,7 @@ class Channel:
 
 
 def check_name(name: str) -> None:
-    """
-    Check that a name can be a ROS 2 topic: words, perhaps with slashes between them.
-
-    Raises
-    ------
-    RecordingError : it cannot
-
-    """
+    """Raise RecordingError if a name cannot be a ROS 2 topic: words, slashes between them."""
     parts = name.split('/') if isinstance(name, str) else []
     if not parts or not all(part.isascii() and part.isidentifier() for part in parts):
         raise RecordingError(f'{one_line(repr(name))}: no name of a signal, such as '
@@ -193,14 +140,7 @@ def check_name(name: str) -> None:
 
 
 def make_channel(name: str, unit: str, time_ns: ArrayLike, values: ArrayLike) -> Channel:
-    """
-    Make a channel, and name the signal when its samples are refused.
-
-    Raises
-    ------
-    RecordingError : see Channel; the message begins with `name`
-
-    """
+    """Make a channel; RecordingError, as of Channel, begins with its name."""
     try:
         return Channel(unit, time_ns, values)  # type: ignore[arg-type]
     except (RecordingError, TypeError, ValueError) as error:

@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-A map from somebody else's file to signals: columns, units, signs, clocks.
-
-docs/recording.md describes the map's entries with an example.
-"""
+"""A map from somebody else's file to signals, see docs/recording.md: columns, units, clocks."""
 
 from __future__ import annotations
 
@@ -57,52 +53,29 @@ _PLACE = Entry('1', 0, MOST_COLUMNS, whole=True)
 
 @dataclass(frozen=True)
 class TimeMap:
-    """
-    How the time is written.
+    """How the time is written."""
 
-    Attributes
-    ----------
-    column : name of the column, or its place, counted from 0
-    unit : one of TIME_UNITS, or iso8601 (without a zone it is taken for UTC)
-    offset_ns : added to every time stamp [ns]
-    from_first : count from the first time stamp of the file
-    duplicates : which row counts where a time stamp is repeated: refuse, first or last
-
-    """
-
-    column: str | int
-    unit: str = 's'
-    offset_ns: int = 0
-    from_first: bool = False
+    column: str | int  # its name, or its place, counted from 0
+    unit: str = 's'  # one of TIME_UNITS, or iso8601 (without a zone it is taken for UTC)
+    offset_ns: int = 0  # added to every time stamp [ns]
+    from_first: bool = False  # count from the first time stamp of the file
+    # row that counts where a time stamp is repeated: refuse, first or last
     duplicates: str = 'refuse'
 
 
 @dataclass(frozen=True)
 class SignalMap:
-    """
-    How one signal is written: SI value = factor * (sign * scale * number + offset).
+    """How one signal is written: SI value = factor * (gain * number + offset)."""
 
-    Attributes
-    ----------
-    number : the columns, and the number that they give
-    unit : SI unit of the signal
-    factor : SI units in the unit of the column
-    gain : sign * scale
-    offset : in the unit of the column
-    time_column : column of this signal's own time stamps; None for the common one
-    clock_offset_ns : added to this signal's time stamps [ns]
-    sign_bit : value of the bit that is the sign of a sign-magnitude register; 0 for none
-
-    """
-
-    number: Expression
-    unit: str
-    factor: float = 1.0
-    gain: float = 1.0
-    offset: float = 0.0
+    number: Expression  # of the columns
+    unit: str  # SI unit of the signal
+    factor: float = 1.0  # SI units in the unit of the column
+    gain: float = 1.0  # sign * scale
+    offset: float = 0.0  # in the unit of the column
+    # of this signal's own time stamps; None for the common one
     time_column: str | int | None = None
-    clock_offset_ns: int = 0
-    sign_bit: int = 0
+    clock_offset_ns: int = 0  # added to this signal's time stamps [ns]
+    sign_bit: int = 0  # value of the bit that is the sign of a sign-magnitude register; 0 for none
 
 
 @dataclass(frozen=True)
@@ -117,16 +90,7 @@ class ImportMap:
 
 @dataclass(frozen=True)
 class KnownSignals:
-    """
-    Signals that a program knows already, before it reads a map.
-
-    Attributes
-    ----------
-    owner : who has them, for messages
-    units : their SI units by name
-    aliases : other names by which a map may call them
-
-    """
+    """Signals that the program `owner` knows before a map: SI units by name, and aliases."""
 
     owner: str = ''
     units: Mapping[str, str] = field(default_factory=dict)
@@ -138,20 +102,10 @@ NO_SIGNALS = KnownSignals()
 
 def load_map(path: str | Path, known: KnownSignals = NO_SIGNALS) -> ImportMap:
     """
-    Read a map.
+    Read a map; the units of known signals need not be stated.
 
-    Parameters
-    ----------
-    path
-        of the map
-    known
-        signals whose units need not be stated
-
-    Raises
-    ------
-    ParameterError : the file cannot be read or an entry is not allowed; one line names the file,
-        the key and what is allowed
-
+    Raises ParameterError if the file cannot be read or an entry is not allowed; one line names the
+    file, the key and what is allowed.
     """
     path = Path(path)
     tree = read_yaml(path)
@@ -162,14 +116,7 @@ def load_map(path: str | Path, known: KnownSignals = NO_SIGNALS) -> ImportMap:
 
 
 def parse_map(tree: object, known: KnownSignals = NO_SIGNALS) -> ImportMap:
-    """
-    Check the plain data of a map; parameters as in `load_map`.
-
-    Raises
-    ------
-    ParameterError : an entry is missing, unknown or not allowed; the message names the key
-
-    """
+    """Check the plain data of a map, as `load_map`; ParameterError names a wrong key."""
     top = mapping_of('the map', tree, _TOP)
     texts = {key: _text(key, top[key]) for key in _TEXT_ENTRIES if key in top}
     for key, allowed in (('delimiter', ',;\t| '), ('decimal', '.,')):
@@ -212,7 +159,6 @@ def _text(key: str, value: object, choices: tuple[str, ...] | None = None) -> st
 
 
 def _column(key: str, value: object) -> str | int:
-    """Return a column's name, or its place."""
     if isinstance(value, int) and not isinstance(value, bool):
         return int(_PLACE.check(key, plain_value(value)))  # type: ignore[arg-type]
     if not isinstance(value, str) or not value:
@@ -279,7 +225,6 @@ def _signal(key: str, name: str, body: object, known: KnownSignals) -> SignalMap
 
 
 def _expression(key: str, entries: Mapping[str, Any]) -> Expression:
-    """Return what a signal is in the columns of the file."""
     index = _whole(key, 'index', entries)
     if 'expression' not in entries:
         return Expression.of_column(Reference(_column(f'{key}.column', entries.get('column')),

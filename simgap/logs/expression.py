@@ -3,10 +3,9 @@
 """
 A number that a row of a file gives: a column, or a small expression over columns.
 
-An expression is parsed with Python's own grammar, and only the parts listed here are allowed. It
-is never evaluated as a program. Names are columns, as the file writes them. `v[2]` is the third
-number of a column of vectors. `column('T (ms)')` is a column whose name is no word, and
-`column(0)` is the first column of the file.
+An expression is parsed with Python's own grammar, of which the parts listed here are allowed, and
+is never evaluated as a program. Names are columns. `v[2]` is the third number of a column of
+vectors, `column('T (ms)')` a column of that name, and `column(0)` the first column.
 """
 
 from __future__ import annotations
@@ -48,40 +47,22 @@ _Term = Callable[[Sequence[float]], float]
 
 @dataclass(frozen=True)
 class Reference:
-    """
-    A column of a file.
-
-    Attributes
-    ----------
-    column : its name, or its place, counted from 0
-    index : which number of a vector in a cell, counted from 0; None for a cell with one number
-
-    """
+    """A column, by name or by place from 0, and the index of a number in its vectors or None."""
 
     column: str | int
     index: int | None = None
 
     def __str__(self) -> str:
-        """Return the column as a person would call it."""
         column = self.column if isinstance(self.column, str) else f'number {self.column}'
         return column if self.index is None else f'{column}[{self.index}]'
 
 
 @dataclass(frozen=True)
 class Expression:
-    """
-    A number as a function of columns.
+    """A number as a function of columns."""
 
-    Attributes
-    ----------
-    references : the columns, each of them once
-    value : returns the number from those of the columns, in this order; ArithmeticError or
-        ValueError where it has none, such as 1 / 0
-
-    """
-
-    references: tuple[Reference, ...]
-    value: _Term
+    references: tuple[Reference, ...]  # the columns, each of them once
+    value: _Term  # of those, in this order; ArithmeticError or ValueError if none, as 1 / 0
 
     @classmethod
     def of_column(cls, reference: Reference) -> Expression:
@@ -90,21 +71,7 @@ class Expression:
 
 
 def parse_expression(key: str, text: str) -> Expression:
-    """
-    Read an expression.
-
-    Parameters
-    ----------
-    key
-        of the entry, for errors
-    text
-        such as '0.1 * current - 0.02 * sign(rate)'
-
-    Raises
-    ------
-    ParameterError : it is none, or holds what is not allowed; the message names the key
-
-    """
+    """Read an expression such as '0.1 * current'; ParameterError names the key."""
     if len(text) > LONGEST:
         raise ParameterError(f'{key}: {len(text)} characters given, allowed are {LONGEST}')
     try:
@@ -171,7 +138,6 @@ class _Parser:
         return lambda numbers: function(*[term(numbers) for term in terms])
 
     def _reference(self, node: ast.expr) -> Reference:
-        """Return the column that a part names."""
         if isinstance(node, ast.Subscript):
             index = node.slice.value if isinstance(node.slice, ast.Constant) else None
             inner = self._reference(node.value)

@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Rows that a recorder lost, put back with what is known of them.
-
-A simulation takes one step from row to row, and a controller in it one sample. A log with missing
-rows would make it leap.
-"""
+"""Rows that a recorder lost, put back because a simulation takes one step from row to row."""
 
 from __future__ import annotations
 
@@ -24,23 +19,12 @@ def without_gaps(log: Log, commands: Sequence[str], settles_s: float = 0.0) -> L
     """
     Return a log with all its rows, for `machine(..., log=...)`.
 
-    Rows come at even times but for jitter; where some lack, as many as fit are put in. Readings
-    are NaN there. Commands are interpolated. Where a command jumped or turned in a gap, nobody
-    knows when: readings are left out from the gap on until the machine has settled.
+    Where rows lack at even times but for jitter, as many as fit are put in, with NaN for readings.
+    Commands are interpolated. Where one jumped or turned in a gap, nobody knows when: readings are
+    left out from the gap on until the machine has settled. Raises LogError if a column is missing.
 
-    Parameters
-    ----------
-    log
-        as recorded
-    commands
-        columns that are known between the rows, too, such as a reference
-    settles_s
-        for which readings are left out after an unknown command [s]
-
-    Raises
-    ------
-    LogError : there is no such column
-
+    commands : columns that are known between the rows, too, such as a reference
+    settles_s : for which readings are left out after an unknown command [s]
     """
     steps = np.diff(log.time)
     counts = np.maximum(np.round(steps / np.median(steps)).astype(int), 1)

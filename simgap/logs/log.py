@@ -36,14 +36,9 @@ class Log:
     """
     What was recorded in one test.
 
-    Attributes
-    ----------
-    name : for people
     time : of the samples, rising, shape (n,) [s]
     columns : shape (n,) each, as recorded; NaN where there is no sample
-    constants : what the tester knows of this test, such as a mass
-    labels : what was different in this test, such as load: A
-
+    constants, labels : what the tester knows, such as a mass, and what was different: load: A
     """
 
     name: str
@@ -54,14 +49,7 @@ class Log:
     _held: dict[str, FloatArray] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
-        """
-        Make the samples arrays of numbers.
-
-        Raises
-        ------
-        LogError : the time does not rise, or a column has another number of samples
-
-        """
+        """Make arrays; LogError if the time does not rise or a column differs in length."""
         time = np.array(self.time, float)
         if time.ndim != 1 or time.size < _LEAST_SAMPLES or not np.all(np.diff(time) > 0.0):
             raise LogError(f'{self.name}: time: two or more increasing times are needed')
@@ -75,14 +63,7 @@ class Log:
         object.__setattr__(self, '_held', {name: _held(v) for name, v in columns.items()})
 
     def __getitem__(self, column: str) -> FloatArray:
-        """
-        Return a column, shape (n,); where it has no sample, the last one before holds.
-
-        Raises
-        ------
-        LogError : there is no such column
-
-        """
+        """Return a column, shape (n,), the last sample held; LogError if there is none."""
         try:
             return self._held[column]
         except KeyError:
@@ -95,11 +76,8 @@ class OneTest:
     """
     What a simulation gets of a test.
 
-    Attributes
-    ----------
     log : the test's log, perhaps only its beginning
     push : what enters at each place of the model, shape (n,); zero unless something does
-
     """
 
     log: Log
@@ -121,7 +99,6 @@ class OneTest:
         return self.log.constants
 
     def __getitem__(self, column: str) -> FloatArray:
-        """Return a column of the log, shape (n,)."""
         return self.log[column]
 
 
@@ -140,18 +117,10 @@ def read_log(path: str | Path, import_map: ImportMap | None = None) -> Log:
     """
     Read a log, and NAME.yaml beside it if it is there: constants and labels of the test.
 
-    Parameters
-    ----------
-    path
-        a file of any kind that `recording.tables` knows; without a map its columns keep their
-        names, and time_s, time or t is the time
-    import_map
-        which column is which, and how it is written
+    path : a file of any kind that `tables` knows; without a map, time_s, time or t is the time
+    import_map : which column is which, and how it is written
 
-    Raises
-    ------
-    LogError, RecordingError : a cell, a row or a column cannot be read; one line says where
-
+    Raises LogError or RecordingError, in one line, if a cell, a row or a column cannot be read.
     """
     path = Path(path)
     time, columns = _mapped(path, import_map) if import_map else _plain(path)
@@ -163,14 +132,7 @@ def read_log(path: str | Path, import_map: ImportMap | None = None) -> Log:
 
 
 def read_logs(paths: Sequence[str | Path], map_path: str | Path | None = None) -> list[Log]:
-    """
-    Read several files with one map.
-
-    Raises
-    ------
-    LogError, RecordingError, ParameterError : as `read_log` and `load_map`; two files of one name
-
-    """
+    """Read several files with one map; errors of `read_log` and `load_map`, or of equal names."""
     import_map = load_map(map_path) if map_path else None
     logs = [read_log(path, import_map) for path in paths]
     names = [log.name for log in logs]

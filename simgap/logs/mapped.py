@@ -25,7 +25,7 @@ from simgap.logs.text import Cell, parse_nanoseconds, parse_number
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=timezone.utc)
 _BETWEEN = re.compile(r'[\s,;]+')
-# a comma is no separator where it is the decimal point
+# a comma is not a separator where it is the decimal point
 _BETWEEN_DECIMAL_COMMAS = re.compile(r'[\s;]+')
 
 
@@ -33,15 +33,9 @@ def read_mapped(path: str | Path, import_map: ImportMap) -> dict[str, Channel]:
     """
     Return the signals that a map finds in a file, by name.
 
-    Raises
-    ------
-    RecordingError : a cell, a row or the header cannot be read as the map says, or a time stamp
-        is not later than the one before; one line names file, line and column
-
-    Warns
-    -----
-    RecordingWarning : the last line is not ended, or rows with repeated time stamps were left out
-
+    Raises RecordingError if a cell, a row or the header cannot be read as the map says, or a time
+    stamp is not later than the one before; one line names file, line and column. Warns with
+    RecordingWarning if the last line is not ended, or repeated rows were left out.
     """
     path = Path(path)
     room = SAMPLES.value()
@@ -149,7 +143,7 @@ def _number_of(text: str, cell: Cell, decimal: str, sign_bit: int) -> float:
 
 
 def _point(text: str, decimal: str) -> str:
-    """Return a number with a point; one that has a point already is no number."""
+    """Return a number with a point; one that has a point already is not a number."""
     return text if decimal == '.' else text.replace('.', ' ').replace(decimal, '.')
 
 

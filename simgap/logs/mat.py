@@ -3,10 +3,9 @@
 """
 MATLAB's .mat files, up to version 7: the variables that are plain real numbers.
 
-scipy reads them. It takes the type that a file states for the numbers of a variable as an index
-into a table of 20 pointers, without a look: in a damaged file that is a crash of the process
-(scipy pull request 25829). So the types are looked at first. Format: The MathWorks, 'MAT-File
-Format', level 5.
+scipy takes a number's type in a file as an index into a table of 20 pointers, without a look: a
+damaged file crashes the process (scipy pull request 25829). So the types are looked at first.
+Format: The MathWorks, 'MAT-File Format', level 5.
 """
 
 from __future__ import annotations

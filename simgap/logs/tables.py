@@ -3,9 +3,8 @@
 """
 Tables as they come: text, .npy, .npz, .mat, JSON, JSON lines and Parquet, as rows of cells.
 
-Each kind becomes the same: names of columns, and rows whose cells are texts, empty where there is
-no sample, or vectors of texts. A number becomes the shortest text that is read back to its last
-bit, so a file means the same whatever its kind.
+Cells are texts, empty without a sample, or vectors of texts. A number becomes the shortest text
+that is read back to its last bit, so a file means the same whatever its kind.
 """
 
 from __future__ import annotations
@@ -39,61 +38,32 @@ _DAMAGE = (ValueError, TypeError, BadZipFile, EOFError, zlib.error, ArithmeticEr
 
 @dataclass(frozen=True)
 class Layout:
-    """
-    How text is laid out; other kinds of files need no such help.
+    """How text is laid out; other kinds of files need no such help."""
 
-    Attributes
-    ----------
-    delimiter, decimal : between cells, and in numbers
-    comment : rows that begin with it are left out; '' for none
-    encoding : of the text
-    skip_lines : lines before the header
-    header : False if the columns have no names
-
-    """
-
-    delimiter: str = ','
-    decimal: str = '.'
-    comment: str = ''
+    delimiter: str = ','  # between cells
+    decimal: str = '.'  # in numbers
+    comment: str = ''  # rows that begin with it are left out; '' for none
     encoding: str = 'utf-8-sig'
-    skip_lines: int = 0
-    header: bool = True
+    skip_lines: int = 0  # lines before the header
+    header: bool = True  # False if the columns have no names
 
 
 @dataclass(frozen=True)
 class Table:
-    """
-    An open file.
+    """An open file."""
 
-    Attributes
-    ----------
-    names : of the columns; empty texts where they have none
-    rows : the rows, each with the number of its line
-    start : where the names stand, for errors
-    counted : what the number of a row counts
-    lengths : of columns that need not be equally long, by name
-    is_text : whether a cell that is no number is a mistake, and no column of another kind
-
-    """
-
-    names: Sequence[str]
-    rows: Iterator[tuple[int, Sequence[Text]]]
-    start: str = ''
-    counted: str = 'row'
+    names: Sequence[str]  # of the columns; empty texts where they have none
+    rows: Iterator[tuple[int, Sequence[Text]]]  # with the number of each one's line
+    start: str = ''  # where the names stand, for errors
+    counted: str = 'row'  # what the number of a row counts
+    # of columns that need not be equally long
     lengths: Mapping[str, int] = field(default_factory=dict)
-    is_text: bool = False
+    is_text: bool = False  # whether a cell that is not a number is a mistake
 
 
 @contextmanager
 def open_table(path: Path, layout: Layout = Layout()) -> Iterator[Table]:
-    """
-    Open a file of any kind, told by its suffix; what is no array, JSON or Parquet is text.
-
-    Raises
-    ------
-    RecordingError : it cannot be opened, is not what its suffix says, or is larger than allowed
-
-    """
+    """Open a file by its suffix, else as text; RecordingError if it is damaged or too large."""
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         with open_text(path, layout.encoding) as stream:
@@ -306,7 +276,7 @@ def _cell(value: Any) -> Text:
 
 
 def _text(value: Any) -> str:
-    """Return a single value as a text; NaN and null are no sample."""
+    """Return a single value as a text; NaN and null are not samples."""
     if value is None or value != value:
         return ''
     if isinstance(value, (bool, int, float)):

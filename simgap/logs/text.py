@@ -37,14 +37,7 @@ class Cell(NamedTuple):
 
 
 def parse_number(text: str, cell: Cell) -> float:
-    """
-    Read one number.
-
-    Raises
-    ------
-    RecordingError : no finite number; the message names file, line and column
-
-    """
+    """Read one finite number; RecordingError names file, line and column."""
     if not _NUMBER.fullmatch(text):
         raise cell.refuse(f'{one_line(repr(text), 40)} is no number; leave the cell empty where '
                           'there is no sample')
@@ -55,23 +48,7 @@ def parse_number(text: str, cell: Cell) -> float:
 
 
 def parse_nanoseconds(text: str, cell: Cell, per_unit: int = NANOSECONDS) -> int:
-    """
-    Read a time stamp, exact up to the nanosecond that it is rounded to.
-
-    Parameters
-    ----------
-    text
-        decimal number
-    cell
-        where it stands
-    per_unit
-        nanoseconds in the unit of the number; seconds if not given
-
-    Raises
-    ------
-    RecordingError : no number, or beyond 9.2e9 s; the message names file, line and column
-
-    """
+    """Read a decimal time stamp [ns]; RecordingError, with its place, beyond 9.2e9 s."""
     value = parse_number(text, cell)
     if abs(value) * per_unit > _LATEST_S * NANOSECONDS:
         raise cell.refuse(f'{one_line(repr(text), 40)} is beyond {_LATEST_S:g} s')
@@ -89,12 +66,8 @@ def rows(path: Path, stream: TextIO, delimiter: str = ',') -> Iterator[tuple[int
     """
     Yield the rows of a CSV file with the number of the line that each ends on.
 
-    Empty lines are left out. Warns if the last line is not ended: it may have been cut.
-
-    Raises
-    ------
-    RecordingError : no CSV, no text or too long a line; the message names file and line
-
+    Empty lines are left out. Warns if the last line is not ended: it may have been cut. Raises
+    RecordingError, with file and line, if it is not CSV or text, or a line is too long.
     """
     last = ''
 
@@ -128,14 +101,7 @@ def rows(path: Path, stream: TextIO, delimiter: str = ',') -> Iterator[tuple[int
 
 
 def open_text(path: Path, encoding: str = 'utf-8-sig') -> TextIO:
-    """
-    Open a file for the csv module.
-
-    Raises
-    ------
-    RecordingError : it cannot be opened
-
-    """
+    """Open a file for the csv module. Raises RecordingError if it cannot be opened."""
     try:
         return open(path, encoding=encoding, newline='')
     except OSError as error:
@@ -143,15 +109,7 @@ def open_text(path: Path, encoding: str = 'utf-8-sig') -> TextIO:
 
 
 def read_text(path: Path) -> bytes:
-    """
-    Read a file of text that lies beside a recording.
-
-    Raises
-    ------
-    OSError : it cannot be read
-    RecordingError : it is longer than allowed
-
-    """
+    """Read a file of text; OSError, or RecordingError if it is longer than allowed."""
     most = TEXT.value()
     with path.open('rb') as file:
         text = file.read(most + 1)

@@ -4,10 +4,9 @@
 A machine whose effects may differ between labels of its tests.
 
 A label says what was different in a test: compensation on or off, load A or B, before or after a
-repair. An effect then has one more form for each label: a size of its own under each value. That
-form pays for each of its numbers, so it is chosen only where the sizes differ. An effect that
-exists under one value only, or has another sign under each, is found by it: with one size for all
-tests, the fit would give half the size, or none.
+repair. An effect has one more form for each label: a size of its own under each value. That form
+pays for each of its numbers, so it is chosen only where the sizes differ. With one size for all
+tests, an effect that exists under one value only would get half its size, or none.
 """
 
 from __future__ import annotations
@@ -30,11 +29,7 @@ Groups = Mapping[str, tuple[str, ...]]
 
 
 def groups_of(experiments: Sequence[Experiment]) -> dict[str, tuple[str, ...]]:
-    """
-    Return the labels with two or more values, with the value of each test.
-
-    Labels that divide the tests alike cannot be told apart: the first of them counts.
-    """
+    """Return the value of each test by label; labels that divide the tests alike count once."""
     found: dict[str, tuple[str, ...]] = {}
     seen = set()
     for key in dict.fromkeys(key for e in experiments for key in e.labels):
@@ -70,11 +65,7 @@ def _split_name(name: str, key: str, value: str) -> str:
 
 
 class Labels:
-    """
-    Forms with a size under each label, the names of such sizes, and points that hold them.
-
-    `groups` comes from `groups_of`; names of nuisances may look like those of sizes by label.
-    """
+    """Forms with a size under each label of `groups`, their names, and points that hold them."""
 
     def __init__(self, groups: Groups, nuisances: Sequence[Parameter]) -> None:
         self.groups = groups
@@ -193,8 +184,6 @@ class ByLabel(Machine):
         self.disturbance_inputs, self.notes = inner.disturbance_inputs, inner.notes
         self.diagram, self.advice = inner.diagram, inner.advice
 
-    # -- readings ------------------------------------------------------------------------------
-
     def predict(self, point: Point, experiment: int) -> FloatArray:
         return self.inner.predict(self.labels.in_test(point, experiment), experiment)
 
@@ -221,8 +210,6 @@ class ByLabel(Machine):
             return self.inner.simulate_disturbed(point, place, course)
         return [self.inner.simulate_disturbed(self.labels.in_test(point, k), place, course)[k]
                 for k in range(len(self.experiments))]
-
-    # -- what the machine within knows ---------------------------------------------------------
 
     @property
     def time_scales(self) -> TimeScales:

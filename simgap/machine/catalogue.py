@@ -13,31 +13,15 @@ from simgap.machine.experiment import Experiment
 
 
 class Catalogue(dict[str, Effect]):
-    """
-    Effects by id.
-
-    Parameters
-    ----------
-    effects
-        in the order in which they are tried
-
-    """
+    """Effects by id, in the order in which they are tried."""
 
     def __init__(self, effects: Iterable[Effect] = ()) -> None:
         super().__init__({effect.id: effect for effect in effects})
 
     def without(self, effects: Collection[str]) -> Catalogue:
-        """
-        Return the catalogue without some effects.
-
-        It also lacks their parts, what they are parts of, and what becomes one of them at an end
-        of its range.
-
-        Raises
-        ------
-        KeyError : there is no effect of a name
-
-        """
+        """Return the catalogue without effects and what depends on them; KeyError if unknown."""
+        # their parts, what they are parts of, and what becomes one of them at an end of its range
+        # also without their parts, and what becomes one of them at an end of its range
         gone = {name for effect in effects for name in (effect, *self[effect].parts)}
         kept = copy(self)
         while found := gone.intersection(kept):
@@ -49,11 +33,7 @@ class Catalogue(dict[str, Effect]):
 
     def forms(self, effect: Effect, experiments: Sequence[Experiment],
               residuals: Sequence[FloatArray]) -> Sequence[Form]:
-        """
-        Return the forms of an effect that are worth a fit.
-
-        The residuals of each experiment are measured minus predicted without the effect, (n, c).
-        """
+        """Return the forms of an effect worth a fit; residuals are measured minus predicted."""
         return effect.forms
 
     def typical_form(self, effect: Effect) -> Form:
@@ -61,14 +41,7 @@ class Catalogue(dict[str, Effect]):
         return effect.forms[0]
 
     def form_named(self, effect: Effect, name: str) -> Form:
-        """
-        Return the form of an effect by its name.
-
-        Raises
-        ------
-        KeyError : the effect has no such form
-
-        """
+        """Return the form of an effect by its name; KeyError if there is no such form."""
         for form in effect.forms:
             if form.name == name:
                 return form
@@ -82,8 +55,7 @@ class Catalogue(dict[str, Effect]):
         for whole in self.values():
             if effect.id in whole.parts:
                 yield whole, 1.0 / len(whole.parts)
-                yield from ((self[part], 1.0) for part in whole.parts
-                            if part != effect.id)
+                yield from ((self[part], 1.0) for part in whole.parts if part != effect.id)
 
     def counterpart(self, form: Form, effect: Effect, part: Effect) -> Form:
         """Return the form of an effect's part that corresponds to a form of the effect."""

@@ -21,14 +21,7 @@ class MachineError(UserError):
 
 
 def check_machine(machine: Machine) -> None:
-    """
-    Check what a machine declares, and what it predicts without any effect.
-
-    Raises
-    ------
-    MachineError : something is missing or wrong
-
-    """
+    """Check what a machine declares and predicts; MachineError if something is wrong."""
     if not machine.experiments:
         raise MachineError('experiments: there is none')
     for k, experiment in enumerate(machine.experiments):
@@ -51,12 +44,7 @@ def check_machine(machine: Machine) -> None:
 
 
 def idle_effects(machine: Machine) -> Iterator[str]:
-    """
-    Yield what is wrong with effects in these experiments, an effect a line.
-
-    Each effect is simulated: one that changes no reading at half of its bounds cannot be found,
-    and one that changes a reading while its size is zero is not neutral.
-    """
+    """Yield effects that change no reading, or that change one while they are absent."""
     neutral = machine.simulate([{}])[0]
     for effect in machine.catalogue.values():
         form = machine.catalogue.typical_form(effect)

@@ -14,42 +14,23 @@ _IN_A_ROW, _WIDTH, _GAP = 4, 170, 20
 
 @dataclass(frozen=True)
 class DiagramBlock:
-    """
-    A part of the machine.
+    """A part of the machine."""
 
-    Attributes
-    ----------
-    component : as the effects of the catalogue name it
-    label : for people
-    x, y : its upper left corner
-    width : of the block
-
-    """
-
-    component: str
-    label: str
-    x: float
+    component: str  # as the effects of the catalogue name it
+    label: str  # for people
+    x: float  # of its upper left corner
     y: float
-    width: float
+    width: float  # of the block
 
 
 @dataclass(frozen=True)
 class Diagram:
-    """
-    Blocks and the lines between them.
+    """Blocks and the lines between them."""
 
-    Attributes
-    ----------
-    blocks : in the order in which they are drawn
-    lines : x and y of their two ends
-    height : of a block
-    several : components that are no block but several, with the components of those blocks
-
-    """
-
-    height: ClassVar[int] = 26
-    blocks: tuple[DiagramBlock, ...]
-    lines: tuple[tuple[float, float, float, float], ...] = ()
+    height: ClassVar[int] = 26  # of a block
+    blocks: tuple[DiagramBlock, ...]  # in the order in which they are drawn
+    lines: tuple[tuple[float, float, float, float], ...] = ()  # x and y of their two ends
+    # components that are several blocks, with the components of those
     several: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @classmethod

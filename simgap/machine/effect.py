@@ -22,11 +22,8 @@ class Parameter:
     """
     A number in which the machine may differ from its model; zero is the model as configured.
 
-    Attributes
-    ----------
     name : unique in its machine
-    unit : of the value
-    low, high : hard bounds, with zero between them
+    low, high : hard bounds in `unit`, with zero between them
     step : of the difference quotient, in the unit of the value
     prior_sigma : standard deviation of a Gaussian prior about zero; 0 for no prior
     experiment : index of the one experiment that it acts on; None for all
@@ -34,9 +31,7 @@ class Parameter:
     is_shape : True for a shape parameter, which has no meaning while its effect is absent
     tolerance : size up to which the model's number may be off without being wrong
     label : key and value of the label of the tests that it acts on; None for all
-    least_step : least step of a difference quotient, for a prediction that is a staircase in the
-        value, such as a delay in samples; 0 for none
-
+    least_step : of the difference quotient where the prediction is a staircase; 0 for none
     """
 
     name: str
@@ -58,14 +53,10 @@ class Form:
     """
     One mathematical form of an effect.
 
-    Attributes
-    ----------
-    name : for people
-    parameters : those that are no shape parameters are zero where the effect is absent
+    parameters : those that are not shape parameters are zero where the effect is absent
     scanned : True if the form was chosen by a scan of many, such as the orders of a ripple
     is_course : True for a course over time that is free at every moment, such as a gust
     is_wave : True if its two sizes are the sine and the cosine part of a wave
-
     """
 
     name: str
@@ -86,13 +77,7 @@ class Form:
 
     @property
     def trials(self) -> list[dict[str, float]]:
-        """
-        Return sizes, far from zero, that may be tried out before a fit.
-
-        Of a single size these are shares of its bounds, denser near zero. Of a wave they are
-        amplitudes that grow from a few steps to the bound, each in several phases. Other forms
-        have none.
-        """
+        """Return sizes to try: shares of a single one's bounds, or amplitudes of a wave."""
         if self.is_wave and len(self.sizes) == 2:  # with labels there are more
             sine, cosine = self.sizes
             least = _LEAST_AMPLITUDE * sine.step
@@ -108,11 +93,8 @@ class Form:
                 for share in _SHARES if share > 0.0 or size.low < 0.0]
 
     def implausibility(self, point: Point, deviations: Point) -> float:
-        """
-        Return how little these values look like the effect; above 1 is implausible.
-
-        `deviations` has their standard deviations; it is empty where they are not known.
-        """
+        """Return how little values look like the effect; above 1 is implausible."""
+        # `deviations` has their standard deviations; it is empty where they are not known
         return 0.0
 
 
@@ -121,16 +103,11 @@ class Effect:
     """
     Something that the model may lack.
 
-    Attributes
-    ----------
-    id : 'component.effect'
-    component : the part of the machine that it sits in
-    cause : its physical cause, one sentence
-    look : what it looks like in the signals, one sentence
+    id, component : 'component.effect', and the part of the machine that it sits in
+    cause, look : its physical cause, and what the signals show, one sentence each
     forms : alternatives; the best one counts
     parts : ids of the effects that act together in it, each in its own place
     simpler : ids of the effects that it becomes at an end of its range
-
     """
 
     id: str  # noqa: A003: the word of the verdict's format

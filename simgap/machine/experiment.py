@@ -13,20 +13,11 @@ from simgap.machine.arrays import FloatArray
 
 @dataclass(frozen=True)
 class Colour:
-    """
-    The colour of noise: a filter whose output is white, see `noise`.
+    """The colour of noise: a filter whose output is white, see `noise`."""
 
-    Attributes
-    ----------
-    pole : of the slow part, for one sample; 0 if there is none
-    gain : share of an innovation that stays in the slow part
-    level : standard deviation of the innovations, in units of the stated noise
-
-    """
-
-    pole: float = 0.0
-    gain: float = 0.0
-    level: float = 1.0
+    pole: float = 0.0  # of the slow part, for one sample; 0 if there is none
+    gain: float = 0.0  # share of an innovation that stays in the slow part
+    level: float = 1.0  # standard deviation of the innovations, in units of the stated noise
 
 
 @dataclass(frozen=True)
@@ -34,20 +25,14 @@ class Experiment:
     """
     What was measured in one test.
 
-    Attributes
-    ----------
-    name : for people
     time : shape (n,) [s]
-    channels : names of the c signals
-    units : of the signals
+    channels, units : names and units of the c signals
     measured : shape (n, c); NaN where there is no sample
     noise : standard deviation of the residuals of a perfect model, shape (n, c)
     quantised : names of signals whose residual at rest is a fraction of a digit, not noise
-    model_error : slow error that the model may have in each signal however right it is, shape
-        (c,), in the signals' units; None for a usual share of the motion
-    colours : of the noise, one for each signal, as a diagnosis finds it; empty for white noise
+    model_error : slow error of a right model, shape (c,), as read; None for a usual share
+    colours : of the noise of each signal, as a diagnosis finds it; empty for white noise
     labels : what was different in this test, such as load: A; see `interventions`
-
     """
 
     name: str

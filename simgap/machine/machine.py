@@ -3,9 +3,8 @@
 """
 The seam between the diagnosis and the machine: what a diagnosis asks of a machine.
 
-A machine of your own needs two things: a simulation (`Machine.predict`) and the numbers that may
-differ from your model (`nuisances` and `effects`). Everything else has a default that you may
-override, for speed or because you know your machine better.
+Your machine needs a simulation (`Machine.predict`) and the numbers that may differ from your model
+(`nuisances` and `effects`). You may override the other defaults, for speed or accuracy.
 """
 
 from __future__ import annotations
@@ -30,43 +29,24 @@ from simgap.machine.nuisances import Nuisances
 
 @dataclass(frozen=True)
 class DisturbanceInput:
-    """
-    A place where an unknown input may act on the machine.
+    """A place where an unknown input may act on the machine."""
 
-    Attributes
-    ----------
-    name : unique in its machine, for people
-    component : the part of the machine that it acts on
-
-    """
-
-    name: str
-    component: str
+    name: str  # unique in its machine, for people
+    component: str  # the part of the machine that it acts on
 
 
 class Machine(ABC):
     """
     A machine that can be simulated, and the experiments that were made with it.
 
-    Parameters
-    ----------
-    experiments
-        what was measured
-    nuisances
-        numbers that are known only within a tolerance; they are fitted beside any effect
-    effects
-        the catalogue of what the model may lack
-
-    Attributes
-    ----------
-    experiments, nuisances, catalogue : as given; the effects by id
+    nuisances : numbers known only within a tolerance, fitted beside any effect
+    catalogue : the effects that the model may lack, by id
     disturbance_inputs : where an unknown input may act; readings need not be listed
     notes : what the machine inferred or missed, for people
     diagram : picture of the machine for the page; None for a block for each component
-    advice : tests that settle what is open: names of effects without their component (empty for
-        any), and what to record
+    advice : tests that settle what is open: effects without their component (empty for any), and
+        what to record
     planning : what the design of a further test must know of the tests, as plain data
-
     """
 
     experiments: Sequence[Experiment]
@@ -89,20 +69,9 @@ class Machine(ABC):
     @abstractmethod
     def predict(self, point: Point, experiment: int) -> FloatArray:
         """
-        Return the readings of one experiment, had the machine these parameter values.
+        Return the readings of an experiment, shape (n, c); not finite where the run diverged.
 
-        Parameters
-        ----------
-        point
-            parameter values by name; a parameter that is not named is zero, a shape parameter
-            that is not named has no effect
-        experiment
-            its index
-
-        Returns
-        -------
-        array of shape (n, c), as `Experiment.measured`; NaN or infinite where the run diverged
-
+        `point` has values by name. Others are zero; shape parameters not named do nothing.
         """
 
     # -- what it may override for speed --------------------------------------------------------
@@ -110,21 +79,10 @@ class Machine(ABC):
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
                  until: float = math.inf) -> list[list[FloatArray | None]]:
         """
-        Return the readings of several variants.
+        Return the readings of variants by experiment, shape (n, c) each, or None if not wanted.
 
-        Parameters
-        ----------
-        points
-            parameter values by name, one mapping for each variant
-        only
-            for each variant the index of the one experiment that is wanted, None for all
-        until
-            end of the simulation after an experiment's first sample [s]; later readings are NaN
-
-        Returns
-        -------
-        for each variant and experiment an array of shape (n, c), or None where not wanted
-
+        only : for each variant the index of the one experiment that is wanted, None for all
+        until : end of the simulation after the first sample [s]; later readings are NaN
         """
         results: list[list[FloatArray | None]] = []
         for point, one in zip(points, only or [None] * len(points), strict=True):
@@ -151,8 +109,7 @@ class Machine(ABC):
     @property
     def time_scales(self) -> TimeScales:
         """Return how fast the machine is; by default in proportion to the longest test."""
-        return TimeScales.of_duration(max(
-            float(e.time[-1] - e.time[0]) for e in self.experiments))
+        return TimeScales.of_duration(max(float(e.time[-1] - e.time[0]) for e in self.experiments))
 
     def motion(self, experiment: int) -> Motion:
         """Return how it moves in an experiment; by default nothing is known."""
@@ -171,31 +128,17 @@ class Machine(ABC):
         return other
 
     def with_noise_at(self, point: Point) -> Machine:
-        """
-        Return the machine with the noise that its sensors have where it moves as at `point`.
-
-        A jitter of the time stamps makes a fast reading noisier than a slow one.
-        """
+        """Return the machine with the noise of its sensors where it moves as at `point`."""
+        # a jitter of the time stamps makes a fast reading noisier than a slow one
         return self
 
     def simulate_disturbed(self, point: Point, place: DisturbanceInput,
                            course: Course) -> list[FloatArray]:
         """
-        Return the readings with an unknown input.
+        Return the readings of each experiment, shape (n, c), with an unknown input.
 
-        Parameters
-        ----------
-        point
-            parameter values by name
-        place
-            where it acts, one of `disturbance_inputs`
-        course
-            the input over time, in a unit that moves the machine a little
-
-        Returns
-        -------
-        for each experiment an array of shape (n, c)
-
+        `place` is one of `disturbance_inputs`; `course` is the input over time, in a unit that
+        moves the machine a little.
         """
         raise NotImplementedError(f'{type(self).__name__} names disturbance_inputs '
                                   'and lacks simulate_disturbed')

@@ -29,24 +29,13 @@ class Regimes:
 
 @dataclass(frozen=True)
 class TimeScales:
-    """
-    How fast the machine is, which the search and the localisation need to know.
+    """How fast the machine is, which the search and the localisation need to know."""
 
-    Attributes
-    ----------
-    start_s : time within which the effect of the initial conditions shows [s]
-    scan_s : length of the part of a test that a scan of parameter values looks at [s]
-    pulse_s : rise time of the pulses of an unknown input [s]
-    response_s : time after which the response to such a pulse has ended [s]
-    block_s : time beyond which residuals are independent, for the bootstrap [s]
-
-    """
-
-    start_s: float
-    scan_s: float
-    pulse_s: float
-    response_s: float
-    block_s: float
+    start_s: float  # time within which the effect of the initial conditions shows [s]
+    scan_s: float  # length of the part of a test that a scan of parameter values looks at [s]
+    pulse_s: float  # rise time of the pulses of an unknown input [s]
+    response_s: float  # time after which the response to such a pulse has ended [s]
+    block_s: float  # time beyond which residuals are independent, for the bootstrap [s]
 
     @classmethod
     def of_duration(cls, duration_s: float) -> TimeScales:
@@ -58,24 +47,14 @@ class TimeScales:
 
 @dataclass(frozen=True)
 class Motion:
-    """
-    How a machine moves in an experiment, as far as it is known.
+    """How a machine moves in an experiment; rate, load and angle in any unit, None if unknown."""
 
-    Attributes
-    ----------
-    time : shape (n,) [s]
-    rate, load, angle : shape (n,), in any unit; None for an unknown one
-    load_limit : load at which the drive saturates
-    reversal_s : time after a reversal that still belongs to it [s]
-
-    """
-
-    time: FloatArray
+    time: FloatArray  # shape (n,) [s]
     rate: FloatArray | None = None
     load: FloatArray | None = None
     angle: FloatArray | None = None
-    load_limit: float = math.inf
-    reversal_s: float = 0.4
+    load_limit: float = math.inf  # load at which the drive saturates
+    reversal_s: float = 0.4  # time after a reversal that still belongs to it [s]
 
     def regimes(self) -> Regimes:
         """Return the regime of each sample; a later test overrides an earlier one."""

@@ -14,16 +14,8 @@ class Nuisances(list[Parameter]):
     """
     The nuisances of a machine, and how they share numbers with its effects.
 
-    Parameters
-    ----------
-    numbers
-        the nuisances
-    initial_conditions
-        of some experiments by index, values that are tried out before a fit. Gradients do not
-        lead from one side of a gap to the other. Groups are tried one after the other, each from
-        the best of those before it: conditions that hardly depend on each other need not be
-        tried in all combinations
-
+    `initial_conditions` has values, by experiment, to try out before a fit, because gradients do
+    not lead across a gap. Each group is tried from the best of those before it.
     """
 
     def __init__(self, numbers: Iterable[Parameter] = (),
@@ -33,19 +25,14 @@ class Nuisances(list[Parameter]):
         self.initial_conditions = initial_conditions or {}
 
     def absorb(self, point: Point, removed: Point) -> dict[str, float]:
-        """
-        Return the nuisances that take over what they can of an effect that is removed.
-
-        `point` has the nuisances, `removed` the values of the effect's parameters.
-        """
+        """Return the nuisances of `point` that take over what they can of `removed` values."""
         return dict(point)
 
     def take_over(self, point: Point, forms: Sequence[Form]) -> tuple[dict[str, float], set[str]]:
         """
         Return a point at which effects alone stand for their numbers, and what is held at zero.
 
-        A nuisance may stand for the very number that an effect changes. Both together are not
-        determined, so the nuisance is held at zero, and the effect takes over its value. Of
-        several nuisances it takes over what they have in common. By default none is held.
+        A nuisance may stand for the very number that an effect changes; data do not determine
+        both. The effect takes over what such nuisances have in common. By default none is held.
         """
         return dict(point), set()

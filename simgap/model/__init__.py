@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-A machine of your own for the diagnosis: a simulation in, the missing effect out.
-
-This is its public face; docs/own-machine.md leads through it step by step.
-"""
+"""The public face of machines of your own for the diagnosis, see docs/own-machine.md."""
 
 from simgap.logs.gaps import without_gaps
 from simgap.logs.log import Log, LogError, OneTest, read_log, read_logs

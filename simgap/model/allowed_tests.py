@@ -22,20 +22,9 @@ from simgap.verdict.record import Verdict
 
 
 class OwnTests(TestSpace):
-    """
-    The tests that a model of one's own declares.
-
-    Parameters
-    ----------
-    model
-        with its `tests` and `limits`
-    duration_s
-        of a test [s]
-
-    """
+    """The tests of `duration_s` [s] that a model of one's own declares, within its limits."""
 
     def __init__(self, model: Model, duration_s: float) -> None:
-        """Take the model."""
         self.families = tuple(model.tests)
         self._model, self._duration = model, duration_s
         self.limits = model.limits
@@ -91,14 +80,7 @@ class OwnTests(TestSpace):
 
 
 def own_tests(model: Model, duration_s: float) -> OwnTests:
-    """
-    Return the tests that a model declares.
-
-    Raises
-    ------
-    ModelError : it declares none
-
-    """
+    """Return the tests that a model declares. Raises ModelError if it declares none."""
     if not model.tests:
         raise ModelError('tests: the model does not say what a test may be; give machine(..., '
                          'tests={kind: f(duration_s, random) -> Log})')

@@ -23,21 +23,13 @@ from simgap.model.response import NO_RESPONSE, StepResponse, tests_of, where_it_
 # simulation is smooth.
 _ROUGH = 0.5
 _LEAST_SAMPLES = 50
-# Simulations of a usual diagnosis, by which its duration is told.
+# Simulations of a usual diagnosis, from which its duration is estimated.
 _RUNS = 6000
 
 
 @dataclass(frozen=True)
 class Checked:
-    """
-    What a check found.
-
-    Attributes
-    ----------
-    faults : what has to be mended, a line each
-    remarks : what should be known, a line each
-
-    """
+    """What a check found: faults that have to be mended, and remarks, a line each."""
 
     faults: Sequence[str]
     remarks: Sequence[str]

@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-What a user says of a machine: numbers, readings, effects, places where something may push.
-
-`machine` collects it. See docs/own-machine.md for the steps, and examples/emps for a real one.
-"""
+"""What a user says of a machine, see docs/own-machine.md; `machine` collects it."""
 
 from __future__ import annotations
 
@@ -30,23 +26,11 @@ def within(value: float, share: float | None = None, unit: str = '1', *,
     """
     Return a number that is known within a tolerance, and is fitted within it.
 
-    Parameters
-    ----------
-    value
-        as configured
-    share
-        tolerance as a share of the value
-    unit
-        of the value
-    by
-        tolerance in the unit of the value, in the place of `share`
-    step
-        of the difference quotient; 0 for a usual one
+    value, unit : as configured
+    share, by : tolerance as a share of the value, or in its unit
+    step : of the difference quotient; 0 for a usual one
 
-    Raises
-    ------
-    ModelError : neither `share` nor `by` is given, or both, or the tolerance is not above 0
-
+    Raises ModelError unless just one of `share` and `by` is given, and is above 0.
     """
     if (share is None) == (by is None):
         raise ModelError(f'within({value:g}): give either a share or by=')
@@ -60,19 +44,10 @@ def within(value: float, share: float | None = None, unit: str = '1', *,
 def free(low: float, high: float, unit: str = '1', *, start: float | None = None,
          step: float = 0.0) -> Number:
     """
-    Return a number of which nothing is known but its bounds.
+    Return a number of which nothing is known but its bounds `low` and `high`, in `unit`.
 
-    Parameters
-    ----------
-    low, high
-        bounds
-    unit
-        of the value
-    start
-        where a fit begins; None for the middle
-    step
-        of the difference quotient; 0 for a usual one
-
+    start : where a fit begins; None for the middle
+    step : of the difference quotient; 0 for a usual one
     """
     return Number(0.5 * (low + high) if start is None else start, low, high, unit, step)
 
@@ -82,17 +57,9 @@ def size(low: float, high: float, unit: str = '1', *, tolerance: float = 0.0,
     """
     Return a number of an effect that is zero where the effect is absent.
 
-    Parameters
-    ----------
-    low, high
-        bounds, with 0 between them or at one of them
-    unit
-        of the value
-    tolerance
-        size that a machine in good order may have, which is not named
-    step
-        of the difference quotient; 0 for a usual one
-
+    low, high, unit : bounds, with 0 between them or at one of them, and their unit
+    tolerance : size that a machine in good order may have, which is not named
+    step : of the difference quotient; 0 for a usual one
     """
     return Number(0.0, low, high, unit, step, tolerance=tolerance)
 
@@ -113,26 +80,13 @@ def effect(name: str, *forms: OwnForm, cause: str = '', look: str = '', simpler:
     """
     Return an effect that the model may lack.
 
-    Parameters
-    ----------
-    name
-        'component.effect'
-    forms
-        alternative forms, if there are several
-    cause
-        its physical cause, one sentence
-    look
-        what it looks like in the readings, one sentence
-    simpler
-        name of the effect that it becomes at an end of its range, as a Stribeck friction
-        becomes a Coulomb friction; it is tried in its place
-    numbers
-        of its only form: `size` or `shape` by name
+    name : 'component.effect'
+    cause, look : its physical cause, and what the readings show, one sentence each
+    simpler : effect that it becomes at an end of its range, tried in its place
+    forms : alternative forms, if there are several
+    numbers : of its only form: `size` or `shape` by name
 
-    Raises
-    ------
-    ModelError : there are neither forms nor numbers, or both
-
+    Raises ModelError if there are neither forms nor numbers, or both.
     """
     if bool(forms) == bool(numbers):
         raise ModelError(f'effect {name}: give its numbers, such as half_gap=size(0, 1e-3, '
@@ -150,23 +104,12 @@ def ripple(name: str, stem: str, amplitude: Number, angle: str | Angle,
     The simulation reads numbers.stem_cosine, stem_sine and stem_order, for `parts.wave`; of each
     further harmonic k stem_cosine_k and stem_sine_k, for `parts.harmonics`.
 
-    Parameters
-    ----------
-    name
-        'component.effect'
-    stem
-        of the three numbers
-    amplitude
-        `size` of the two amplitudes
-    angle
-        name of a column of the logs in rad, or a function of a log that returns the angle [rad]
-    orders
-        cycles per revolution that are tried; empty to find them in the residual
-    harmonics
-        how many the wave has, its fundamental counted; waves of real machines are seldom pure
-    cause, look
-        as for `effect`
-
+    name, stem : 'component.effect', and stem of the three numbers
+    amplitude : `size` of the two amplitudes
+    angle : column of the logs [rad], or a function of a log that returns the angle [rad]
+    orders : cycles per revolution that are tried; empty to find them in the residual
+    harmonics : how many the wave has, its fundamental counted; real waves are seldom pure
+    cause, look : as for `effect`
     """
     column = angle
     follow = angle if callable(angle) else (lambda log: log[column])

@@ -32,29 +32,17 @@ class ModelError(UserError):
 
 @dataclass(frozen=True)
 class Number:
-    """
-    A number of the simulation.
+    """A number of the simulation."""
 
-    Attributes
-    ----------
-    value : as configured
-    low, high : bounds; equal to the value for a known number
-    unit : of the value
-    step : of the difference quotient, which then never steps over less; 0 for one that is chosen
-    sigma : standard deviation about the value; 0 if nothing is known but the bounds
-    is_shape : True for a number of an effect that means nothing while the effect is absent
-    tolerance : size up to which an effect's number is usual and not worth a name
-
-    """
-
-    value: float
-    low: float
-    high: float
-    unit: str = '1'
+    value: float  # as configured
+    low: float  # bound; the value for a known number
+    high: float  # bound; the value for a known number
+    unit: str = '1'  # of the value
+    # of the difference quotient, which then never steps over less; 0: one is chosen
     step: float = 0.0
-    sigma: float = 0.0
-    is_shape: bool = False
-    tolerance: float = 0.0
+    sigma: float = 0.0  # standard deviation about the value; 0: unknown but for the bounds
+    is_shape: bool = False  # means nothing while its effect is absent
+    tolerance: float = 0.0  # size up to which an effect's number is usual and not worth a name
 
     @property
     def is_known(self) -> bool:
@@ -69,28 +57,15 @@ class Number:
 
 @dataclass(frozen=True)
 class Reading:
-    """
-    A reading of a sensor, which the simulation predicts.
+    """A reading of a sensor, which the simulation predicts."""
 
-    Attributes
-    ----------
-    unit : of the reading
-    noise : standard deviation of the sensor's white noise; at least that of its digit
-    model_error : slow error that a right model may have; None for 0.3 percent of the motion
-    digit : smallest step of the sensor; 0 for none
-    column : of the logs; empty for the reading's own name
-    zero : how far the sensor's zero may be off, in each test
-    gain : share by which its scale may be off
-
-    """
-
-    unit: str
-    noise: float
-    model_error: float | None = None
-    digit: float = 0.0
-    column: str = ''
-    zero: float = 0.0
-    gain: float = 0.0
+    unit: str  # of the reading
+    noise: float  # standard deviation of white noise; at least that of the digit
+    model_error: float | None = None  # slow error of a right model; None for 0.3 percent of motion
+    digit: float = 0.0  # smallest step of the sensor; 0 for none
+    column: str = ''  # of the logs; empty for the reading's own name
+    zero: float = 0.0  # how far the sensor's zero may be off, in each test
+    gain: float = 0.0  # share by which its scale may be off
 
     @property
     def sigma(self) -> float:
@@ -100,22 +75,12 @@ class Reading:
 
 @dataclass(frozen=True)
 class Push:
-    """
-    A place where something unknown may enter, such as a force on a carriage.
+    """A place where something unknown may enter, such as a force on a carriage."""
 
-    Attributes
-    ----------
-    component : part of the machine
-    label : for people
-    unit : of what enters
-    size : what moves the machine a little, well above the noise and far from any limit
-
-    """
-
-    component: str
-    label: str
-    unit: str
-    size: float
+    component: str  # part of the machine
+    label: str  # for people
+    unit: str  # of what enters
+    size: float  # what moves the machine a little, well above noise and below limits
 
 
 @dataclass(frozen=True)
@@ -128,25 +93,13 @@ class OwnForm:
 
 @dataclass(frozen=True)
 class Ripple:
-    """
-    A wave by an angle, whose order is given or found.
+    """A wave by an angle, whose order is given or found."""
 
-    Attributes
-    ----------
-    stem : its numbers are stem_cosine, stem_sine and stem_order, and of harmonic k stem_cosine_k
-        and stem_sine_k
-    amplitude : bounds of each amplitude
-    angle : that it follows
-    orders : cycles per revolution that are tried; empty to find them
-    harmonics : how many the wave has, its fundamental counted
-
-    """
-
-    stem: str
-    amplitude: Number
-    angle: Angle
-    orders: tuple[float, ...]
-    harmonics: int = 1
+    stem: str  # of stem_cosine, stem_sine, stem_order; harmonics have stem_cosine_k, stem_sine_k
+    amplitude: Number  # bounds of each amplitude
+    angle: Angle  # that it follows
+    orders: tuple[float, ...]  # cycles per revolution that are tried; empty to find them
+    harmonics: int = 1  # how many the wave has, its fundamental counted
 
     @property
     def fundamental(self) -> tuple[str, str]:
@@ -162,26 +115,14 @@ class Ripple:
 
 @dataclass(frozen=True)
 class OwnEffect:
-    """
-    Something that the model may lack.
+    """Something that the model may lack."""
 
-    Attributes
-    ----------
-    name : 'component.effect'
-    cause : its physical cause, one sentence
-    look : what it looks like in the readings, one sentence
-    forms : alternatives; the best one counts
-    ripple : set in the place of forms for a wave by an angle
-    simpler : name of the effect that it becomes at an end of its range; empty if there is none
-
-    """
-
-    name: str
-    cause: str
-    look: str
-    forms: tuple[OwnForm, ...] = ()
-    ripple: Ripple | None = None
-    simpler: str = ''
+    name: str  # 'component.effect'
+    cause: str  # its physical cause, one sentence
+    look: str  # what it looks like in the readings, one sentence
+    forms: tuple[OwnForm, ...] = ()  # alternatives; the best one counts
+    ripple: Ripple | None = None  # in the place of forms
+    simpler: str = ''  # what it becomes at an end of its range
 
     @property
     def component(self) -> str:
@@ -194,32 +135,24 @@ class Model:
     """
     A simulation, and what may differ from it; with the logs of its tests it becomes a machine.
 
-    Attributes
-    ----------
     simulate : f(numbers, test) -> {reading: shape (n,)}. `numbers.name` is a number; `test.time`
-        [s] and `test['column']` are arrays of shape (n,), `test.push['name']` is what enters
-        there. A test may be shorter than its log, because a search looks at its beginning first
+        [s], `test['column']` and `test.push['name']`, what enters there, have shape (n,). A test
+        may be shorter than its log, because a search looks at its beginning first
     base : numbers of the model by name: `known`, `within` or `free`
-    readings : by name: `reading`
+    readings, push : by name: `reading`, and places where something unknown may enter: `push`
     effects : what the model may lack: `effect` or `ripple`
     per_test : numbers that each test has of its own, such as where it starts
-    push : places where something unknown may enter: `push` by name
-    settles_s : time in which the machine settles after a push [s]; None for 5 percent of the
-        longest test
+    settles_s : time to settle after a push [s]; None for 5 percent of the longest test
     judged_hz : samples per second that are compared; None for at most 3000 samples of a test
     blocks : the components in the order in which the signal passes them, for the picture
     advice : tests that settle what is open, a sentence each
     parallel : True if `simulate` may run in several threads at once, as compiled functions may
-    log : makes of a log as it was read the log that the simulation wants, e.g. with further
-        columns
-    tests : what a further test may be, by kind: f(duration_s, random) -> a log with its commands
-        and without readings, drawn with `random`, a numpy Generator
+    log : makes of a log as it was read the one that the simulation wants
+    tests : by kind: f(duration_s, random) -> a log with commands and without readings; `random` is
+        a numpy Generator
     limits : greatest size that a reading may have in such a test, by reading
 
-    Raises
-    ------
-    ModelError : a name is there twice, or an entry is not what it should be
-
+    Raises ModelError if a name is there twice, or an entry is not what it should be.
     """
 
     simulate: Simulation
@@ -239,7 +172,6 @@ class Model:
     limits: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check the entries."""
         _check(self)
 
 

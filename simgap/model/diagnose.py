@@ -3,12 +3,9 @@
 """
 The diagnosis of a machine of one's own.
 
-Examples
---------
 >>> from simgap.model import diagnose_logs, load_model, read_log  # doctest: +SKIP
 >>> found = diagnose_logs(load_model('my_machine.py'), [read_log('a.csv')])     # doctest: +SKIP
 >>> print(found.summary())                                                      # doctest: +SKIP
-
 """
 
 from __future__ import annotations

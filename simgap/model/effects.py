@@ -19,11 +19,7 @@ _FOUND_ORDERS = 4
 
 
 class OwnCatalogue(Catalogue):
-    """
-    The catalogue of a user's machine.
-
-    `angles` returns an angle that a wave follows, in each test at its judged samples [rad].
-    """
+    """The catalogue of a user's machine; `angles` of waves are at the judged samples [rad]."""
 
     def __init__(self, effects: Sequence[OwnEffect],
                  angles: Callable[[Angle], Sequence[FloatArray]]) -> None:

@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-An FMU for co-simulation (FMI 2 or 3) as the simulation of a machine.
-
-A place, an input and an output are variables of its modelDescription.xml by their names. A step
-calls the FMU's own functions with addresses of arrays, without a wrapper between.
-"""
+"""An FMU for co-simulation (FMI 2 or 3) as a simulation, called without a wrapper between."""
 
 from __future__ import annotations
 
@@ -39,21 +34,7 @@ _Step = Callable[[float, float], bool]
 
 
 class FmuModel:
-    """
-    A simulation with an FMU; see `Simulator`.
-
-    Parameters
-    ----------
-    path
-        of the .fmu file
-    ports
-        names of its variables
-
-    Raises
-    ------
-    ModelError : the file cannot be read or instantiated, or has no such variable
-
-    """
+    """A simulation with an .fmu file; ModelError if it cannot be used or lacks a variable."""
 
     parallel = False
     longest_step_s = math.inf

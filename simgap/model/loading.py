@@ -20,18 +20,10 @@ _MODEL_FILES = ('.yaml', '.yml')
 
 def load_model(place: str) -> Model:
     """
-    Return the model of a Python file or of a model file.
+    Return the model of 'FILE.py:NAME', 'FILE.py' (NAME is machine) or 'FILE.yaml' (`model_file`).
 
-    Parameters
-    ----------
-    place
-        'FILE.py:NAME', 'FILE.py' if the name is 'machine', or 'FILE.yaml' (see `model_file`)
-
-    Raises
-    ------
-    ModelError : there is no such file or name, or the file fails; the message says at which line
-    ModuleNotFoundError : a model file needs mujoco or fmpy, which is not installed
-
+    Raises ModelError if there is no such file or name, or the file fails; the message says at
+    which line. Raises ModuleNotFoundError if mujoco or fmpy, which it needs, is missing.
     """
     if place.endswith(_MODEL_FILES):
         return load_model_file(Path(place))

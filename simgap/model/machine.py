@@ -27,21 +27,7 @@ _SAMPLES = 3000
 
 
 class OwnMachine(Machine):
-    """
-    A model of one's own in the tests that were logged.
-
-    Parameters
-    ----------
-    model
-        see `declaration.machine`
-    logs
-        the tests
-
-    Raises
-    ------
-    LogError : a log lacks a reading
-
-    """
+    """A model, see `declaration.machine`, in its logs; LogError if one lacks a reading."""
 
     def __init__(self, model: Model, logs: Sequence[Log]) -> None:
         self.model = model
@@ -131,21 +117,7 @@ class OwnMachine(Machine):
 
     def pushed(self, point: Point, experiment: int, push: Mapping[str, FloatArray],
                until: float = math.inf) -> FloatArray:
-        """
-        Return the readings of one test in which something pushes, as `predict` does.
-
-        Parameters
-        ----------
-        point
-            parameter values by name
-        experiment
-            its index
-        push
-            what enters at some of the model's places, for each sample of the log
-        until
-            end of the simulation after the first sample [s]; later readings are NaN
-
-        """
+        """Return a test's readings with pushes by place and sample, NaN later than `until` [s]."""
         log = self.logs[experiment]
         part = beginning(log, until) if math.isfinite(until) else log
         count = part.time.size
@@ -164,14 +136,7 @@ class OwnMachine(Machine):
         return np.column_stack(columns)
 
     def simulated(self, numbers: Numbers, test: OneTest) -> dict[str, FloatArray]:
-        """
-        Return what the model's simulation says, checked, shape (n,) for each reading.
-
-        Raises
-        ------
-        ModelError : it failed, or gave something else than its readings
-
-        """
+        """Return the model's checked readings, shape (n,) each; ModelError if it failed."""
         try:
             if self._lock is None:
                 found = self.model.simulate(numbers, test)

@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-A model file: a few lines of YAML make a machine of a MuJoCo model or an FMU.
-
-The entries are those of `declaration.machine`. Each number also says what it does in the
-simulation program: it changes a parameter, or delays an input (docs/own-machine.md).
-"""
+"""A model file: YAML that makes a machine of a MuJoCo model or FMU, see docs/own-machine.md."""
 
 from __future__ import annotations
 
@@ -42,18 +37,7 @@ _SAME = 1e-6
 
 @dataclass(frozen=True)
 class _Action:
-    """
-    What a number does to a place or an input.
-
-    Attributes
-    ----------
-    key : the entry that says it
-    number : its name
-    act : one of _ACTS
-    target : place or input
-    factor : of the number
-
-    """
+    """What a number does, by a factor, to a place or an input: one of _ACTS."""
 
     key: str
     number: str
@@ -66,11 +50,8 @@ def load_model_file(path: Path) -> Model:
     """
     Return the model that a YAML file describes.
 
-    Raises
-    ------
-    ModelError : the file or the model that it names cannot be used; one line names file and entry
-    ModuleNotFoundError : mujoco or fmpy is not installed
-
+    Raises ModelError, in a line with file and entry, if the file or its model cannot be used, and
+    ModuleNotFoundError if mujoco or fmpy is not installed.
     """
     try:
         return _model(path, mapping_of('', read_yaml(path), _TOP))
@@ -163,7 +144,6 @@ class _Simulation:
                 for reading, source in zip(self.readings, self.sources, strict=True)}
 
     def _values(self, numbers: Numbers, test: OneTest) -> FloatArray:
-        """Return the values of the places."""
         values = dict(zip(self.places, self.simulator.defaults.tolist(), strict=True))
         for place, name in self.constants.items():
             if name not in test.constants:
@@ -339,7 +319,6 @@ def _fields(kind: type) -> tuple[str, ...]:
 
 def _bodies(where: str, top: Mapping[str, Any], allowed: Collection[str] | None,
             before: str = '') -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the entries of a mapping of mappings."""
     for name, body in mapping_of(f'{before}{where}', top.get(where) or {}).items():
         yield str(name), mapping_of(f'{before}{where}.{name}', body, allowed)
 

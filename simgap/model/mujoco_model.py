@@ -3,9 +3,9 @@
 """
 A MuJoCo model (MJCF) as the simulation of a machine.
 
-A place is KIND.NAME.FIELD, or KIND.NAME.FIELD[INDEX] where the field has several values:
-joint.motor.damping, tendon.shaft.stiffness, actuator.servo.biasprm[1], joint.motor.qpos (where it
-starts), or option.gravity[2]. The fields are those of MuJoCo's mjModel without their prefix.
+A place is KIND.NAME.FIELD, with [INDEX] where the field, of MuJoCo's mjModel without its prefix,
+has several values: joint.motor.damping, actuator.servo.biasprm[1], joint.motor.qpos (where it
+starts), or option.gravity[2].
 """
 
 from __future__ import annotations
@@ -50,30 +50,20 @@ mujoco.set_mju_user_warning(lambda text: None)
 
 class MujocoModel:
     """
-    A simulation with MuJoCo; see `Simulator`.
+    A simulation with an MJCF file; see `Simulator`.
 
-    Parameters
-    ----------
-    path
-        of the MJCF file
-    ports
-        places as above; inputs are actuators, pushes joints, outputs sensors with one value
-
-    Raises
-    ------
-    ModelError : the file cannot be read, or has no such place, actuator, joint or sensor
-
+    Inputs are actuators, pushes joints, outputs sensors with one value. Raises ModelError if the
+    file cannot be read, or lacks a port.
     """
 
     parallel = True
 
     def __init__(self, path: Path, ports: Ports) -> None:
-        """Read the file and find the ports."""
         try:
             self._model = mujoco.MjModel.from_xml_path(str(path))
         except ValueError as error:
             raise ModelError(f'{path}: {error}') from None
-        # a run that diverges ends in NaN, and does not begin anew
+        # a run that diverges ends in NaN, and does not begin again
         self._model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         self.longest_step_s = float(self._model.opt.timestep)
         self._places = tuple(ports.places)
@@ -153,14 +143,7 @@ class _Worker:
         return found
 
     def cell(self, place: str, key: str) -> FloatArray:
-        """
-        Return the cell of the model or its data that a place names, shape (1,), to be written.
-
-        Raises
-        ------
-        ModelError : there is no such place
-
-        """
+        """Return a place's cell in model or data, shape (1,), to be written; or ModelError."""
         parts = _PLACE.fullmatch(place)
         if parts is None or (parts['name'] is None) != (parts['kind'] == 'option'):
             raise ModelError(f'{key}: {place}: give KIND.NAME.FIELD, such as joint.motor.damping, '

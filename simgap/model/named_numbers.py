@@ -11,35 +11,19 @@ from simgap.model.declared import ModelError
 
 
 class Numbers(Mapping[str, float]):
-    """
-    Numbers of a simulation as attributes; it remembers which were asked for.
-
-    Attributes
-    ----------
-    asked_for : names that the simulation has read
-
-    """
+    """Numbers of a simulation as attributes; `asked_for` has those it has read."""
 
     def __init__(self, values: Mapping[str, float]) -> None:
-        """Take the values by name."""
         self._values = values
         self.asked_for: set[str] = set()
 
     def __getattr__(self, name: str) -> float:
-        """
-        Return a number.
-
-        Raises
-        ------
-        ModelError : no entry of the model declares it
-
-        """
+        """Return a number. Raises ModelError if no entry of the model declares it."""
         if name.startswith('__'):
             raise AttributeError(name)
         return self[name]
 
     def __getitem__(self, name: str) -> float:
-        """Return a number; see `__getattr__`."""
         self.asked_for.add(name)
         try:
             return self._values[name]
@@ -48,13 +32,10 @@ class Numbers(Mapping[str, float]):
                              f'{nearest(name, self._values)}') from None
 
     def __contains__(self, name: object) -> bool:
-        """Return whether there is a number of this name."""
         return name in self._values
 
     def __iter__(self) -> Iterator[str]:
-        """Iterate over the names."""
         return iter(self._values)
 
     def __len__(self) -> int:
-        """Return how many there are."""
         return len(self._values)

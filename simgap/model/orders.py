@@ -21,21 +21,7 @@ _WINDOW_SAMPLES, _WINDOW_REVOLUTIONS = 64, 2.0
 
 def likely_orders(experiments: Sequence[Experiment], residuals: Sequence[FloatArray],
                   angles: Sequence[FloatArray], count: int) -> list[float]:
-    """
-    Return the orders that stand out most, half of them by their peak and half by their energy.
-
-    Parameters
-    ----------
-    experiments
-        the tests
-    residuals
-        of each, shape (n, c) in the readings' units
-    angles
-        that the wave follows in each, shape (n,) [rad]
-    count
-        how many
-
-    """
+    """Return likely orders, half by peak and half by energy, from residuals and angles [rad]."""
     orders = np.arange(_STEP, _GREATEST + _STEP, _STEP)
     energy = np.zeros(orders.size)
     for experiment, residual, angle in zip(experiments, residuals, angles, strict=True):

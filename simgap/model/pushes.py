@@ -3,10 +3,9 @@
 """
 When something unknown pushes, and how strongly.
 
-The likeliest course of an input over time (`diagnosis.courses`) is smooth and shrunk, and a
-constant part of it is shared with the numbers of the model. So it only says when the push changes.
-The levels between these moments are then fitted together with the numbers of the model, which stay
-within their tolerances.
+The likeliest course of an input (`diagnosis.courses`) is smooth and shrunk, and the numbers of the
+model share its constant part. So it only says when the push changes. The levels between are then
+fitted together with the numbers of the model, which stay within their tolerances.
 """
 
 from __future__ import annotations
@@ -36,16 +35,7 @@ _LEVEL_STEP = 0.1
 
 @dataclass(frozen=True)
 class PushedSpan:
-    """
-    A span of time in which something pushes.
-
-    Attributes
-    ----------
-    test : its name
-    from_s, until_s : begin and end [s]
-    size : mean of the push in it, in the unit of its place
-
-    """
+    """A span from_s to until_s [s] of a test in which a mean push enters, in its place's unit."""
 
     test: str
     from_s: float
@@ -55,19 +45,7 @@ class PushedSpan:
 
 def pushes(problem: LeastSquares, point: Mapping[str, float],
            place: DisturbanceInput) -> list[PushedSpan]:
-    """
-    Return the spans in which something pushes at a place.
-
-    Parameters
-    ----------
-    problem
-        the machine in its tests
-    point
-        its numbers as fitted without any effect
-    place
-        one of the machine's
-
-    """
+    """Return the spans in which something pushes at a place; `point` is fitted without effects."""
     machine = problem.machine
     assert isinstance(machine, OwnMachine)
     edges = [level_edges(*course) for course in courses(problem, point, place)]
@@ -85,17 +63,11 @@ def pushes(problem: LeastSquares, point: Mapping[str, float],
 
 def level_edges(time: FloatArray, course: FloatArray) -> FloatArray:
     """
-    Return the times between which a course stays at a level, with its begin and end, shape (k,).
+    Return the times [s] between which a course, shape (m,), stays at a level, shape (k,).
 
-    The course is split so that the sum of squares about the levels and a price for each level is
-    least (B. Jackson et al., An algorithm for optimal partitioning of data on an interval, IEEE
-    Signal Processing Letters 12, 2005).
-
-    Parameters
-    ----------
-    time, course
-        shape (m,) [s], any unit
-
+    They minimise the squares about the levels plus a price for each (B. Jackson et al., An
+    algorithm for optimal partitioning of data on an interval, IEEE Signal Processing Letters 12,
+    2005).
     """
     if time.size < _LEAST_NODES:
         return time[[0, -1]]

@@ -18,18 +18,10 @@ NO_RESPONSE = 1e-6
 
 @dataclass(frozen=True)
 class StepResponse:
-    """
-    How readings answer to a step of a number, in standard deviations.
+    """How readings answer to a step of a number, in standard deviations."""
 
-    Attributes
-    ----------
-    acts : False if nothing changes
-    roughness : how much the difference quotient changes when its step is doubled, as a share
-
-    """
-
-    acts: bool
-    roughness: float
+    acts: bool  # False if nothing changes
+    roughness: float  # share by which the difference quotient changes if its step is doubled
 
     @classmethod
     def at(cls, machine: OwnMachine, parameter: Parameter, experiment: int,
@@ -61,12 +53,7 @@ def where_it_acts(form: Form, parameter: Parameter) -> dict[str, float]:
 
 
 def derivative_error(machine: OwnMachine) -> float:
-    """
-    Return the share of a derivative of the readings that may be wrong, by the worst number.
-
-    It is how much a difference quotient changes where its step is doubled: next to nothing where a
-    simulation is smooth, and much where it sticks and slips.
-    """
+    """Return by which share the worst difference quotient changes where its step is doubled."""
     places: list[tuple[Parameter, Point]] = [(parameter, {}) for parameter in machine.nuisances]
     places += [(parameter, where_it_acts(form, parameter))
                for effect in machine.catalogue.values() for form in effect.forms

@@ -13,59 +13,27 @@ from simgap.machine.contract import FloatArray
 
 @dataclass(frozen=True)
 class Ports:
-    """
-    Names in a simulation program, each with the entry of the model file that gives it.
+    """Names in a simulation program, each with the entry of the model file that gives it."""
 
-    Attributes
-    ----------
-    places : parameters and initial states that are written before a run
-    inputs : what the log feeds in
-    pushes : where something unknown may enter
-    outputs : what is read
-
-    """
-
-    places: Mapping[str, str]
-    inputs: Mapping[str, str]
-    pushes: Mapping[str, str]
-    outputs: Mapping[str, str]
+    places: Mapping[str, str]  # parameters and initial states that are written before a run
+    inputs: Mapping[str, str]  # what the log feeds in
+    pushes: Mapping[str, str]  # where something unknown may enter
+    outputs: Mapping[str, str]  # what is read
 
 
 class Simulator(Protocol):
-    """
-    A simulation program with the ports that a model file names.
+    """A simulation program with the ports that a model file names."""
 
-    Attributes
-    ----------
-    defaults : of the places, as the program's own file has them, NaN where it has none
-    longest_step_s : of a run
-    parallel : True if several threads may call `run` at once
-
-    """
-
-    defaults: FloatArray
-    longest_step_s: float
-    parallel: bool
+    defaults: FloatArray  # of the places, by the program's own file; NaN where it has none
+    longest_step_s: float  # of a run
+    parallel: bool  # True if several threads may call `run` at once
 
     def run(self, values: FloatArray, start_s: float, step_s: float,
             inputs: FloatArray) -> FloatArray:
         """
-        Simulate from the start, with each input held during a step.
+        Return the outputs as each step begins, shape (n, outputs); NaN from a failure on.
 
-        Parameters
-        ----------
-        values
-            of the places, in their order; NaN leaves a place as it is
-        start_s
-            time of the first row
-        step_s
-            time from row to row
-        inputs
-            inputs, then pushes, shape (n, inputs + pushes)
-
-        Returns
-        -------
-        the outputs at the beginning of each step, shape (n, outputs); NaN from a
-        failure on
-
+        values : of the places, in their order; NaN leaves a place as it is
+        start_s, step_s : time of the first row, and from row to row [s]
+        inputs : inputs, then pushes, held in a step, shape (n, inputs + pushes)
         """

@@ -3,8 +3,8 @@
 """
 The proof of a diagnosis: a log that it never saw, predicted without fitting anything to it.
 
-A diagnosis weighs whitened residuals, in which a slow error counts little. A free run is judged by
-its rms, so the numbers are fitted once more to the diagnosed logs, by plain least squares.
+A free run is judged by its rms, in which a slow error counts, unlike in whitened residuals. So the
+numbers are fitted once more to the diagnosed logs, by plain least squares.
 """
 
 from __future__ import annotations
@@ -27,21 +27,11 @@ _RUNS = 40
 
 @dataclass(frozen=True)
 class Unseen:
-    """
-    How far a reading of an unseen log is from its predictions, as rms in the reading's unit.
+    """How far a reading of an unseen log is from its predictions, as rms in the reading's unit."""
 
-    Attributes
-    ----------
-    configured : of the model as configured
-    before : of the model fitted to the logs of the diagnosis by least squares, without any effect
-    after : the same with the effects of the best answer
-    unit : of the reading
-
-    """
-
-    configured: float
-    before: float
-    after: float
+    configured: float  # of the model as configured
+    before: float  # fitted by least squares, without any effect
+    after: float  # the same with the effects of the best answer
     unit: str
 
 

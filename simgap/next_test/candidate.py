@@ -20,34 +20,20 @@ _NEVER = 1e3
 
 @dataclass(frozen=True)
 class Candidate:
-    """
-    A test and what it is expected to tell.
+    """A test and what it is expected to tell."""
 
-    Attributes
-    ----------
-    family, test : as the test space has drawn it
-    use : share of each limit that it uses, the worst of all rivals
-    score : by the criterion; the larger the better
-    coarseness : smallest size of each effect of the catalogue that shows, over that in the best
-        test that was judged, in the geometric mean; NaN where it was not asked for
-    promised : how well it tells the rivals apart to first order
-    confirmed : the same with every rival fitted to the readings of the others
-    kept : while not confirmed, the share of its promise that counts: as other tests of its
-        family have kept theirs
-    deviations : of each number of the effects, its standard deviation before and after
-    sizes : of each effect, the smallest size that shows, and its unit
-
-    """
-
-    family: str
+    family: str  # as drawn from the test space
     test: Any
-    use: Mapping[str, float]
-    score: float = 0.0
+    use: Mapping[str, float]  # share of each limit that it uses, the worst of all rivals
+    score: float = 0.0  # by the criterion; the larger the better
+    # smallest sizes that show over those in the best test, geometric mean; NaN if unknown
     coarseness: float = math.nan
-    promised: Separation | None = None
-    confirmed: Separation | None = None
-    kept: float = 1.0
+    promised: Separation | None = None  # how well it tells the rivals apart to first order
+    confirmed: Separation | None = None  # the same with every rival fitted to the others
+    kept: float = 1.0  # share of an unconfirmed promise that counts: what its family has kept
+    # standard deviation before and after, by number
     deviations: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    # smallest size that shows and its unit, by effect
     sizes: Mapping[str, tuple[float, str]] = field(default_factory=dict)
 
     @property
@@ -63,32 +49,19 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Proposal:
-    """
-    What was found.
+    """What a search for the next test has found."""
 
-    Attributes
-    ----------
-    objective, criterion : what was asked for, and by which rule
-    rivals : that were to be told apart
-    tests : judged ones that help, the best first; none if no test within the limits helps
-    refused : how many drawn tests each limit has cost
-    beyond : if no test helps, the best ones beyond the limits
-    alike : pairs of rivals that no judged test tells apart, with what no sensor reads in which
-        they differ, the greatest difference first
-    tried : number of tests that were simulated
-    unnamed : where something without a name may act, see `Findings`
-
-    """
-
-    objective: str
-    criterion: str
-    rivals: Sequence[Rival]
-    tests: Sequence[Candidate]
-    refused: Mapping[str, int]
-    beyond: Sequence[Candidate] = ()
+    objective: str  # what was asked for
+    criterion: str  # by which rule
+    rivals: Sequence[Rival]  # to be told apart
+    tests: Sequence[Candidate]  # judged ones that help, the best first
+    refused: Mapping[str, int]  # how many drawn tests each limit has cost
+    beyond: Sequence[Candidate] = ()  # if no test helps, the best ones beyond the limits
+    # pairs of rivals that no judged test tells apart, with the unread signals in which they
+    # differ, the greatest difference first
     alike: Sequence[tuple[int, int, Mapping[str, float]]] = ()
-    tried: int = 0
-    unnamed: Mapping[str, float] = field(default_factory=dict)
+    tried: int = 0  # number of tests that were simulated
+    unnamed: Mapping[str, float] = field(default_factory=dict)  # see `Findings`
 
 
 def coarseness_of(tests: Sequence[Candidate], weights: FloatArray) -> list[float]:

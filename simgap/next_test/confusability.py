@@ -3,10 +3,9 @@
 """
 Which effects a set of tests can and cannot tell apart, before the tests are made.
 
-An effect shows if it does more than its price even where the nuisances imitate as much of it as
-their tolerances allow. All derivatives are taken at one point, and what may be their error shows
-nothing. The angle between what the nuisances cannot imitate of two effects says whether one passes
-for the other.
+An effect shows if it does more than its price where the nuisances imitate as much of it as their
+tolerances allow. Derivatives are taken at one point; their possible error shows nothing. The angle
+between what cannot be imitated of two effects says whether one passes for the other.
 """
 
 from __future__ import annotations
@@ -33,25 +32,14 @@ _SHARE = 0.01
 
 @dataclass(frozen=True)
 class Confusability:
-    """
-    What a set of tests can tell.
+    """What a set of tests can tell of m effects."""
 
-    Attributes
-    ----------
-    effects : ids, m of them
-    detectable : least size that shows in any case, in the unit of the effect's first parameter;
-        infinite if none within its bounds does; shape (m,)
-    units : of that size
-    alike : share of the squared remainder of one effect that another can imitate, shape (m, m)
-    limit : share from which two effects count as alike
-
-    """
-
-    effects: tuple[str, ...]
+    effects: tuple[str, ...]  # ids
+    # shape (m,), least size that shows; infinite if none within bounds does
     detectable: FloatArray
-    units: tuple[str, ...]
-    alike: FloatArray
-    limit: float
+    units: tuple[str, ...]  # of that size, which is the effect's first parameter
+    alike: FloatArray  # shape (m, m), share of an effect's squared remainder that another imitates
+    limit: float  # share from which two effects count as alike
 
     def passing_for(self, index: int, most: int) -> list[str]:
         """Return the effects that pass for one of them, the most alike first."""
@@ -84,11 +72,10 @@ def confusability(machine: Machine, progress: Callable[[float], None] = lambda s
                   settings: Settings = DEFAULT, inflated: float = 1.0,
                   among: Collection[str] = ()) -> Confusability:
     """
-    Say which effects the tests of a machine can tell apart.
+    Say which effects the tests of a machine can tell apart, with the readings that it predicts.
 
-    The measured readings are those that the model predicts. `progress` is called with the share
-    that is done, `inflated` divides differences of the cost, and `among` names the effects that
-    are asked for, or all.
+    `progress` gets the share that is done. `inflated` divides differences of the cost. `among`
+    names the effects that are judged; empty for all.
     """
     problem = LeastSquares(machine.with_experiments(
         with_model_error(machine.experiments, settings.noise)), settings=settings)
@@ -98,11 +85,7 @@ def confusability(machine: Machine, progress: Callable[[float], None] = lambda s
 def visibility(problem: LeastSquares, state: FitState,
                progress: Callable[[float], None] = lambda share: None,
                inflated: float = 1.0, among: Collection[str] = ()) -> Confusability:
-    """
-    Say how large each effect must be to show beside a fit of the nuisances, and what it is like.
-
-    `state` is that fit, with its Jacobian; the others are as in `confusability`.
-    """
+    """Say how large each effect must be to show beside `state`, a fit of the nuisances."""
     machine, settings = problem.machine, problem.settings
     jacobian = state.jacobian
     known = state.hessian + np.diag(proper_precision(state.parameters))
@@ -144,13 +127,9 @@ class _Imitation:
 
     def least_visible(self, number: Parameter, power: float, cross: FloatArray,
                       price: float) -> float:
-        """
-        Return the size from which an effect is named, whichever sign it has.
-
-        It is then larger than its tolerance, and more than its `price` [half chi-square] is left
-        of it. `number` is the effect's first; `power` and `cross`, shape (m,), are the products of
-        its column with itself and with those of the nuisances.
-        """
+        """Return the size above which an effect exceeds its tolerance and leaves `price`."""
+        # `number` is the effect's first; `power` and `cross`, shape (m,), are the products of its
+        # column with itself and with those of the nuisances. Either sign has to show.
         # where nothing imitates it; a little less, so that rounding does not make it visible
         least = (1.0 - _SHARE) * math.sqrt(2.0 * price / power) if power > 0.0 else math.inf
         least = max(least, number.tolerance)

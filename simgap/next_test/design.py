@@ -3,10 +3,9 @@
 """
 The design of the next test: which of the tests that a machine may run tells most.
 
-What a test may be is the machine's to say, see `TestSpace`. The search knows nothing of waveforms.
-It draws tests of every family, keeps those within the limits, judges the most promising ones with
-all tolerances free, and varies the best. Last, each rival is fitted to the simulated readings of
-the others: what derivatives promise is not always kept.
+The search knows nothing of waveforms. It draws tests of every family from a `TestSpace`, keeps
+those within the limits, judges the most promising with all tolerances free, and varies the best.
+Last, each rival is fitted to the simulated readings of the others: derivatives promise too much.
 """
 
 from __future__ import annotations
@@ -61,51 +60,23 @@ def objective_for(findings: Findings, settings: Settings = DEFAULT) -> str:
 
 @dataclass(frozen=True)
 class DesignEffort:
-    """
-    How much is searched.
+    """How much is searched."""
 
-    Attributes
-    ----------
-    drawn : tests of each family
-    judged : of all, those that are judged with all tolerances free
-    varied : of these, those that are varied
-    variants : of each of them
-    confirmed : of the best, those that every rival is fitted to at a time
-    rounds : of that at most, while another test promises more than the best of those
-    margin : share of each limit that a test may use
-
-    """
-
-    drawn: int = 12
-    judged: int = 14
-    varied: int = 3
-    variants: int = 4
-    confirmed: int = 2
-    rounds: int = 3
-    margin: float = 0.9
+    drawn: int = 12  # tests of each family
+    judged: int = 14  # tests that are judged with all tolerances free
+    varied: int = 3  # of these, the best that are varied
+    variants: int = 4  # of each of them
+    confirmed: int = 2  # of the best, those that every rival is fitted to at a time
+    rounds: int = 3  # of that at most, while another test promises more
+    margin: float = 0.9  # share of each limit that a test may use
 
 
 class TestDesign:
     """
-    The search for the next test.
+    The search for the next test, after the `findings` of the tests so far.
 
-    Parameters
-    ----------
-    space
-        the tests that the machine may run
-    findings
-        of the tests so far
-    objective
-        one of `OBJECTIVES`, or `D_OPTIMAL` or `RANDOM` to compare with
-    suspected
-        for `detect`, ids of effects; empty for all
-    threads
-        tests at once
-    settings, effort
-        thresholds, and how much is searched
-    seed
-        of the tests that are drawn
-
+    `objective` is one of `OBJECTIVES`, or `D_OPTIMAL` or `RANDOM` to compare with. `suspected` has
+    ids of effects for `detect`, empty for all. `threads` tests are simulated at once.
     """
 
     __test__ = False
@@ -124,14 +95,7 @@ class TestDesign:
             DETECT: self._detected, RANDOM: lambda test: test}[objective]
 
     def run(self, progress: Progress = lambda share, doing: None) -> Proposal:
-        """
-        Search, and return what was found.
-
-        Raises
-        ------
-        KeyError : the machine's catalogue lacks an effect or a form of a rival
-
-        """
+        """Search; KeyError if the catalogue lacks an effect or a form of a rival."""
         effort = self._effort
         drawn = [Candidate(family, self._space.draw(family, self._random), {})
                  for _ in range(effort.drawn) for family in self._space.families]
@@ -150,8 +114,7 @@ class TestDesign:
                 chosen = self._random.permutation(len(allowed))[:1]
                 return self._proposal([allowed[i] for i in chosen], refused, (), len(drawn))
             progress(0.3, 'the best with all tolerances free')
-            judged = self._compared(pool.map(self._judge, of_each_family(
-                allowed, effort.judged)))
+            judged = self._compared(pool.map(self._judge, of_each_family(allowed, effort.judged)))
             progress(0.55, 'variants of the best')
             variants = [replace(test, test=self._space.nearby(test.family, test.test,
                                                               self._random))
@@ -203,8 +166,6 @@ class TestDesign:
         return machine.with_experiments(with_found_noise(
             machine.experiments, self._findings.noise))
 
-    # -- judging one test ----------------------------------------------------------------------
-
     def _screened(self, test: Candidate) -> Candidate:
         """Simulate a test with each rival; no rival's numbers follow yet."""
         machine = self._planned(test).low_fidelity()
@@ -223,11 +184,8 @@ class TestDesign:
         return replace(test, promised=promised, sizes=self._sizes(machine.low_fidelity()))
 
     def _with_fits(self, judged: Sequence[Candidate], pool: ThreadPoolExecutor) -> list[Candidate]:
-        """
-        Confirm the best tests until no other one promises more, and put those first.
-
-        Tests of a family break their promises alike: a promise counts as far as others were kept.
-        """
+        """Confirm the best tests until no other one promises more, and put those first."""
+        # tests of a family break promises alike: a promise counts as far as others were kept
         best = list(judged)
         for _ in range(self._effort.rounds):
             if not best or best[0].confirmed is not None:
@@ -279,7 +237,6 @@ class TestDesign:
             for name, (size, unit) in self._sizes(self._planned(test)).items()})
 
     def _sizes(self, machine: Machine) -> dict[str, tuple[float, str]]:
-        """Return the smallest size of each effect that shows in a test, and its unit."""
         machine = machine.with_experiments([
             replace(e, measured=machine.predict({}, k))
             for k, e in enumerate(machine.experiments)])
@@ -313,11 +270,8 @@ class TestDesign:
         return weight
 
     def _compound(self, test: Candidate, coarseness: float) -> float:
-        """
-        Return what a test tells of the rivals and of other effects, by their weights.
-
-        Each part is the logarithm of an efficiency, but for what all tests share.
-        """
+        """Return what a test tells of the rivals and of other effects, by their weights."""
+        # Each part is the logarithm of an efficiency, but for what all tests share.
         if test.separation is None:
             return -math.log(coarseness)
         unlisted = max(self._settings.planning.unlisted, self._findings.unlisted)
@@ -325,10 +279,7 @@ class TestDesign:
         return ((1.0 - unlisted) * math.log(max(information, _NOTHING))
                 - unlisted * math.log(coarseness))
 
-    # -- what no test tells --------------------------------------------------------------------
-
     def _alike(self, judged: Sequence[Candidate]) -> list[tuple[int, int, Mapping[str, float]]]:
-        """Return the pairs of rivals that no judged test tells apart."""
         compared = [test for test in judged if test.separation is not None]
         limit = self._settings.planning.alike * self._temperature
         found = []

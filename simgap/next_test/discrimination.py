@@ -5,19 +5,15 @@ How well a planned test would tell rivals apart.
 
 The criterion is T-optimality: a test is good if a wrong rival fits badly however its numbers
 follow (A. C. Atkinson, V. V. Fedorov, Biometrika 62, 57, 1975; for several rivals, the same
-volume, 289). It goes back to W. G. Hunter, A. M. Reiner (Technometrics 7, 307, 1965), who hold
-the numbers at their fitted values, and takes prior probabilities and prior knowledge of the
-numbers into account as A. C. Ponce de Leon, A. C. Atkinson (Biometrika 78, 601, 1991) do. The
-criterion of G. E. P. Box, W. J. Hill (Technometrics 9, 57, 1967) weighs rivals in the same way,
-and sees a wrong rival's numbers through the variance of its prediction alone. With a hundred
-tolerances, that variance is as large as the readings. How far the numbers can follow must be
-known sample by sample, which T-optimality asks.
+volume, 289), with prior probabilities and prior knowledge of the numbers (A. C. Ponce de Leon, A.
+C. Atkinson, Biometrika 78, 601, 1991). W. G. Hunter, A. M. Reiner (Technometrics 7, 307, 1965)
+hold the numbers at their fitted values. G. E. P. Box, W. J. Hill (Technometrics 9, 57, 1967) see
+them through the variance of the prediction alone, which is as large as the readings with a hundred
+tolerances.
 
-The lack of fit of every pair becomes probabilities as in a verdict. The logarithm of what the
-true rival gets, in the mean over the rivals, is the information that the test is expected to give.
-
-To first order the best that a rival can do is a projection (`separation`). That is a promise. A
-fit of each rival to the readings of the others keeps or breaks it (`rival_fits`).
+The lack of fit of every pair becomes probabilities as in a verdict. The mean logarithm of what the
+true rival gets is the expected information. To first order the best that a rival can do is a
+projection (`separation`). That is a promise, which fits keep or break (`rival_fits`).
 """
 
 from __future__ import annotations
@@ -43,24 +39,9 @@ def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
     """
     Return how well the planned tests of a machine would tell rivals apart, to first order.
 
-    Parameters
-    ----------
-    machine
-        in the planned tests; what they measured does not count
-    rivals
-        of a verdict, r of them
-    inflated
-        by what the cost's differences are divided
-    settings
-        thresholds
-    follow
-        False to leave the numbers as they are: an upper bound, found without derivatives
-        (Hunter and Reiner's criterion)
-
-    Raises
-    ------
-    KeyError : the machine's catalogue lacks an effect or a form
-
+    `inflated` divides differences of the cost. Without `follow` the numbers stay as they are,
+    which is an upper bound without derivatives (Hunter and Reiner). Raises KeyError if the
+    catalogue lacks an effect or a form.
     """
     points = [known_to(machine, rival) for rival in rivals]
     problem = planned(machine, rivals, points, settings)
@@ -87,12 +68,7 @@ def separation(machine: Machine, rivals: Sequence[Rival], inflated: float,
 
 def deviations(machine: Machine, rival: Rival, inflated: float,
                settings: Settings = DEFAULT) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
-    """
-    Return how well the planned tests of a machine would determine the numbers of a rival.
-
-    These are the names of its m known numbers, and their covariances before and after, shape (m,
-    m) each. The others are as in `separation`.
-    """
+    """Return a rival's m names, and their covariances before and after tests, shape (m, m)."""
     point = known_to(machine, rival)
     problem = planned(machine, [rival], [point], settings)
     numbers = numbers_of(machine, rival)
@@ -120,13 +96,10 @@ def planned(machine: Machine, rivals: Sequence[Rival], points: Sequence[Point],
 
 def _followed(problem: LeastSquares, rival: Rival, point: dict[str, float], off: FloatArray,
               inflated: float) -> tuple[FloatArray, FloatArray, dict[str, float]]:
-    """
-    Return what remains of differences after a rival's numbers have followed them.
-
-    The differences `off` are in standard deviations, shape (r, n). What is returned: what the
-    steps away from what is known add to each chi-square, shape (r,), the differences that are
-    left, and the share to which the deviation of each size in doubt shrinks.
-    """
+    """Return what remains of differences after a rival's numbers have followed them."""
+    # The differences `off` are in standard deviations, shape (r, n). What is returned: what the
+    # steps away from what is known add to each chi-square, shape (r,), the differences that are
+    # left, and the share to which the deviation of each size in doubt shrinks.
     numbers = numbers_of(problem.machine, rival)
     if not numbers:
         return np.zeros(len(off)), off, {}

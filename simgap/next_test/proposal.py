@@ -31,17 +31,7 @@ def named(rival: Rival) -> str:
 
 
 def as_data(proposal: Proposal, space: TestSpace, settings: Settings = DEFAULT) -> dict[str, Any]:
-    """
-    Return a proposal as plain data, for the JSON.
-
-    Parameters
-    ----------
-    proposal, space
-        what was found among which tests
-    settings
-        thresholds
-
-    """
+    """Return a proposal as plain data, for the JSON."""
     rivals = proposal.rivals
     found: dict[str, Any] = {
         'objective': proposal.objective, 'criterion': proposal.criterion,
@@ -70,7 +60,6 @@ def as_data(proposal: Proposal, space: TestSpace, settings: Settings = DEFAULT) 
 
 
 def _told(test: Candidate, rivals: Sequence[Rival], settings: Settings) -> dict[str, Any]:
-    """Return what a test is expected to tell, as plain data."""
     found: dict[str, Any] = {'score': test.score}
     if test.deviations:
         found['deviations'] = {name: {'before': before, 'after': after}
@@ -171,44 +160,24 @@ def _promises(data: Mapping[str, Any]) -> list[str]:
 
 @dataclass(frozen=True)
 class ProposalContents:
-    """
-    All that the page about a proposal says.
+    """All that the page about a proposal says."""
 
-    Attributes
-    ----------
-    title, lead : in a few words and in a sentence
-    data : of `as_data`
-    panels : for each signal what the likeliest rivals would read
-
-    """
-
-    title: str
-    lead: str
-    data: Mapping[str, Any]
-    panels: Sequence[Panel]
+    title: str  # in a few words
+    lead: str  # in a sentence
+    data: Mapping[str, Any]  # of `as_data`
+    panels: Sequence[Panel]  # what the likeliest rivals would read, by signal
 
 
 def contents(proposal: Proposal, space: TestSpace, settings: Settings = DEFAULT,
              effort: DesignEffort = DesignEffort()) -> ProposalContents:
-    """
-    Return what the page about a proposal says.
-
-    Parameters
-    ----------
-    proposal, space, settings
-        as in `as_data`
-    effort
-        with the margin that was kept
-
-    """
+    """Return what the page about a proposal says; `effort` has the margin that was kept."""
     data = as_data(proposal, space, settings)
     said = lines(data)
     if not data['helps']:
         return ProposalContents('No test within the limits helps', said[1].strip(), data, ())
     lead = (f'Chosen among {proposal.tried} simulated tests. Every rival keeps '
             f'{100.0 * effort.margin:.0f} % of every limit in it.')
-    return ProposalContents(f'Next test: {data["family"]}', lead, data,
-                            _panels(proposal, space))
+    return ProposalContents(f'Next test: {data["family"]}', lead, data, _panels(proposal, space))
 
 
 def _panels(proposal: Proposal, space: TestSpace) -> list[Panel]:

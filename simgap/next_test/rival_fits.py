@@ -26,10 +26,9 @@ def confirmed_separation(machine: Machine, rivals: Sequence[Rival], inflated: fl
     """
     Return how well tests tell rivals apart, with each fitted to the readings of each other one.
 
-    The true rival is fitted as well, from a standard deviation away along each direction. A fit
-    that sticks there would stick in a diagnosis, which compares two fits. What it leaves is no
-    evidence against the others. Deviations shrink as `shrunk` says, from
-    `discrimination.separation`, whose parameters the others are; without it they stay.
+    The true rival is fitted as well, from a standard deviation away along each direction: what
+    such a fit leaves because it sticks is not evidence against the others. `shrunk` comes from
+    `separation`, whose parameters the others are.
     """
     points = [known_to(machine, rival) for rival in rivals]
     problem = planned(machine, rivals, points, settings)
@@ -62,11 +61,7 @@ def confirmed_separation(machine: Machine, rivals: Sequence[Rival], inflated: fl
 
 
 class _Continued(Machine):
-    """
-    A machine whose numbers count from where the tests so far have left them.
-
-    Each of its numbers is a standard deviation along one direction that the tests have left free.
-    """
+    """A machine whose numbers count in deviations along the directions still free."""
 
     def __init__(self, machine: Machine, rival: Rival, inflated: float) -> None:
         numbers = numbers_of(machine, rival)

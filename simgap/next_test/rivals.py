@@ -3,13 +3,10 @@
 """
 What a verdict knows of its rivals: the next test is designed from it, see `discrimination`.
 
-Each rival is a hypothesis with its numbers as fitted and how well the tests so far determine them.
-Numbers of a single test, such as where it starts, are integrated out: the next test has its own.
-
-Two answers may come from the same fit, where it is not sure that one of its effects is larger than
-its tolerance. Each of them is then taken at its mean in its own region: what it names is beyond
-the tolerances, and the rest is within them. A rival also holds these doubts: they say what it
-would take to end them.
+Each rival is a hypothesis with its fitted numbers and their covariance. Numbers of a single test,
+such as where it starts, are integrated out: the next test has its own. Two answers may come from
+one fit, if it is not sure that an effect exceeds its tolerance. Each is then taken at its mean in
+its own region, and holds the doubts that a test may end.
 """
 
 from __future__ import annotations
@@ -39,28 +36,16 @@ _LEAST = 1e-30
 
 @dataclass(frozen=True)
 class Rival:
-    """
-    An answer of a verdict.
+    """An answer of a verdict."""
 
-    Attributes
-    ----------
-    named : effects that it names; none for 'none'
-    effects, forms : what was fitted, with the name of the form of each
-    probability : of the answer, in the verdict
-    names, values : numbers of the machine and of the effects, shape (m,)
-    covariance : of the values, shape (m, m)
-    doubts : what tells whether effects that it names are larger than their tolerances, by effect
-
-    """
-
-    named: tuple[str, ...]
-    effects: tuple[str, ...]
-    forms: tuple[str, ...]
-    probability: float
-    names: tuple[str, ...]
-    values: FloatArray
-    covariance: FloatArray
-    doubts: Mapping[str, Doubt] = field(default_factory=dict)
+    named: tuple[str, ...]  # effects that it names; none for 'none'
+    effects: tuple[str, ...]  # that were fitted
+    forms: tuple[str, ...]  # their names, one for each effect
+    probability: float  # of the answer, in the verdict
+    names: tuple[str, ...]  # numbers of the machine and of the effects, m of them
+    values: FloatArray  # shape (m,)
+    covariance: FloatArray  # shape (m, m)
+    doubts: Mapping[str, Doubt] = field(default_factory=dict)  # by effect
 
     @property
     def point(self) -> dict[str, float]:
@@ -68,14 +53,7 @@ class Rival:
         return dict(zip(self.names, self.values.tolist(), strict=True))
 
     def forms_of(self, machine: Machine) -> list[Form]:
-        """
-        Return the forms of the effects in a machine.
-
-        Raises
-        ------
-        KeyError : the machine's catalogue lacks an effect or a form
-
-        """
+        """Return the forms of the effects in a machine; KeyError if its catalogue lacks one."""
         return [machine.catalogue.form_named(machine.catalogue[effect], form)
                 for effect, form in zip(self.effects, self.forms, strict=True)]
 
@@ -98,12 +76,9 @@ class Rival:
         return self.covariance[np.ix_(places, places)]
 
     def as_data(self) -> dict[str, Any]:
-        """
-        Return the rival as plain data, for the JSON.
-
-        Of the covariance it has the lower triangle, each row a text: thousands of numbers, a line
-        each, would bury the verdict.
-        """
+        """Return the rival as plain data, for the JSON."""
+        # the lower triangle of the covariance, a text for each row: a line for each number would
+        # bury the verdict
         rows = [' '.join(f'{x:.{_DIGITS}g}' for x in row[:i + 1])
                 for i, row in enumerate(self.covariance)]
         return {'named': list(self.named), 'effects': list(self.effects),
@@ -113,14 +88,7 @@ class Rival:
 
     @classmethod
     def of_data(cls, data: Mapping[str, Any]) -> Rival:
-        """
-        Take a rival from plain data.
-
-        Raises
-        ------
-        KeyError, TypeError, ValueError, AttributeError : it is not a rival
-
-        """
+        """Take a rival from plain data; KeyError, TypeError, ValueError or AttributeError."""
         names = tuple(data['names'])
         lower = np.zeros((len(names), len(names)))
         for i, row in enumerate(data['covariance']):
@@ -133,34 +101,25 @@ class Rival:
 
 @dataclass(frozen=True)
 class Findings:
-    """
-    What the design of a further test takes from the tests so far.
+    """What the design of a further test takes from the tests so far."""
 
-    Attributes
-    ----------
-    rivals : answers of the verdict; none before the first test
-    inflated : by what differences of the cost are divided
-    noise : of each sensor, see `noise.found_noise`; by default that of its data sheet
-    shown : smallest size at which an effect shows in these tests, in the unit of its first
-        parameter, by effect; where answers are open nobody asks for it
-    unnamed : probability that something without a name acts in a part of the machine, by part;
-        what they leave of 1 is spread over the whole catalogue
-
-    """
-
-    rivals: Sequence[Rival] = ()
-    inflated: float = 1.0
+    rivals: Sequence[Rival] = ()  # answers of the verdict; none before the first test
+    inflated: float = 1.0  # divides differences of the cost
+    # of each sensor, see `noise.found_noise`; by default that of its data sheet
     noise: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    # smallest size at which an effect shows, in the unit of its first parameter, by effect;
+    # unknown where answers are open
     shown: Mapping[str, float] = field(default_factory=dict)
+    # probability that something without a name acts in a part of the machine, by part; the
+    # remainder is spread over the whole catalogue
     unnamed: Mapping[str, float] = field(default_factory=dict)
 
     def are_open(self, settings: Settings) -> bool:
         """
         Return whether there are answers to tell apart: several, and none of them sure.
 
-        Nor is there anything to tell apart if all others have less than `unknown` has at least,
-        or if it is likelier than each of them. What is open then is whether any effect of the
-        catalogue is true.
+        Nothing can be distinguished if `unknown` is the likeliest, or if all answers but the best
+        together have less than the least probability of `unknown`.
         """
         known = [rival.probability for rival in self.rivals]
         return len(known) > 1 and self.unlisted < max(known) < min(
@@ -179,17 +138,8 @@ class Findings:
 
     @classmethod
     def of_data(cls, planning: Mapping[str, Any]) -> Findings:
-        """
-        Take the findings from the entry `planning` of a verdict.
-
-        A verdict of an earlier version lacks noise, doubts, what has shown or where something
-        unnamed may be, which is not an error.
-
-        Raises
-        ------
-        KeyError, TypeError, ValueError, AttributeError : it holds none
-
-        """
+        """Take the findings from `planning` of a verdict, with the errors of `Rival.of_data`."""
+        # an earlier version lacks some entries
         return cls([Rival.of_data(item) for item in planning['rivals']],
                    float(planning['inflation']), dict(planning.get('noise', {})),
                    {effect: float(size) for effect, size in planning.get('shown', {}).items()},
@@ -211,13 +161,7 @@ def rivals_of(problem: LeastSquares, answers: Sequence[Answer], inflated: float,
               settings: PlanningSettings,
               doubted: Callable[[Hypothesis], Mapping[str, Doubt]] = lambda hypothesis: {},
               ) -> list[Rival]:
-    """
-    Return the likeliest answers of a verdict with what is known of their numbers.
-
-    `answers` has the likeliest first. `inflated` is the variance over that with independent noise,
-    and `doubted` returns what tells whether a hypothesis' effects are larger than their
-    tolerances.
-    """
+    """Return the likeliest of sorted answers with what is known of their numbers, see `Rival`."""
     found = []
     for answer in answers[:settings.rivals]:
         if answer.probability < settings.least_probability:
@@ -258,9 +202,8 @@ def within(values: FloatArray, known: FloatArray, place: int, low: float, high: 
     Return the mean and the covariance of normal numbers, given that one is within bounds.
 
     The others follow it by regression (N. L. Johnson, S. Kotz, N. Balakrishnan, Continuous
-    Univariate Distributions, volume 1, chapter 13, section 10.1). `values`, shape (m,), and
-    `known`, shape (m, m), are mean and covariance; the bounds of the one in this place may be
-    equal or infinite.
+    Univariate Distributions, volume 1, chapter 13, section 10.1). The bounds may be equal or
+    infinite.
     """
     variance = known[place, place]
     if variance <= 0.0:

@@ -3,12 +3,11 @@
 """
 What a planned test tells of rivals: how badly a wrong one would fit, and what that decides.
 
-In most open verdicts, one answer names one effect more than the other. The simpler answer already
-misses the readings by hundreds of units. The verdict is open because it doubts that the effect is
-larger than its tolerance. A smaller deviation of the effect's size or a larger gain ends the
-doubt: see `doubts`. Two such rivals are told apart by no more than the doubt falls
-(`Separation.odds`). D_s-optimality asks for the same: A. C. Atkinson, A. N. Donev, R. D. Tobias,
-Optimum Experimental Designs (2007), section 10.3.
+In most open verdicts one answer names one effect more than the other, which already misses the
+readings by far. What is open is whether the effect exceeds its tolerance. A smaller deviation of
+its size or a larger gain ends this doubt (`doubts`), and separates the rivals by no more
+(`Separation.odds`), as D_s-optimality asks: A. C. Atkinson, A. N. Donev, R. D. Tobias, Optimum
+Experimental Designs (2007), section 10.3.
 """
 
 from __future__ import annotations
@@ -29,26 +28,18 @@ LEAST = 1e-12
 
 @dataclass(frozen=True)
 class Separation:
-    """
-    What a planned test tells of r rivals.
+    """What a planned test tells of r rivals."""
 
-    Attributes
-    ----------
-    prior : probability of each rival before the test, shape (r,)
-    lack : half the chi-square by which rival j fits worse than i if i is true, shape (r, r)
-    channels : share of that which each signal gives; empty where it was not asked for
-    points : where the fit of rival j to the readings of i ended, by (i, j); empty without fits
-    odds : logarithm of the odds that rival j loses to i at most if i is true, because the verdict
-        doubts an effect that only one of them names, shape (r, r); infinite for all other pairs
-    shrunk : for each rival the share to which deviations of sizes shrink, by name
-
-    """
-
-    prior: FloatArray
-    lack: FloatArray
+    prior: FloatArray  # probability of each rival before the test, shape (r,)
+    lack: FloatArray  # half the chi-square by which j fits worse than i if i is true, shape (r, r)
+    # share of that which each signal gives, if known
     channels: Mapping[str, float] = field(default_factory=dict)
+    # where the fit of j to i ended, by (i, j)
     points: Mapping[tuple[int, int], Point] = field(default_factory=dict)
+    # greatest logarithm of the odds that rival j loses to i if i is true, because the verdict
+    # doubts an effect that only one of them names, shape (r, r); infinite for other pairs
     odds: FloatArray = field(default_factory=lambda: np.array(np.inf))
+    # for each rival the share to which deviations shrink
     shrunk: Sequence[Mapping[str, float]] = ()
 
     def evidence(self, temperature: float) -> FloatArray:
@@ -56,11 +47,7 @@ class Separation:
         return np.asarray(np.minimum(self.lack / temperature, self.odds))
 
     def posterior(self, temperature: float, caution: float = 1.0) -> FloatArray:
-        """
-        Return the probability of rival j after the test if i is true, shape (r, r).
-
-        The evidence is divided by `caution`.
-        """
+        """Return the probability of j if i is true, shape (r, r); `caution` divides evidence."""
         logits = np.log(np.maximum(self.prior, LEAST)) - self.evidence(temperature) / caution
         weights = np.exp(logits - logits.max(axis=1, keepdims=True))
         return np.asarray(weights / weights.sum(axis=1, keepdims=True))
@@ -105,13 +92,10 @@ def odds_of(rivals: Sequence[Rival], lack: FloatArray, shrunk: Sequence[Mapping[
 
 
 def _ended(doubt: Doubt, known: float, share: float, gain: float) -> FloatArray:
-    """
-    Return the logarithms of the odds by which a test moves a doubt, shape (2,).
-
-    By how much the doubt falls if the effect is there, and by how much the effect does if not.
-    `known` is the deviation of its size from the readings alone, which shrinks to a `share`;
-    `gain` is what the test adds if the effect is there.
-    """
+    """Return the logarithms of the odds by which a test moves a doubt, shape (2,)."""
+    # By how much the doubt falls if the effect is there, and by how much the effect does if not.
+    # `known` is the deviation of its size from the readings alone, which shrinks to a `share`;
+    # `gain` is what the test adds if the effect is there.
     # what follows from a tolerance, or from how tests differ, does not shrink
     after = replace(doubt, deviation=math.sqrt(max(
         doubt.deviation ** 2 - (1.0 - share ** 2) * known ** 2, LEAST)))

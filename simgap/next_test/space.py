@@ -15,15 +15,7 @@ from simgap.machine.contract import FloatArray, Machine, Point
 
 
 class TestSpace(ABC):
-    """
-    The tests that a machine may run.
-
-    Attributes
-    ----------
-    families : names of the kinds of test
-    limits : that a test must keep, by name
-
-    """
+    """The tests that a machine may run: names of their families, and limits by name."""
 
     __test__ = False  # not a test case, whatever pytest makes of the name
 
@@ -40,17 +32,7 @@ class TestSpace(ABC):
 
     @abstractmethod
     def use(self, machine: Machine, points: Sequence[Point]) -> Mapping[str, float]:
-        """
-        Return the share of each limit that a test uses, 1 at the limit.
-
-        Parameters
-        ----------
-        machine
-            from `machine`
-        points
-            variants of it; the worst one counts
-
-        """
+        """Return the share of each limit that a test uses at the worst of the points."""
 
     def nearby(self, family: str, test: Any, random: np.random.Generator) -> Any:
         """Return a test like another one; by default another of the same family."""
@@ -69,10 +51,5 @@ class TestSpace(ABC):
         return {path: f'{self.as_data(test)}\n'}
 
     def unread(self, machine: Machine, one: Point, other: Point) -> Mapping[str, float]:
-        """
-        Return by how much two variants differ in what no sensor reads.
-
-        The rms of the difference as a share of the rms of the signal, by signal. By default
-        nothing is known.
-        """
+        """Return the rms difference of two variants, over the signal's, by unread signal."""
         return {}

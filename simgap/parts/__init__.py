@@ -15,8 +15,8 @@ call the parts in it:
 >>> round(coasting(1.0, 0.01, 100), 6)
 0.8
 
-Numbers are in SI units. Each part is a function of numbers; those with many take them in a named
-tuple of floats, whose annotations are its units.
+Each part is a function of numbers in SI units; those with many take them in a named tuple of
+floats, whose annotations are its units.
 """
 
 from __future__ import annotations
@@ -39,10 +39,9 @@ _Function = TypeVar('_Function', bound=Callable[..., Any])
 
 def compiled(function: _Function) -> _Function:
     """
-    Compile a function that Python calls and that may call parts.
+    Compile a function that Python calls and that may call parts and `inner` functions.
 
-    The result is kept on disk until a part or a file beside the function's own changes. Inside
-    the function, numbers, arrays, tuples, `math` and what is compiled with `inner` can be used.
+    It may use numbers, arrays, tuples and `math`. It is kept on disk until a source changes.
     """
     file = Path(inspect.getfile(function)).resolve()
     # typed in by hand: there is no folder to watch, and nothing is kept

@@ -15,13 +15,8 @@ def shaft_torque(twist: float, twist_rate: float, stiffness: float, damping: flo
     """
     Return the torque of a shaft that twists [N m].
 
-    Parameters
-    ----------
-    twist, twist_rate
-        driving minus driven angle and rate [rad], [rad/s]
-    stiffness, damping
-        [N m/rad], [N m s/rad]
-
+    twist, twist_rate : driving minus driven angle and rate [rad], [rad/s]
+    stiffness, damping : [N m/rad], [N m s/rad]
     """
     return stiffness * twist + damping * twist_rate
 
@@ -32,15 +27,9 @@ def tooth_torque(twist: float, twist_rate: float, half_gap: float, stiffness: fl
     """
     Return the torque of teeth that push and do not pull [N m]; without a gap, that of a shaft.
 
-    Parameters
-    ----------
-    twist, twist_rate
-        driving minus driven angle and rate [rad], [rad/s]
-    half_gap
-        the gap reaches from -half_gap to half_gap [rad]
-    stiffness, damping
-        of the flanks [N m/rad], [N m s/rad]
-
+    twist, twist_rate : driving minus driven angle and rate [rad], [rad/s]
+    half_gap : the gap reaches from -half_gap to half_gap [rad]
+    stiffness, damping : of the flanks [N m/rad], [N m s/rad]
     """
     if half_gap <= 0.0:
         return stiffness * twist + damping * twist_rate
@@ -49,23 +38,15 @@ def tooth_torque(twist: float, twist_rate: float, half_gap: float, stiffness: fl
 
 
 @inner
-def steps_for(span: float, stiffness: float, damping: float, inertia: float,
-              load: float) -> int:
+def steps_for(span: float, stiffness: float, damping: float, inertia: float, load: float) -> int:
     """
-    Return in how many steps a span has to be integrated for the shaft's own motion.
+    Return in how many steps a span [s] has to be integrated for the shaft's own motion.
 
-    A twentieth of the period and a fifth of the time in which damping decays are enough for a
-    semi-implicit Euler method to be within a percent.
+    A twentieth of the period and a fifth of the time in which damping decays keep a semi-implicit
+    Euler method within a percent.
 
-    Parameters
-    ----------
-    span
-        [s]
-    stiffness, damping
-        [N m/rad], [N m s/rad]
-    inertia, load
-        of the two ends [kg m^2]
-
+    stiffness, damping : [N m/rad], [N m s/rad]
+    inertia, load : of the two ends [kg m^2]
     """
     both = 1.0 / inertia + 1.0 / load
     fastest = math.sqrt(stiffness * both) * 20.0 / (2.0 * math.pi) + 5.0 * damping * both

@@ -3,10 +3,9 @@
 """
 Friction of a body that moves, and true sticking: level, drag, and the rate after a step.
 
-`level` and `drag` say how strong friction is. `rate_after` applies it: the level is an impulse
-against the motion that can bring the body to an exact stop and hold it there, so no threshold
-rate and no stiff equation is needed. Torques and forces are alike: read N m or N, rad/s or m/s,
-kg m^2 or kg throughout.
+`rate_after` applies the level as an impulse against the motion that can bring the body to an exact
+stop and hold it there: no threshold rate and no stiff equation is needed. Torques and forces are
+alike: read N m or N, rad/s or m/s, kg m^2 or kg throughout.
 """
 
 from __future__ import annotations
@@ -23,21 +22,15 @@ class Friction(NamedTuple):
     """
     The numbers of a friction; zero switches each of them off.
 
-    Attributes
-    ----------
-    coulomb : friction of a slipping body that does not depend on the rate
-    viscous : drag per rate
-    asymmetry : share by which Coulomb and Stribeck friction are larger forward than their mean,
-        and smaller backward
+    coulomb, viscous : friction that does not depend on the rate, and drag per rate
+    asymmetry : share by which Coulomb and Stribeck friction are larger forward than their mean
     viscous_asymmetry : the same of the drag
-    thinning : 1 minus the exponent of the drag: at 0 it grows with the rate, at 1/3 as grease
-        does (Palmgren, Ball and Roller Bearing Engineering, 1959)
+    thinning : 1 minus the exponent of the drag: 0, or 1/3 for grease (Palmgren, Ball and Roller
+        Bearing Engineering, 1959)
     thinning_rate : rate at which `viscous` holds whatever the thinning
-    stribeck : how much more friction is at rest than in motion
-    stribeck_rate, stribeck_shape : it fades as exp(-(rate / stribeck_rate)^stribeck_shape)
+    stribeck : excess at rest, which fades as exp(-(rate / stribeck_rate)^stribeck_shape)
     load_share : friction per load that the contact carries
     wave_order, wave_cosine, wave_sine : wave by the angle, as a share of the level
-
     """
 
     coulomb: Annotated[float, 'N m'] = 0.0
@@ -60,17 +53,8 @@ def level(friction: Friction, rate: float, load: float, angle: float) -> float:
     """
     Return the size of the friction that does not grow with the rate [N m], never below zero.
 
-    Parameters
-    ----------
-    friction
-        its numbers
-    rate
-        of the body; at rest, the direction in which it would move decides, see `direction`
-    load
-        on the contact [N m]
-    angle
-        of the body [rad]
-
+    rate : of the body; at rest, the direction in which it would move decides, see `direction`
+    load, angle : on the contact [N m], of the body [rad]
     """
     size = slip_level(rate, friction.coulomb, 0.0, friction.stribeck, friction.stribeck_rate,
                       friction.stribeck_shape, friction.asymmetry)
@@ -85,8 +69,7 @@ def drag(friction: Friction, rate: float) -> float:
     """Return the drag per rate at a rate [N m s/rad]."""
     slope = friction.viscous
     if friction.viscous_asymmetry != 0.0:
-        slope *= 1.0 + (friction.viscous_asymmetry if rate >= 0.0
-                        else -friction.viscous_asymmetry)
+        slope *= 1.0 + (friction.viscous_asymmetry if rate >= 0.0 else -friction.viscous_asymmetry)
     if friction.thinning != 0.0:
         # below a thousandth of the rate at which it holds, the drag counts as proportional
         slope *= max(abs(rate) / friction.thinning_rate, 1e-3) ** -friction.thinning
@@ -105,23 +88,12 @@ def direction(rate: float, torque: float) -> float:
 def rate_after(step: float, rate: float, torque: float, level: float, drag: float,
                inertia: float) -> float:
     """
-    Return the rate after a step, with the drag at the mean rate and the level as an impulse.
+    Return the rate after a step, exactly zero where the level exceeds what would move the body.
 
-    A body whose level exceeds what would move it ends the step at rest, exactly.
-
-    Parameters
-    ----------
-    step
-        [s]
-    rate
-        before it [rad/s]
-    torque
-        on the body but for friction [N m]
-    level, drag
-        of friction [N m], [N m s/rad]
-    inertia
-        [kg m^2]
-
+    step, rate : [s], before it [rad/s]; the drag acts at the mean rate, the level as an impulse
+    torque : on the body but for friction [N m]
+    level, drag : of friction [N m], [N m s/rad]
+    inertia : [kg m^2]
     """
     free = rate + step * (torque - 0.5 * drag * rate) / inertia
     impulse = step * level / inertia
@@ -134,20 +106,12 @@ def presliding(share: float, rate: float, distance: float, step: float) -> float
     """
     Return the share of the friction level that acts after a step, from -1 to 1 (Dahl's model).
 
-    After a reversal friction builds up over a distance. Apply level * share as a torque against
-    the motion, and no level in `rate_after`: the contact is a spring before it slides.
+    Apply level * share as a torque against the motion, and no level in `rate_after`: the contact
+    is a spring before it slides.
 
-    Parameters
-    ----------
-    share
-        before the step
-    rate
-        of the body in it [rad/s]
-    distance
-        over which friction builds up [rad]; 0 for at once
-    step
-        [s]
-
+    share : before the step
+    rate, step : of the body in it [rad/s], [s]
+    distance : over which friction builds up after a reversal [rad]; 0 for at once
     """
     if rate == 0.0:
         return share

@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-A cascaded loop as drives have it: position, velocity, current, each with its gain and limit.
-
-The loop is sampled: call it once per sample and hold its output until the next. It knows numbers
-only; what it reads (a digitised position, a rate by difference) the caller makes.
-"""
+"""A cascaded loop as drives have it, called once per sample: position, velocity, current."""
 
 from __future__ import annotations
 
@@ -21,21 +16,10 @@ def pi_controller(error: float, integral: float, gain: float, integral_time: flo
     """
     Return the output of a PI controller and its new integral; it does not wind up at the limit.
 
-    Parameters
-    ----------
-    error
-        in any unit
-    integral
-        of the last call, in the unit of the output; 0 at first
-    gain
-        output per error
-    integral_time
-        [s]; 0 for a proportional controller
-    limit
-        of the output
-    step
-        since the last call [s]
-
+    error, gain : in any unit, output per error
+    integral : of the last call, in the unit of the output; 0 at first
+    integral_time, step : [s], 0 for a proportional controller; since the last call [s]
+    limit : of the output
     """
     grown = integral
     if integral_time > 0.0:
@@ -52,14 +36,9 @@ class Cascade(NamedTuple):
     """
     The numbers of a cascaded loop.
 
-    Attributes
-    ----------
-    position_gain : rate asked for per position error
-    rate_limit : greatest rate that the position loop asks for
-    velocity_gain : current asked for per rate error
+    position_gain, rate_limit : rate asked for per position error, and its limit
+    velocity_gain, current_limit : current asked for per rate error, and its limit
     velocity_time : integral time of the velocity loop; 0 for none
-    current_limit : greatest current that the velocity loop asks for
-
     """
 
     position_gain: Annotated[float, '1/s']
@@ -75,19 +54,9 @@ def cascade(loop: Cascade, reference: float, feedforward: float, position: float
     """
     Return the current asked for [A] and the new integral of the velocity loop [A].
 
-    Parameters
-    ----------
-    loop
-        its numbers
-    reference, feedforward
-        position and rate asked for [rad], [rad/s]
-    position, rate
-        as the drive reads them [rad], [rad/s]
-    integral
-        of the last call [A]; 0 at first
-    step
-        between two samples of the loop [s]
-
+    reference, feedforward : position and rate asked for [rad], [rad/s]
+    position, rate : as the drive reads them [rad], [rad/s]
+    integral, step : of the last call [A], 0 at first; between two samples of the loop [s]
     """
     asked = limited(loop.position_gain * (reference - position) + feedforward, loop.rate_limit)
     return pi_controller(asked - rate, integral, loop.velocity_gain, loop.velocity_time,

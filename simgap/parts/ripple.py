@@ -11,19 +11,7 @@ from simgap.laws.compiling import inner
 
 @inner
 def wave(angle: float, order: float, cosine: float, sine: float) -> float:
-    """
-    Return a wave in the unit of its amplitudes.
-
-    Parameters
-    ----------
-    angle
-        that it follows [rad]
-    order
-        cycles per revolution
-    cosine, sine
-        amplitudes of its two parts
-
-    """
+    """Return a wave by an angle [rad], `order` cycles per revolution, in its amplitudes' unit."""
     if cosine == 0.0 and sine == 0.0:
         return 0.0
     return cosine * math.cos(order * angle) + sine * math.sin(order * angle)
@@ -32,17 +20,10 @@ def wave(angle: float, order: float, cosine: float, sine: float) -> float:
 @inner
 def harmonics(angle: float, order: float, amplitudes: tuple[float, ...]) -> float:
     """
-    Return a wave with harmonics, in the unit of its amplitudes.
+    Return a wave by an angle [rad] with harmonics, in the unit of its amplitudes.
 
-    Parameters
-    ----------
-    angle
-        that it follows [rad]
-    order
-        of the fundamental, cycles per revolution
-    amplitudes
-        cosine and sine part of the fundamental, of the second harmonic, and so on
-
+    `order` is of the fundamental in cycles per revolution; `amplitudes` are cosine and sine part
+    of the fundamental, of the second harmonic, and so on.
     """
     total = 0.0
     for k in range(len(amplitudes) // 2):

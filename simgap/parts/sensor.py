@@ -3,9 +3,8 @@
 """
 What sensors make of a motion: encoder, tachometer, current reading.
 
-A reading with its digit is a staircase, and a staircase has no derivative. Leave the digit out of
-a simulation that is to be fitted, and give it to the `reading`; `digitised` and `counts` are
-for a controller that closes its loop over them.
+A reading with its digit is a staircase without a derivative. In a simulation that is to be fitted,
+give the digit to the `reading`; `digitised` and `counts` are for controllers.
 """
 
 from __future__ import annotations
@@ -21,16 +20,9 @@ def encoder(angle: float, order: float, cosine: float, sine: float) -> float:
     """
     Return the reading of a scale with a cyclic error, such as one mounted off centre [rad].
 
-    Parameters
-    ----------
-    angle
-        true [rad]
-    order
-        of the error in cycles per revolution: 1 for eccentricity, that of its lines for the
-        interpolation between them
-    cosine, sine
-        amplitudes of the error [rad]; it is counted from that at angle zero
-
+    angle : true [rad]
+    order : cycles per revolution: 1 for eccentricity, that of the lines for interpolation
+    cosine, sine : amplitudes of the error [rad]; it is counted from that at angle zero
     """
     return angle + wave(angle, order, cosine, sine) - cosine
 
@@ -55,16 +47,8 @@ def tachometer(rate: float, angle: float, gain_error: float, zero: float, order:
     """
     Return the reading of a tachometer in the unit of the rate.
 
-    Parameters
-    ----------
-    rate, angle
-        of its shaft [rad/s], [rad]
-    gain_error
-        share by which it reads too much
-    zero
-        reading at rest [rad/s]
-    order, cosine, sine
-        ripple: cycles per revolution, amplitudes as shares of the rate
-
+    rate, angle : of its shaft [rad/s], [rad]
+    gain_error, zero : share by which it reads too much, and reading at rest [rad/s]
+    order, cosine, sine : ripple: cycles per revolution, amplitudes as shares of the rate
     """
     return rate * (1.0 + gain_error + wave(angle, order, cosine, sine)) + zero

@@ -29,40 +29,16 @@ def soft_limited(value: float, softness: float) -> float:
 
 @inner
 def rate_limited(value: float, wanted: float, limit: float, step: float) -> float:
-    """
-    Return a value that follows another no faster than it may.
-
-    Parameters
-    ----------
-    value
-        before the step
-    wanted
-        that it follows, in the same unit
-    limit
-        greatest change per second
-    step
-        [s]
-
-    """
+    """Return a value after a step [s] towards `wanted`, limited in its change per second."""
     return value + min(max(wanted - value, -limit * step), limit * step)
 
 
 @inner
 def lagged(value: float, source: float, time_constant: float, step: float) -> float:
     """
-    Return the output of a first-order lag after a step in which its input stands still.
+    Return the output of a first-order lag after a step [s] in which its input stands still.
 
-    Parameters
-    ----------
-    value
-        output before the step
-    source
-        input, in the same unit
-    time_constant
-        [s]; 0 for none
-    step
-        [s]
-
+    `value` is before the step, `source` is the input, and `time_constant` is in s; 0 for no lag.
     """
     if time_constant <= 0.0:
         return source
@@ -75,8 +51,7 @@ def lagged_mean(value: float, source: float, time_constant: float,
     """
     Return the mean output of a first-order lag over a step, and its output at the end of it.
 
-    A machine that is driven by the mean feels a lag far below the step, too, so that a fit can
-    begin without any. Arguments are those of `lagged`.
+    A machine driven by the mean feels even a lag far below the step. Arguments as for `lagged`.
     """
     if time_constant <= 0.0:
         return source, source
@@ -88,19 +63,12 @@ def lagged_mean(value: float, source: float, time_constant: float,
 @inner
 def delayed(past: NDArray[np.float64], k: int, ticks: float) -> float:
     """
-    Return what a signal was some ticks ago, on the straight line between two of its samples.
+    Return what a signal was some ticks ago, on the straight line between two samples.
 
     It has a derivative by the delay, which `held` has not.
 
-    Parameters
-    ----------
-    past
-        the signal at each tick so far, shape (n,), any unit
-    k
-        index of the present tick
-    ticks
-        delay, 0 or more; before the first sample the first value holds
-
+    past, k : the signal at each tick so far, shape (n,), and the present tick
+    ticks : delay, 0 or more; before the first sample the first value holds
     """
     whole, share = int(ticks), ticks % 1.0
     return (1.0 - share) * past[max(k - whole, 0)] + share * past[max(k - whole - 1, 0)]
@@ -110,23 +78,12 @@ def delayed(past: NDArray[np.float64], k: int, ticks: float) -> float:
 def held(time: NDArray[np.float64], values: NDArray[np.float64], moment: float,
          place: int) -> tuple[float, int]:
     """
-    Return the value of a sampled signal at a moment, held from each sample to the next.
+    Return the held value of a sampled signal at a moment [s], and the index of its sample.
 
     A delayed command is `held(time, command, now - delay, place)`.
 
-    Parameters
-    ----------
-    time, values
-        of the samples, shape (n,) [s], any unit
-    moment
-        [s]; before the first sample the first value holds
-    place
-        index from which the search starts, as the last call returned it; 0 at first
-
-    Returns
-    -------
-    the value, and its index
-
+    time, values : of the samples, shape (n,) [s], any unit; the first holds before it
+    place : index from which the search starts, as the last call returned it; 0 at first
     """
     # a sample's time is a sum of steps, and a sum of steps is rounded
     while place + 1 < time.size and time[place + 1] <= moment + 1e-9:

@@ -5,7 +5,7 @@ Answers of an earlier verdict, fitted to more tests than it has seen.
 
 A test in which motors creep and stick may hold every fit that begins at the model as configured in
 a wrong minimum. An answer of the earlier tests begins near its optimum. Where the new test leaves
-much at first, the noise counts as louder for one fit: the hills between the minima are lower then
+much at first, the noise counts as louder for one fit, which flattens the hills between minima
 (graduated non-convexity: A. Blake, A. Zisserman, Visual Reconstruction, 1987).
 """
 
@@ -22,11 +22,7 @@ from simgap.search.hypothesis import Hypothesis
 
 def continued(problem: LeastSquares, rivals: Sequence[Rival],
               concurrently: Callable[..., Iterable[Any]] = map) -> list[Hypothesis]:
-    """
-    Return answers of an earlier verdict as they fit all tests, at the sensors' own noise.
-
-    Two answers of the same fit are one. One whose effects the machine does not know is left out.
-    """
+    """Return the known answers of an earlier verdict, fitted to all tests, each fit once."""
     unique = {(rival.effects, rival.forms): rival for rival in rivals
               if rival.is_known_to(problem.machine)}
     return list(concurrently(lambda rival: _continued(problem, rival), unique.values()))

@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Stepwise selection: whether each effect of a hypothesis is needed, and whether another one is.
-
-A fit of a hundred nuisances may stop before it has converged, and that looks like a weak effect.
-Where an effect gains little, the fit without it is therefore run until it has converged.
-"""
+"""Stepwise selection: whether each effect of a hypothesis is needed, and whether another is."""
 
 from __future__ import annotations
 
@@ -25,10 +20,9 @@ def backward_elimination(fits: FullFits, hypotheses: Sequence[Hypothesis], setti
     """
     Test each doubtful effect of the best hypothesis, until the best has none.
 
-    Where its effects are one effect in each of its places, this one is tried, too, and so is a
-    simpler effect that one of them becomes at an end of its range. Of the hypotheses, fitted to
-    the whole tests, the nuisances alone are the first. They are returned in their order, with the
-    best of them, whose fit has converged.
+    One effect in all places is tried instead of itself in each, and so is a simpler effect that an
+    effect becomes at an end of its range. Return the hypotheses in their order, the nuisances
+    alone first, and the best of them, whose fit has converged.
     """
     found = {frozenset(h.effects): h for h in hypotheses}
     tried: set[frozenset[str]] = set()
@@ -68,12 +62,9 @@ def converged_rivals(fits: FullFits, hypotheses: Sequence[Hypothesis], best: Hyp
     """
     Take fits close behind the best to their ends, too: only there can they be distinguished.
 
-    A rival may be close only together with a partner that is no larger than its tolerance. It is
-    then fitted without the partner, and so is the best itself. An effect in another place is a
-    rival, too, also where the search has given it up: of two motors, far from its end, the wrong
-    one may win. It begins where the best has ended, because its own fit may have got stuck.
-
-    Parameters and what is returned are those of `forward_selection`.
+    Partners no larger than their tolerance are dropped from rivals and from the best. An effect in
+    another place is a rival even where the search gave it up, because its own fit may have got
+    stuck: it begins where the best has ended. Signature as `forward_selection`.
     """
     options, price = settings.search, settings.penalty
     found = {frozenset(h.effects): h for h in hypotheses}
@@ -115,12 +106,7 @@ def converged_rivals(fits: FullFits, hypotheses: Sequence[Hypothesis], best: Hyp
 
 def forward_selection(fits: FullFits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
                       settings: Settings) -> tuple[list[Hypothesis], Hypothesis]:
-    """
-    Add effects one after the other, until none is worth its price.
-
-    A single effect is left alone if it leaves only noise: the search has tried its partners. Taken
-    and returned are the hypotheses, and the best of them with a fit that has converged.
-    """
+    """Add effects one after the other, until none is worth its price or only noise remains."""
     found = list(hypotheses)
     while (0 < len(best.effects) < settings.search.most_effects
            and (len(best.effects) > 1 or fits.leaves_much(best))):

@@ -19,26 +19,16 @@ from simgap.verdict.verdict import Decision, LackOfFit
 
 @dataclass(frozen=True)
 class Evidence:
-    """
-    What a verdict is decided on.
+    """What a verdict is decided on."""
 
-    Attributes
-    ----------
-    hypotheses : everything that was fitted, the nuisances alone among them
-    lacks : what each of them leaves
-    inflation : of the cost's differences, see `intervals.inflation`
-
-    """
-
-    hypotheses: Sequence[Hypothesis]
-    lacks: Sequence[LackOfFit]
-    inflation: float = 1.0
+    hypotheses: Sequence[Hypothesis]  # everything that was fitted, the nuisances alone among them
+    lacks: Sequence[LackOfFit]  # what each of them leaves
+    inflation: float = 1.0  # of the cost's differences, see `intervals.inflation`
 
     def decide(self, settings: Settings) -> Decision:
         """Decide with these thresholds, on what the best hypothesis leaves under them."""
         best = verdict.best(self.hypotheses, settings, self.inflation)
-        lack = next(lack for h, lack in zip(self.hypotheses, self.lacks, strict=True)
-                    if h is best)
+        lack = next(lack for h, lack in zip(self.hypotheses, self.lacks, strict=True) if h is best)
         return verdict.decide(self.hypotheses, lack, settings, self.inflation)
 
     def as_data(self) -> list[dict[str, Any]]:
@@ -51,14 +41,7 @@ class Evidence:
 
     @classmethod
     def of_data(cls, data: Sequence[Mapping[str, Any]]) -> Evidence:
-        """
-        Take evidence from plain data.
-
-        Raises
-        ------
-        KeyError, TypeError : it is not evidence
-
-        """
+        """Take evidence from plain data. Raises KeyError or TypeError if it is not."""
         return cls([_hypothesis(item) for item in data],
                    [LackOfFit(**item['lack_of_fit']) for item in data],
                    data[0].get('inflation', 1.0) if data else 1.0)

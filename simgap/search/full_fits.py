@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Fits to the whole tests: the best that the search has found, compared at the sensors' own noise.
-
-They are what stepwise selection (`elimination`) runs until they have converged.
-"""
+"""Fits to the whole tests, compared at the sensors' own noise; see `elimination`."""
 
 from __future__ import annotations
 
@@ -27,15 +23,7 @@ from simgap.search.single_fits import added
 
 
 class FullFits:
-    """
-    Fits to the whole tests, as many at once as there are threads.
-
-    Attributes
-    ----------
-    problem : with the noise of the motion that was found
-    progress : called with the share that is done, 0 to 1, and what is being done
-
-    """
+    """Fits of `problem`, in `threads`; `progress` gets the share done and what is being done."""
 
     def __init__(self, problem: LeastSquares, progress: Callable[[float, str], None],
                  threads: int = 1) -> None:
@@ -46,12 +34,8 @@ class FullFits:
 
     def compared(self, none: Hypothesis, singles: Sequence[Hypothesis],
                  pairs: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """
-        Fit the best of what a search has found to the whole tests; return 'none' first.
-
-        All share the derivatives by the nuisances. In each pass these are taken again, where the
-        best hypothesis is then. Those with one effect and with two come the best first.
-        """
+        """Fit the best of a search to the whole tests; return 'none', then the best first."""
+        # all share the derivatives by the nuisances, taken again where the best is in each pass
         options = self.settings
         chosen = self._chosen(singles, pairs)
         anchor = min(chosen, key=self._priced)
@@ -80,14 +64,12 @@ class FullFits:
                 before = np.inf
                 continue
             reached = self._priced(anchor)
-            chosen = [single, *self._within_reach(reached, (
-                h for h in chosen if h is not single))]
+            chosen = [single, *self._within_reach(reached, (h for h in chosen if h is not single))]
             if number and before - reached < max(options.settled, options.settled_share * reached):
                 break
             before = reached
         # the best form of each effect counts
-        unique = {frozenset(h.effects): h for h in sorted(
-            chosen, key=lambda h: -self._priced(h))}
+        unique = {frozenset(h.effects): h for h in sorted(chosen, key=lambda h: -self._priced(h))}
         return [none, *sorted(unique.values(), key=self._priced)]
 
     def _chosen(self, singles: Sequence[Hypothesis],
@@ -152,13 +134,8 @@ class FullFits:
         """Return whether a hypothesis leaves more than noise in the whole tests."""
         return self.problem.leaves_much(hypothesis.state)
 
-    def at_noise_of(self, best: Hypothesis,
-                    hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """
-        Return hypotheses with their costs at the noise that one of them leaves.
-
-        Slow noise may be what an effect does that the others lack.
-        """
+    def at_noise_of(self, best: Hypothesis, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return hypotheses at the noise of one of them: slow noise may be a missing effect."""
         if not self._noise_taken(best):
             return list(hypotheses)
         return [replace(h, state=self.problem.evaluated(h.state)) for h in hypotheses]
@@ -182,11 +159,8 @@ class FullFits:
                 if other.id not in hypothesis.effects]
 
     def exchanged(self, hypothesis: Hypothesis, effect: str, other: str) -> Hypothesis:
-        """
-        Return a hypothesis with another effect in the place of one of its own.
-
-        The fit begins at the size that does most of what the former has done, and has converged.
-        """
+        """Return a converged hypothesis with another effect in the place of one of its own."""
+        # the fit begins at the size that does most of what the former has done
         machine = self.problem.machine
         rest, form = self._dropped(hypothesis, effect), machine.catalogue[other].forms[0]
         point = {**rest.state.point(), **form.start}
@@ -201,11 +175,7 @@ class FullFits:
         return self._ended((*rest.effects, other), (*rest.forms, form), state)
 
     def joined(self, hypothesis: Hypothesis) -> Hypothesis | None:
-        """
-        Return a hypothesis with one effect in all of its places, not in each by itself.
-
-        None if its effects are not all the parts of one, in one form. The fit has converged.
-        """
+        """Return one effect in all its places instead of in each, converged; None if not alike."""
         machine, effects = self.problem.machine, self.problem.machine.catalogue
         whole = next((item for item in effects.values()
                       if item.parts and set(item.parts) == set(hypothesis.effects)), None)
@@ -235,6 +205,5 @@ class FullFits:
 
     def _refitted(self, shared: SharedJacobian, keep_hessian: bool,
                   hypothesis: Hypothesis) -> Hypothesis:
-        """Fit a hypothesis to the whole tests and drop its Jacobian."""
         return refitted(self.problem, shared, self.settings.full_iterations,
                         hypothesis).without_jacobian(keep_hessian)

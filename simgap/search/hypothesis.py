@@ -18,21 +18,12 @@ from simgap.settings import PenaltySettings
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """
-    Effects that were fitted together with all nuisances.
+    """Effects that were fitted together with all nuisances."""
 
-    Attributes
-    ----------
-    effects : their ids; none for the nuisances alone
-    forms : one for each effect
-    state : where the fit ended
-    doubts : the probability that an effect is within its tolerance, by effect; 0 if not given
-
-    """
-
-    effects: tuple[str, ...]
-    forms: tuple[Form, ...]
-    state: FitState
+    effects: tuple[str, ...]  # their ids; none for the nuisances alone
+    forms: tuple[Form, ...]  # one for each effect
+    state: FitState  # where the fit ended
+    # probability that an effect is within tolerance
     doubts: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -88,12 +79,9 @@ class Hypothesis:
         return self.state.cost + penalty(self.forms, self.state.point(), settings)
 
     def loss_without(self, effect: str) -> float:
-        """
-        Return what the fit would lose without one of its effects, were it quadratic.
-
-        Half of Wald's statistic: the square of the effect's sizes in the metric of their own
-        precision, with the nuisances following. Up to its tolerance, a nuisance may take over.
-        """
+        """Return what the fit would lose without an effect, were it quadratic."""
+        # Half of Wald's statistic: the square of the sizes beyond tolerance, which a nuisance may
+        # take over, in the metric of their own precision, with the nuisances following.
         form = self.forms[self.effects.index(effect)]
         sizes = {p.name for p in form.sizes}
         places = [j for j, p in enumerate(self.state.parameters) if p.name in sizes]
@@ -119,13 +107,9 @@ class Hypothesis:
 
 
 def penalty(forms: Sequence[Form], point: Point, settings: PenaltySettings) -> float:
-    """
-    Return the penalty of effects in these forms with these values, in halves of a chi-square.
-
-    An effect pays for itself and for each parameter. An effect that is as small as the tolerance
-    of its number is that tolerance, and pays for it; the payment falls to zero as the effect
-    outgrows the tolerance.
-    """
+    """Return the penalty of effects in these forms with these values [half chi-square]."""
+    # An effect as small as its number's tolerance is that tolerance, and pays for it; the payment
+    # falls to zero as the effect outgrows the tolerance.
     total = 0.0
     for form in forms:
         total += settings.effect + settings.scanned * form.scanned

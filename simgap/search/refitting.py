@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-A hypothesis somewhere else: at other noise, in whole tests, or without one of its effects.
-
-Several hypotheses share the derivatives by the nuisances, which cost most of a fit.
-"""
+"""A hypothesis at other noise, in whole tests, or without an effect, with shared derivatives."""
 
 from __future__ import annotations
 
@@ -57,11 +53,7 @@ def refitted(problem: LeastSquares, shared: SharedJacobian, iterations: int,
 
 def taken_over(machine: Machine, point: Point, forms: Sequence[Form],
                parameters: Sequence[Parameter]) -> tuple[dict[str, float], list[Parameter]]:
-    """
-    Return a point at which effects alone stand for their numbers, and the parameters.
-
-    The nuisances that stand for the same numbers are held at zero.
-    """
+    """Return a point where effects alone stand for their numbers: twin nuisances are zero."""
     at, held = machine.nuisances.take_over(point, forms)
     return at, [replace(p, low=0.0, high=0.0) if p.name in held else p for p in parameters]
 

@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Screening: how much of the residual each effect could explain, by its derivative alone.
-
-A screening is a filter, not a judgement: what it promises is far above what a fit gains, but the
-true effect is nearly always among the first dozen.
-"""
+"""Screening: how much of the residual each effect could explain, by its derivative alone."""
 
 from __future__ import annotations
 
@@ -28,20 +23,11 @@ _REFINEMENTS = 10
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """
-    A form of an effect and the derivatives of the prediction by its parameters.
+    """A form of an effect and the derivatives of the prediction by its parameters."""
 
-    Attributes
-    ----------
-    effect : its id
-    form : of the effect
-    jacobian : shape (n, m); zero for shape parameters
-
-    """
-
-    effect: str
-    form: Form
-    jacobian: Jacobian
+    effect: str  # its id
+    form: Form  # of the effect
+    jacobian: Jacobian  # shape (n, m); zero for shape parameters
 
 
 def sensitivities(problem: LeastSquares, state: FitState,
@@ -81,12 +67,8 @@ def same_effect(effects: Mapping[str, Effect], effect: str, others: Sequence[str
 
 def screened(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
              besides: Sequence[str] = ()) -> list[tuple[float, Sensitivity]]:
-    """
-    Return the gain that each form promises beside the effects that are there, the greatest first.
-
-    What the fit would gain without it, because it has not converged, is not part of the promise.
-    The effects of the fit have the ids `besides`, and `known` comes from `sensitivities`.
-    """
+    """Return the gain that each form promises beside the effects `besides`, the greatest first."""
+    # what the fit would gain without it, because it has not converged, is not part of the promise
     names = {p.name for p in state.parameters}
     low = np.array([p.low for p in state.parameters]) - state.x
     high = np.array([p.high for p in state.parameters]) - state.x
@@ -131,12 +113,11 @@ def _promised(hessian: FloatArray, gradient: FloatArray, low: FloatArray,
 def scan(problem: LeastSquares, state: FitState, known: Sequence[Sensitivity],
          besides: Sequence[str] = ()) -> list[tuple[Sensitivity, dict[str, float]]]:
     """
-    Return the forms that fit best once their sizes are tried out far from zero.
+    Return the forms that fit best once their sizes are tried out far from zero, best first.
 
-    A strong effect may bend the misfit so much that its derivative at zero tells nothing: a mode
-    at another frequency, a limit that was not reached, a ripple that shakes a mode. The values are
-    sought in the worst test. Each form comes with the sizes from which a fit should begin, the
-    best first. The parameters are those of `screened`.
+    A strong effect may bend the misfit so much that its derivative at zero says nothing. Values
+    are sought in the worst test, and each form comes with the sizes from which a fit should begin.
+    Parameters are those of `screened`.
     """
     here = state.point()
     count = problem.settings.search.scanned

@@ -3,17 +3,12 @@
 """
 The search for effects: from the nuisances alone over single effects to pairs.
 
-1. The nuisances are fitted without any effect: the hypothesis 'none'. While something strong is
-   missing, the misfit counts as noise, and the nuisances stay close to their priors.
-2. A screening by derivatives says how much of the residual each effect could explain.
-3. The best dozen are fitted, each together with all nuisances. While they leave much, the
-   effect that each single test promises most of is fitted, too. If the best explains much, the
-   noise is lowered to what it leaves, and the best are fitted again.
-4. Several of the best are given partners, and the pairs are fitted.
-
-The answers of an earlier verdict on some of the tests are fitted as well, each from where it has
-ended there.
-
+The nuisances are fitted without any effect: the hypothesis 'none'. While something strong is
+missing, the misfit counts as noise, and the nuisances stay close to their priors. A screening by
+derivatives chooses a dozen effects, which are fitted, each together with all nuisances. While they
+leave much, so is the effect that each single test promises most of. If the best explains much, the
+noise is lowered to what it leaves, and the best are fitted again. Several of the best are given
+partners, and the pairs are fitted. Answers of an earlier verdict are fitted from where they ended.
 All this is done with coarser steps of the simulation. The best are then fitted to the whole tests
 and compared (`full_fits`).
 """
@@ -43,13 +38,7 @@ from simgap.search.single_fits import added, added_at, gone_on, moved, others_th
 
 
 class Search:
-    """
-    The search for the effects that a model lacks.
-
-    `progress` is called with the share that is done, 0 to 1, and what is being done. `threads`
-    hypotheses are fitted at once, and those of `earlier`, answers of a verdict on some of the
-    tests, beside all others.
-    """
+    """The search for missing effects; `progress` gets the share done and what is being done."""
 
     def __init__(self, problem: LeastSquares, progress: Callable[[float, str], None],
                  threads: int = 1, earlier: Sequence[Rival] = ()) -> None:
@@ -96,10 +85,7 @@ class Search:
         """Return the earlier answers as they fit all tests, with costs at the present noise."""
         return [replace(h, state=self.problem.rescaled(h.state, 1.0)) for h in self._earlier_fits]
 
-    # -- the nuisances, and the noise ------------------------------------------------------------
-
     def _nuisances_alone(self) -> Hypothesis:
-        """Fit the nuisances alone; the misfit counts as noise."""
         iterations = self.settings.iterations
         point = self._beginning()
         first = self.problem.start(self.machine.nuisances, point)
@@ -131,12 +117,9 @@ class Search:
         return state
 
     def _freed(self, none: Hypothesis, best: Hypothesis) -> Hypothesis | None:
-        """
-        Return the nuisances alone from where the best single effect has ended; None if as before.
-
-        An effect of next to no size may gain much, because its fit went round what held the fit
-        of the nuisances alone. By its curvature the effect itself gains little.
-        """
+        """Return the nuisances from where the best single effect ended; None if as before."""
+        # An effect of next to no size may gain much, because its fit went round what held the fit
+        # of the nuisances alone. By its curvature the effect itself gains little.
         gain = none.cost - best.cost
         own = self.settings.stuck * gain
         if best.has_course or best.loss_without(best.effects[0]) > own:
@@ -169,18 +152,12 @@ class Search:
                 refitted, problem, shared, self.settings.iterations), finalists)
         return found
 
-    # -- single effects ------------------------------------------------------------------------
-
     def _take_sensitivities(self, state: FitState) -> None:
         self.sensitivities = sensitivities(self.problem, state, self._pool.map)
 
     def _sorted(self, fitted: Callable[[Any], Hypothesis], of: Iterable[Any],
                 full: int | None = None) -> list[Hypothesis]:
-        """
-        Fit several hypotheses at once; return the best first.
-
-        Only the first `full` keep their Jacobians, which take most of the memory; None for all.
-        """
+        # Only the first `full` keep their Jacobians, which take most of the memory; None for all.
         found: list[Hypothesis] = []
         for hypothesis in self._pool.map(fitted, of):
             insort(found, hypothesis, key=self._priced)
@@ -219,12 +196,9 @@ class Search:
         return [*leading[:options.bases], *(h.without_jacobian() for h in leading[options.bases:])]
 
     def _led_by_tests(self, none: Hypothesis, known: Collection[str]) -> list[Hypothesis]:
-        """
-        Return the effects that single tests promise, each fitted to its test and then to all.
-
-        A creep in which motors stick holds every fit to all tests in one of its minima, and what
-        it promises there is wrong. Another test alone may still show what is missing.
-        """
+        """Return the effects that tests promise, each fitted to its test and then to all."""
+        # A creep in which motors stick holds every fit to all tests in one of its minima, and what
+        # it promises there is wrong. Another test alone may still show what is missing.
         asked: dict[str, tuple[int, Form]] = {}
         for k in range(len(self.problem.experiments)):
             weight = np.zeros_like(none.state.weight)
@@ -247,7 +221,6 @@ class Search:
         return list(self._pool.map(fitted, asked.items()))
 
     def _fitted_again(self, hypothesis: Hypothesis) -> Hypothesis:
-        """Fit with a fresh Jacobian."""
         point = with_initial_conditions(self.problem, hypothesis.state.point())
         state = self.problem.start(hypothesis.state.parameters, point)
         return replace(hypothesis, state=self.problem.fit(
@@ -273,12 +246,9 @@ class Search:
         return sorted([*leading, *hypotheses[count:]], key=self._priced)
 
     def _with_relatives(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """
-        Return hypotheses with those whose effects do the same in other places, the best first.
-
-        Each begins with the nuisances of the best and at a size that does as much. From far away
-        its fit may have ended elsewhere, and 'both motors' then lost to one.
-        """
+        """Return hypotheses with the same effects in other places added, the best first."""
+        # Each begins with the nuisances of the best and at a size that does as much. From far away
+        # its fit may have ended elsewhere, and 'both motors' then lost to one.
         best = hypotheses[0]
         return self._with_better(hypotheses, self._pool.map(
             lambda item: moved(self.problem, best, *item),
@@ -287,12 +257,9 @@ class Search:
              if item[0].id not in best.effects]))
 
     def _exchanged(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """
-        Return hypotheses with those that a scan finds in the place of an effect of the best one.
-
-        The nuisances alone were bent by the effect that is missing. With those of the best effect
-        another one may fit better: gravity in place of a steady wind.
-        """
+        """Return hypotheses with those that a scan finds in the place of a best effect."""
+        # The nuisances alone were bent by the effect that is missing. With those of the best
+        # effect another one may fit better: gravity in place of a steady wind.
         best = hypotheses[0]
         if best.has_course:
             return list(hypotheses)
@@ -316,10 +283,7 @@ class Search:
                 found[key] = new
         return sorted(found.values(), key=self._priced)
 
-    # -- pairs ---------------------------------------------------------------------------------
-
     def _pairs(self, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Give the best singles a few partners each."""
         options = self.settings
         best = singles[0]
         # beside the best, another effect may look different: it may have hidden a ripple

@@ -96,5 +96,4 @@ def others_than(hypothesis: Hypothesis, form: Form) -> list[int]:
 
 
 def _put(items: tuple[Item, ...], place: int, item: Item) -> tuple[Item, ...]:
-    """Return a tuple with another item in a place."""
     return (*items[:place], item, *items[place + 1:])

@@ -21,17 +21,7 @@ from simgap.settings import Settings
 
 
 class Part(Machine):
-    """
-    A machine in some of its experiments. What is not among them cannot reach a fit.
-
-    Parameters
-    ----------
-    machine, chosen
-        in all experiments, and the indices of those that count
-    experiments, held
-        what was measured in them, None for all that the machine has; values that are held, by name
-
-    """
+    """A machine in some of its experiments; what is not among them cannot reach a fit."""
 
     def __init__(self, machine: Machine, chosen: Sequence[int],
                  experiments: Sequence[Experiment] | None = None,
@@ -79,20 +69,11 @@ class Part(Machine):
 
 @dataclass(frozen=True)
 class Slopes:
-    """
-    Derivatives that were taken once for all experiments, to begin fits with.
+    """Derivatives that were taken once for all experiments, to begin fits with."""
 
-    Attributes
-    ----------
-    parameters : what the columns belong to
-    rows : of each experiment
-    jacobian : at the sensors' own noise, shape (n, m)
-
-    """
-
-    parameters: tuple[Parameter, ...]
-    rows: tuple[slice, ...]
-    jacobian: Jacobian
+    parameters: tuple[Parameter, ...]  # what the columns belong to
+    rows: tuple[slice, ...]  # of each experiment
+    jacobian: Jacobian  # at the sensors' own noise, shape (n, m)
 
     @classmethod
     def of(cls, problem: LeastSquares, state: FitState) -> Slopes:
@@ -109,12 +90,8 @@ class Slopes:
 
 def begun(part: Part, forms: Sequence[Form], point: Mapping[str, float],
           settings: Settings) -> dict[str, float]:
-    """
-    Return a point with the sizes of effects at which a fit to a part of the tests may begin.
-
-    A strong effect may bend the misfit so much that its derivative at zero leads nowhere. Where an
-    effect's form has values to try out, the best is taken.
-    """
+    """Return a point with the sizes at which a fit to a part may begin, the best of the trials."""
+    # A strong effect may bend the misfit so much that its derivative at zero leads nowhere.
     at = dict(point)
     problem = LeastSquares(part, settings=settings)
     problem = problem.at_scale(max(problem.noise_level(problem.residuals(at)), 1.0))
@@ -129,10 +106,8 @@ def trained(part: Part, parameters: Sequence[Parameter], point: Mapping[str, flo
     """
     Fit parameters to a part of the tests, from a point far from the optimum to the end.
 
-    While much is left, the misfit counts as noise, and the noise is lowered as the fit proceeds:
-    at the sensors' own noise a robust loss does not lead across a large misfit. The derivatives in
-    `slopes`, shape (n, m) each, only begin the fit: the first its beginning, the next what
-    follows. At its end they are taken again as long as that gains much.
+    While much is left, the misfit counts as noise: at the sensors' own noise a robust loss does
+    not lead across a large misfit. `slopes`, shape (n, m) each, only begin the stages of the fit.
     """
     options, search = settings.held_out, settings.search
     at = with_initial_conditions(LeastSquares(part, settings=settings), dict(point))

@@ -28,47 +28,25 @@ from simgap.verdict.lack_of_fit import implausibility, lack_of_fit
 
 @dataclass(frozen=True)
 class Conclusion:
-    """
-    What the fits to a machine's experiments say.
+    """What the fits to a machine's experiments say."""
 
-    Attributes
-    ----------
-    problem : the whole experiments, with the noise of the motion that was found
-    none, best : the hypotheses without and with the likeliest effects
-    reach : how far the gap shrinks, see `held_out`
-    deviating : returns the standard deviations of the values of a hypothesis' effects
-    doubted : returns what tells whether its effects are larger than their tolerances
-    evidence : every fit, with what each leaves
-    decision : what follows from it
-    notes : for people
-
-    """
-
-    problem: LeastSquares
-    none: Hypothesis
-    best: Hypothesis
-    reach: dict[str, Any]
+    problem: LeastSquares  # the whole experiments, with the noise of the motion that was found
+    none: Hypothesis  # without effects
+    best: Hypothesis  # with the likeliest effects
+    reach: dict[str, Any]  # how far the gap shrinks, see `held_out`
+    # standard deviations of the effects' values
     deviating: Callable[[Hypothesis], dict[str, float]]
-    doubted: Callable[[Hypothesis], dict[str, Doubt]]
-    evidence: Evidence
-    decision: verdict.Decision
-    notes: tuple[str, ...]
+    doubted: Callable[[Hypothesis], dict[str, Doubt]]  # whether effects exceed their tolerances
+    evidence: Evidence  # every fit, with what each leaves
+    decision: verdict.Decision  # what follows from it
+    notes: tuple[str, ...]  # for people
 
 
 def concluded(machine: Machine, progress: Callable[[float, str], None], threads: int,
               settings: Settings, earlier: Sequence[Rival] = ()) -> Conclusion:
-    """
-    Fit, select, withhold and decide.
-
-    A course over time has so many numbers that it imitates what moves the same part. Where it
-    looks like no real one, everything is done without it first.
-
-    Parameters
-    ----------
-    machine, progress, threads, settings, earlier
-        see `diagnosis.diagnose`
-
-    """
+    """Fit, select, withhold and decide; parameters as in `diagnosis.diagnose`."""
+    # A course over time has so many numbers that it imitates what moves the same part. Where it
+    # looks like no real one, everything is done without it first.
     whole = LeastSquares(machine, settings=settings)
 
     def report(share: float, doing: str) -> None:
@@ -138,15 +116,13 @@ def _decided(fits: FullFits, none: Hypothesis, best: Hypothesis,
     if best.unsure:
         notes.append(f'{" + ".join(sorted(best.unsure))}: not surely beyond the tolerance, and '
                      'therefore not named')
-    evidence = _evidence(
-        problem, hypotheses, best, reach['explained_fraction']['ci95'][1], usual)
+    evidence = _evidence(problem, hypotheses, best, reach['explained_fraction']['ci95'][1], usual)
     return Conclusion(problem, none, best, reach, deviating,
                       lambda hypothesis: doubted(hypothesis, fitted), evidence,
                       evidence.decide(settings), tuple(notes))
 
 
 def _implausible_courses(best: Hypothesis, settings: Settings) -> tuple[str, ...]:
-    """Return the effects whose course over time looks like no real one."""
     found = implausibility(best, settings)
     return tuple(effect for effect, form in zip(best.effects, best.forms, strict=True)
                  if form.is_course and found[effect] > 1.0)
@@ -163,11 +139,8 @@ def _between_tests(reach: Mapping[str, Any]) -> dict[str, float]:
 
 def _rests(fits: FullFits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
            settings: Settings) -> dict[str, Hypothesis]:
-    """
-    Return the best without each doubted effect, where there is no such fit, by effect.
-
-    The search gives up what is far behind the best, and so the best without what gains most.
-    """
+    """Return the best without each doubted effect, where there is no such fit, by effect."""
+    # The search gives up what is far behind the best, and so the best without what gains most.
     known = {frozenset(h.effects) for h in hypotheses}
     return {effect: fits.without(best, effect) for effect in best.effects
             if best.doubts.get(effect, 0.0) >= settings.interval.least_doubt
@@ -175,7 +148,6 @@ def _rests(fits: FullFits, hypotheses: Sequence[Hypothesis], best: Hypothesis,
 
 
 def _least_costs(hypotheses: Sequence[Hypothesis]) -> dict[frozenset[str], float]:
-    """Return the least cost of a fit with each set of effects."""
     return {frozenset(h.effects): h.cost
             for h in sorted(hypotheses, key=lambda h: h.cost, reverse=True)}
 

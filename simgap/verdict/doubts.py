@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The doubt whether an effect of a fit is larger than its tolerance.
-
-A fit may have an effect because the machine has it, or because it mends what is a little wrong
-elsewhere. It is in doubt if it exceeds its tolerance by few standard deviations and gains little.
-"""
+"""The doubt whether an effect of a fit is larger than its tolerance, or mends something else."""
 
 from __future__ import annotations
 
@@ -19,28 +14,15 @@ from simgap.settings import IntervalSettings
 
 @dataclass(frozen=True)
 class Doubt:
-    """
-    What tells whether an effect is larger than its tolerance.
+    """What tells whether an effect is larger than its tolerance."""
 
-    Attributes
-    ----------
-    size : name of the number that exceeds its tolerance by most deviations
-    excess : over the tolerance, in the unit of the number
-    deviation : standard deviation of the number
-    sure : excess in deviations at which the doubt is a half
-    gain : of the effect [half chi-square], over the inflation; 0 if no fit has shown it
-    sure_by_gain : gain at which the doubt is a half, however small the excess
-    slope : how sharply the doubt falls beyond these limits
-
-    """
-
-    size: str
-    excess: float
-    deviation: float
-    sure: float
-    gain: float
-    sure_by_gain: float
-    slope: float
+    size: str  # number that exceeds its tolerance by most deviations
+    excess: float  # over the tolerance, in the number's unit
+    deviation: float  # standard deviation of the number
+    sure: float  # excess in deviations at which the doubt is a half
+    gain: float  # [half chi-square] over the inflation; 0 if no fit has shown it
+    sure_by_gain: float  # gain at which the doubt is a half, however small the excess
+    slope: float  # how sharply the doubt falls beyond these limits
 
     @property
     def certainty(self) -> float:
@@ -59,20 +41,11 @@ def doubts(hypothesis: Hypothesis, deviating: Mapping[str, float], gained: float
     """
     Return the doubts whether effects are larger than their tolerances, by effect.
 
-    The strongest one is not in doubt where the effects gain much. A weaker one has to exceed its
-    tolerance by more, or to gain more, because it may only mend the form of the strongest. A
-    course over time is judged as a whole, elsewhere.
-
-    Parameters
-    ----------
-    hypothesis, deviating, settings
-        with the standard deviations of its values, from `intervals.deviations`
-    gained, own_gains
-        gain of all its effects, and of some beside the others [half chi-square], over the
-        inflation
-    beyond
-        excess of the strongest effect, in deviations, at which its doubt is a half
-
+    The strongest is not in doubt if `gained`, the gain of all, is large. A weaker one may only
+    mend its form, and has to exceed its tolerance by more, or to gain more of its own. Gains are
+    [half chi-square] over the inflation. Courses over time are judged elsewhere. `deviating` has
+    standard deviations; `beyond` is the excess of the strongest, in deviations, at which its doubt
+    is a half.
     """
     point = hypothesis.state.point()
     found: dict[str, Doubt] = {}

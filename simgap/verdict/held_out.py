@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-How far the gap shrinks once an effect is added, judged on data whose effect is withheld.
-
-Each test is withheld in turn, see `judge`. What the tests say together is here.
-"""
+"""How far the gap shrinks on withheld data: what all tests, each withheld, say together."""
 
 from __future__ import annotations
 
@@ -30,19 +26,7 @@ BOUNDS = (-1.0, 1.0)
 
 def held_out(problem: LeastSquares, none: Hypothesis, best: Hypothesis, threads: int = 1,
              groups: Sequence[str] | None = None, what: str = _TURNS) -> dict[str, Any]:
-    """
-    Return the gap before and after, on data whose effect is withheld, for the JSON.
-
-    Parameters
-    ----------
-    problem
-        the whole tests
-    none, best, threads
-        the hypotheses without and with the likeliest effects, and how many tests go at once
-    groups, what
-        group of each test, withheld together, and its name for people; None if each is its own
-
-    """
+    """Return the gap before and after, where each group's effect is withheld, for the JSON."""
     single = len(problem.experiments) == 1
     judge = Judge(problem, none, best, groups or [e.name for e in problem.experiments])
     with ThreadPoolExecutor(threads) as pool:
@@ -103,7 +87,6 @@ def _judged(effects: Sequence[str], folds: Sequence[Withheld]) -> dict[str, Any]
 
 
 def _reason(folds: Sequence[Withheld]) -> str:
-    """Return why nothing could be judged."""
     reasons = dict.fromkeys(f'{effect}: {reason}' for fold in folds
                             for effect, reason in fold.reasons.items())
     return '; '.join(reasons) or 'no effect was found'
@@ -128,8 +111,6 @@ def _per_signal(problem: LeastSquares, folds: Sequence[Withheld], known: bool) -
                 for name, zs in parts.items()}}
     return found
 
-
-# -- the interval --------------------------------------------------------------------------------
 
 def block_sums(time_s: FloatArray, before: FloatArray, after: FloatArray,
                block_s: float) -> FloatArray:
@@ -169,12 +150,7 @@ def _after(fold: Withheld) -> FloatArray:
 
 
 def explained_fraction(sums: FloatArray, no_gap: float) -> float:
-    """
-    Return the explained share of the energy above the noise, from -1 to 1.
-
-    `sums` has the energy before, after, and of the noise. Up to a share `no_gap` of the energy
-    there is no gap, and the explained share is 0.
-    """
+    """Return the explained share, -1 to 1, of energy above noise, from (before, after, noise)."""
     before, after, noise = sums
     # with a floor above the energy that is left, more than all would be explained
     gap = before - min(noise, after)

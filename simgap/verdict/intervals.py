@@ -3,20 +3,15 @@
 """
 Intervals of fitted values, by Laplace's approximation with a cluster-robust variance.
 
-What a fit leaves is never quite independent noise: a model's own error lasts, an event concerns
-one second. The scores of the likelihood are therefore summed over blocks of time, and the scatter
-of these sums is compared with what independent noise would give (K.-Y. Liang, S. L. Zeger,
-Biometrika 73, 1986).
+Residuals are never quite independent. The scores of the likelihood are summed over blocks of time,
+and the scatter of these sums is compared with that of independent noise (K.-Y. Liang, S. L. Zeger,
+Biometrika 73, 1986). Where the law of an effect is wrong, each test asks for another value,
+however little noise there is. The jackknife over the tests shows that (J. W. Tukey, Annals of
+Mathematical Statistics 29, 1958, 614). The larger deviation counts.
 
-Where the law of an effect is another one, each test asks for another value, however little noise
-there is. The jackknife over the tests sees that: the effect was fitted without each test in turn
-to judge it there (J. W. Tukey, Annals of Mathematical Statistics 29, 1958, 614). The larger of the
-two deviations sets the interval.
-
-Difference quotients of a drive that sticks and slips are right to a tenth. A Hessian of them knows
-nothing of directions in which two columns differ by less. There the priors alone count: without
-that, a change of a number and the tolerance of the same number would be separated by the error of
-a difference quotient.
+Difference quotients of a drive that sticks and slips are right to a tenth. In directions in which
+two columns differ by less, the priors alone count. Otherwise the error of a difference quotient
+would separate a change of a number from the tolerance of the same number.
 """
 
 from __future__ import annotations
@@ -39,21 +34,13 @@ _BY_DATA = 1e-6
 
 
 def inflation(problem: LeastSquares, state: FitState) -> FloatArray:
-    """
-    Return the variance of each fitted value over that with independent noise, 1 or more, (m,).
-
-    `state` is of a fit that has converged, with its Jacobian.
-    """
+    """Return each value's variance over that with independent noise, 1 or more, shape (m,)."""
     posterior = covariance(state, 1.0, problem.settings.interval)
     return _inflation(problem, state, posterior)
 
 
 def contrast_deviation(problem: LeastSquares, state: FitState, contrast: FloatArray) -> float:
-    """
-    Return the standard deviation of a sum of fitted values, robust to dependent residuals.
-
-    `contrast` has the factor of each value, shape (m,); `state` is as in `inflation`.
-    """
+    """Return the robust standard deviation of fitted values times `contrast`, shape (m,)."""
     settings = problem.settings.interval
     along = covariance(state, 1.0, settings) @ contrast[:, np.newaxis]
     [inflated] = _inflation(problem, state, along)
@@ -79,11 +66,7 @@ def _inflation(problem: LeastSquares, state: FitState, posterior: FloatArray) ->
 
 
 def covariance(state: FitState, inflated: float, settings: IntervalSettings) -> FloatArray:
-    """
-    Return the covariance of the values of a fit that has converged, shape (m, m).
-
-    `inflated` is the variance over that with independent noise, 1 or more.
-    """
+    """Return the covariance of converged values, shape (m, m); `inflated` is of the variance."""
     return _covariance(state, _known(state, settings) / inflated)
 
 
@@ -110,12 +93,7 @@ def jackknife(values: Sequence[float]) -> float:
 def deviations(hypothesis: Hypothesis, inflated: Callable[[str], float],
                settings: IntervalSettings,
                between_tests: Mapping[str, float] = MappingProxyType({})) -> dict[str, float]:
-    """
-    Return the standard deviations of the values of a hypothesis' effects, by name.
-
-    `inflated` returns the variance of a parameter over that with independent noise.
-    `between_tests` has deviations by the jackknife, of some of the values. The fit has converged.
-    """
+    """Return robust standard deviations of the effects of a converged hypothesis, by name."""
     state = hypothesis.state
     names = [p.name for p in state.parameters]
     known = _known(state, settings)
@@ -131,20 +109,12 @@ def deviations(hypothesis: Hypothesis, inflated: Callable[[str], float],
 
 def values_with_intervals(hypothesis: Hypothesis,
                           deviating: Mapping[str, float]) -> dict[str, Any]:
-    """
-    Return the values of a hypothesis' effects with 95 percent intervals, for the JSON.
-
-    `deviating` has their standard deviations, from `deviations`.
-    """
+    """Return a hypothesis' effect values with 95 percent intervals, for the JSON."""
     return {p.name: {'value': value, 'unit': p.unit, 'ci95': [
         max(value - TWO_SIDED_95 * deviating[p.name], p.low),
         min(value + TWO_SIDED_95 * deviating[p.name], p.high)]} for p, value in hypothesis.values}
 
 
 def same_number(parameter: Parameter, value: float) -> float:
-    """
-    Return the standard deviation that the tolerance of the same number adds to a change.
-
-    The effect has taken over what the tolerance would account for.
-    """
+    """Return the deviation from the tolerance of a number that the effect has taken over."""
     return parameter.tolerance / 3.0 ** 0.5 * (abs(1.0 + value) if parameter.unit == '1' else 1.0)

@@ -3,10 +3,9 @@
 """
 What an intervention changes: the numbers of the named effects under each value of a label.
 
-For each label the named effects are fitted once more, with a size of their own under each of its
-values, beside all else that the best hypothesis has. The difference between two values has an
-interval of its own, because the sizes share the nuisances. Withholding by label says whether an
-effect that was learned under one value is there under another.
+For each label the named effects are fitted once more, with a size of their own under each value.
+The difference of two values has an interval of its own, because the sizes share the nuisances.
+Withholding by label says whether an effect learned under one value exists under another.
 """
 
 from __future__ import annotations
@@ -38,12 +37,9 @@ def interventions(problem: LeastSquares, none: Hypothesis, best: Hypothesis,
 
 def simplified(problem: LeastSquares, hypotheses: Sequence[Hypothesis],
                best: Hypothesis) -> tuple[list[Hypothesis], Hypothesis]:
-    """
-    Return hypotheses whose best has sizes by label only for effects that differ between them.
-
-    The search takes an effect's form where others are still missing, and a missing effect that
-    differs makes it look as if this one did.
-    """
+    """Return hypotheses whose best has sizes by label only where these differ."""
+    # The search takes an effect's form where others are still missing, and a missing effect that
+    # differs makes it look as if this one did.
     machine = problem.machine
     if not isinstance(machine, ByLabel):
         return list(hypotheses), best
@@ -89,7 +85,6 @@ def _effects(numbers: Sequence[Mapping[str, Any]], differ: bool) -> list[str]:
 
 def _numbers(problem: LeastSquares, machine: ByLabel, best: Hypothesis,
              key: str) -> list[dict[str, Any]]:
-    """Return the sizes of the named effects under each value, and their differences."""
     bases = {effect: machine.labels.base_of(form) for effect, form in zip(
         best.effects, best.forms, strict=True)}
     chosen = {effect: machine.labels.split(form, key) for effect, form in bases.items()
@@ -118,7 +113,6 @@ def _of_value(form: Form, key: str, value: str) -> list[Parameter]:
 
 
 def _in_common(problem: LeastSquares, machine: ByLabel, best: Hypothesis) -> Hypothesis:
-    """Return the best hypothesis with one size for all tests."""
     forms = tuple(machine.labels.base_of(form) for form in best.forms)
     if forms == best.forms:
         return best
@@ -134,8 +128,7 @@ def _fitted(problem: LeastSquares, best: Hypothesis, forms: Sequence[Form],
                   *(p for form in forms for p in form.parameters))
     state = problem.start(parameters, {p.name: point[p.name] for p in parameters}, central=True)
     for _ in range(_ROUNDS):
-        state = problem.refreshed(problem.fit(
-            state, problem.settings.search.full_iterations))
+        state = problem.refreshed(problem.fit(state, problem.settings.search.full_iterations))
     return state
 
 

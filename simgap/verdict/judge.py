@@ -3,9 +3,7 @@
 """
 Judge effects on a test that is withheld from the fit of their numbers.
 
-Those numbers come from the other tests alone: their fit begins at the model as configured. The
-offsets within the tolerance are no part of the effect. They are fitted to the withheld test, with
-the effect and without.
+Offsets within the tolerance are fitted to the withheld test, with the effect and without.
 """
 
 from __future__ import annotations
@@ -29,35 +27,20 @@ from simgap.verdict.intervals import covariance, inflation
 
 @dataclass(frozen=True)
 class Withheld:
-    """
-    A test that was withheld.
+    """A test that was withheld."""
 
-    Attributes
-    ----------
-    name : of the test
-    time : shape (n,) [s]
-    gap_before : measured minus predicted without the effects, in the readings' own units, shape
-        (n, c); NaN where nothing is judged
-    before : the same in standard deviations of the noise, whitened
-    gap_after, after : with those effects that can be judged; None if none can
-    judged : ids of these
-    reasons : why the others cannot be judged, by id
-    names, values : numbers of the judged effects
-    drawn : `after` with draws of these numbers, shape (draws, n, c); None if none can be judged
-
-    """
-
-    name: str
-    time: FloatArray
+    name: str  # of the test
+    time: FloatArray  # shape (n,) [s]
+    # measured minus predicted without effects, as read, shape (n, c); NaN: not judged
     gap_before: FloatArray
-    before: FloatArray
-    gap_after: FloatArray | None = None
-    after: FloatArray | None = None
-    judged: tuple[str, ...] = ()
-    reasons: Mapping[str, str] = field(default_factory=dict)
-    names: tuple[str, ...] = ()
-    values: FloatArray = field(default_factory=lambda: np.zeros(0))
-    drawn: FloatArray | None = None
+    before: FloatArray  # in standard deviations of the noise, whitened
+    gap_after: FloatArray | None = None  # with the effects that can be judged; None if none can
+    after: FloatArray | None = None  # in standard deviations likewise
+    judged: tuple[str, ...] = ()  # ids of these effects
+    reasons: Mapping[str, str] = field(default_factory=dict)  # why others cannot be judged
+    names: tuple[str, ...] = ()  # numbers of the judged effects
+    values: FloatArray = field(default_factory=lambda: np.zeros(0))  # of these numbers
+    drawn: FloatArray | None = None  # `after` with draws of them, shape (draws, n, c)
 
 
 class Judge:
@@ -80,8 +63,6 @@ class Judge:
             at = with_initial_conditions(problem, self._start)
             self._neutral = Slopes.of(problem, problem.start(best.state.parameters, at))
 
-    # -- training ------------------------------------------------------------------------------
-
     def _trained(self, part: Part) -> tuple[LeastSquares, FitState, FitState]:
         """Return a part's problem, and its fits without and with the effects."""
         problem = LeastSquares(part, settings=self._settings)
@@ -101,8 +82,7 @@ class Judge:
             problem.start(bare, found.point(), self._without.for_part(part, bare)),
             self._settings.held_out.iterations)
         search = self._settings.search
-        if (unaided.cost < (1.0 + search.doubtful) * found.cost
-                or problem.leaves_much(found)):
+        if unaided.cost < (1.0 + search.doubtful) * found.cost or problem.leaves_much(found):
             options = self._settings.held_out
             unaided = settled(problem, unaided, search, options.passes, options.iterations)
             found = self._finished(problem, min(
@@ -110,23 +90,17 @@ class Judge:
         return problem, unaided, self._taken_over(problem, found)
 
     def _taken_over(self, problem: LeastSquares, found: FitState) -> FitState:
-        """
-        Return a training fit whose effects alone stand for their numbers.
-
-        Only they are taken to the withheld test. What a tolerance has of them would be lost.
-        """
+        """Return a training fit whose effects alone stand for their numbers."""
+        # Only they are taken to the withheld test. What a tolerance has of them would be lost.
         at, _ = self._problem.machine.nuisances.take_over(found.point(), self._best.forms)
         if at == found.point():
             return found
         return problem.start(found.parameters, at, found.jacobian)
 
     def _finished(self, problem: LeastSquares, found: FitState) -> FitState:
-        """
-        Go on with a training fit while it is in a local minimum and gains.
-
-        It gets fresh derivatives. Initial conditions that were chosen before the fit may not be
-        the best after it, and are chosen again.
-        """
+        """Go on with a training fit while it is in a local minimum and gains."""
+        # It gets fresh derivatives. Initial conditions that were chosen before the fit may not be
+        # the best after it, and are chosen again.
         options = self._settings.held_out
         for _ in range(options.further_passes):
             if not self._in_local_minimum(problem, found):
@@ -143,23 +117,16 @@ class Judge:
         return found
 
     def _added(self, problem: LeastSquares, part: Part, unaided: FitState) -> FitState:
-        """
-        Fit the effects on top of a fit without them.
-
-        A fit of everything at once may bend the nuisances to what a ripple does, and stop there.
-        """
+        """Fit the effects on top of a fit without them."""
+        # A fit of everything at once may bend the nuisances to what a ripple does, and stop there.
         own = part.parameters([p for p in self._best.state.parameters if p.name in self._effects])
         point = {**unaided.point(), **self._start}
-        state = problem.start_from(
-            part.parameters(self._nuisances), unaided.jacobian, own, point)
+        state = problem.start_from(part.parameters(self._nuisances), unaided.jacobian, own, point)
         return trained(part, state.parameters, point, [state.jacobian], self._settings)
 
     def _in_local_minimum(self, problem: LeastSquares, found: FitState) -> bool:
-        """
-        Return whether the values of the fit to all tests fit some tests better than `found` does.
-
-        Those values have seen what is withheld. A training fit takes nothing from them.
-        """
+        """Return whether the fit to all tests fits some of them better than `found` does."""
+        # Those values have seen what is withheld. A training fit takes nothing from them.
         of_all = problem.start(found.parameters, self._best.state.point(), found.base_jacobian)
         return of_all.cost < found.cost - self._settings.penalty.parameter
 
@@ -198,8 +165,6 @@ class Judge:
                         e.labels.get(key, '') == value for e in training.experiments):
                     reasons[effect] = f'no other test has the label {key}: {value}'
         return reasons
-
-    # -- judging -------------------------------------------------------------------------------
 
     def withheld(self, k: int) -> Withheld:
         """Judge on test k what the other tests have taught."""
@@ -277,12 +242,9 @@ class Judge:
 
     def _unseen(self, problem: LeastSquares, point: dict[str, float], residual: FloatArray,
                 reasons: Mapping[str, str]) -> dict[str, str]:
-        """
-        Return the reasons why effects cannot be judged that a withheld test does not show.
-
-        A limit that a test does not reach changes nothing there, whatever its derivative says.
-        `residual` is that at the point.
-        """
+        """Return the reasons why effects cannot be judged that a withheld test does not show."""
+        # A limit that a test does not reach changes nothing there, whatever its derivative says.
+        # `residual` is that at the point.
         unseen = {}
         for effect, form in zip(self._best.effects, self._best.forms, strict=True):
             if effect not in reasons:
@@ -293,7 +255,6 @@ class Judge:
         return unseen
 
     def _numbers(self, reasons: Mapping[str, str]) -> list[Parameter]:
-        """Return the numbers of the effects that can be judged."""
         return [p for effect, form in zip(self._best.effects, self._best.forms, strict=True)
                 if effect not in reasons for p in form.parameters]
 
@@ -304,14 +265,10 @@ class Judge:
     def _completed(self, fold: Withheld, problem: LeastSquares, point: Mapping[str, float],
                    residual: FloatArray, found: FitState, posterior: FloatArray,
                    followed: Callable[[FloatArray], FloatArray] = lambda drawn: drawn) -> Withheld:
-        """
-        Return a fold with what remains, and with draws of the numbers that can be judged.
-
-        `point` and `residual`, shape (n c,), are where the withheld test is judged; `found` and
-        `posterior` are the fit to the training data and its covariance. `followed` returns, of
-        residuals with draws, shape (draws, n c), those that are left once the nuisances have
-        followed.
-        """
+        """Return a fold with what remains, and with draws of the numbers that can be judged."""
+        # `point` and `residual`, shape (n c,), are where the withheld test is judged; `found` and
+        # `posterior` are the fit to the training data and its covariance. `followed` returns, of
+        # residuals with draws, shape (draws, n c), those left once the nuisances have followed.
         numbers = self._numbers(fold.reasons)
         if not numbers:
             return fold
@@ -334,7 +291,6 @@ class Judge:
 
     def _fitted(self, testing: Part, nuisances: Sequence[Parameter], held: Mapping[str, float],
                 begin: Mapping[str, float], slopes: Slopes) -> FitState:
-        """Fit the nuisances to a withheld test, with some values held."""
         own = testing.parameters(nuisances)
         return trained(testing.holding(held), own, begin, [slopes.for_part(testing, own)],
                        self._settings)

@@ -24,8 +24,8 @@ def lack_of_fit(problem: LeastSquares, raw: FloatArray, best: Hypothesis,
     """
     Return what the best hypothesis leaves of the whole tests, after a fit that has converged.
 
-    `raw` has the residuals of the model as configured, shape (n,). `explained` is the upper end of
-    the interval of what the hypothesis explains of withheld data, None without effects.
+    `raw` has the residuals of the model as configured, shape (n,); `explained` is the upper end of
+    the explained share of withheld data, None without effects.
     """
     loudest, fast, fast_left = _fast(problem, raw, best)
     signal, regular = _regular(problem, best.state)
@@ -48,12 +48,9 @@ def implausibility(hypothesis: Hypothesis, settings: Settings) -> dict[str, floa
 
 
 def _slow_excess(problem: LeastSquares, state: FitState) -> float:
-    """
-    Return the slow excess of the residual, averaged over tests and signals.
-
-    It is relative to white noise with the same fast part, so that a sensor that is noisier than
-    its sheet says raises no alarm.
-    """
+    """Return the slow excess of the residual, averaged over tests and signals."""
+    # It is relative to white noise with the same fast part, so that a sensor that is noisier than
+    # its sheet says raises no alarm.
     settings = problem.settings.lack_of_fit
     found = []
     for k, experiment in enumerate(problem.experiments):
@@ -71,12 +68,9 @@ def _slow_excess(problem: LeastSquares, state: FitState) -> float:
 
 
 def _regular(problem: LeastSquares, state: FitState) -> tuple[str, float]:
-    """
-    Return the signal whose residual repeats itself most in a test, and by how much.
-
-    A hum, a ripple or a resonance may be no louder than a sensor's noise may be. But what remains
-    of noise is white, because its colour is known. What is quieter than noise counts less.
-    """
+    """Return the signal whose residual repeats itself most in a test, and by how much."""
+    # A hum, a ripple or a resonance may be no louder than a sensor's noise may be. But what is
+    # left of noise is white, because its colour is known. What is quieter than noise counts less.
     settings = problem.settings.lack_of_fit
     signal, greatest = '', 0.0
     for k, experiment in enumerate(problem.experiments):
@@ -93,7 +87,6 @@ def _regular(problem: LeastSquares, state: FitState) -> tuple[str, float]:
 
 
 def _enough(problem: LeastSquares) -> bool:
-    """Return whether a signal has so many samples that its residual can be judged."""
     least = problem.settings.lack_of_fit.least_samples
     return any((np.isfinite(e.measured).sum(axis=0) > least).any() for e in problem.experiments)
 
@@ -121,11 +114,7 @@ def _left(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> float:
 
 
 def _fast(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> tuple[str, float, float]:
-    """
-    Return the signal with the loudest fast part, how loud it is, and the share that was there.
-
-    Loudness is a variance over that of the sensor's noise, averaged over the tests.
-    """
+    """Return the signal with the loudest fast part, its variance over noise, and its share."""
     settings = problem.settings.lack_of_fit
     signal, loudest, share = '', 0.0, 1.0
     for c, channel in enumerate(problem.experiments[0].channels):
@@ -136,8 +125,7 @@ def _fast(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> tuple[str
                 continue
             first = raw[problem.rows(k)].reshape(experiment.measured.shape)[:, c]
             # a quantised reading at rest is off by a fraction of a digit, slow or fast
-            loud = (statistics.power if channel in experiment.quantised
-                    else statistics.fast_power)
+            loud = statistics.power if channel in experiment.quantised else statistics.fast_power
             pairs.append([loud(z, settings), loud(first, settings)])
         if pairs:
             now, before = np.mean(pairs, axis=0)
@@ -149,11 +137,7 @@ def _fast(problem: LeastSquares, raw: FloatArray, best: Hypothesis) -> tuple[str
 
 def remainders(problem: LeastSquares, state: FitState,
                limits: Mapping[str, float]) -> dict[str, dict[str, Any]]:
-    """
-    Return what a hypothesis leaves of each signal, in its own unit, for the JSON.
-
-    For some signals `limits` has the remainder beyond noise from which it matters.
-    """
+    """Return what a hypothesis leaves of each signal, for the JSON; `limits` say what matters."""
     predicted = problem.machine.simulate([state.point()])[0]
     found: dict[str, dict[str, Any]] = {}
     first = problem.experiments[0]

@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Where a gap lies: the parts of the machine, the signals it shows in, and the regimes of motion.
-
-With a verdict that names effects, the parts are theirs, and a signal's share is what the effects
-explain of it. Without one, the parts are those where an unknown input may act.
-"""
+"""Where a gap lies: parts (of the effects, or of an unknown input), signals and regimes."""
 
 from __future__ import annotations
 
@@ -24,11 +19,7 @@ Located = dict[str, Any]
 
 def of_effects(problem: LeastSquares, answers: Sequence[Answer], none: FitState,
                best: FitState) -> list[Located]:
-    """
-    Return where the effects of a verdict lie, the largest share first.
-
-    `none` and `best` are where the fits ended without and with the likeliest effects.
-    """
+    """Return where the effects of a verdict lie, the largest share first."""
     parts: dict[str, float] = {}
     for answer in answers:
         for effect in answer.effects:
@@ -41,13 +32,8 @@ def of_effects(problem: LeastSquares, answers: Sequence[Answer], none: FitState,
 
 def parts_of_the_unknown(problem: LeastSquares, none: FitState, lack: LackOfFit,
                          ) -> tuple[dict[str, float], list[unknown_input.Place]]:
-    """
-    Return in which parts something may act that no effect names, and in which places.
-
-    The parts come with how likely each is, and are none if none is likely; the likeliest place is
-    the first. `none` is where the fit ended without any effect. What is too fast for a pulse, or
-    repeats itself, shows in one reading, and is put there: `lack` tells.
-    """
+    """Return how likely something unnamed acts in each part, and its places, likeliest first."""
+    # what is too fast for a pulse, or repeats itself, shows in one reading, and is put there
     settings = problem.settings
     truncated = LeastSquares(problem.machine.truncated(), settings=settings)
     found = unknown_input.places(truncated, none.point())
@@ -82,8 +68,7 @@ def _located(problem: LeastSquares, parts: Mapping[str, float],
         for c, channel in enumerate(experiment.channels):
             for r, name in enumerate(regimes.names):
                 key = (channel, name)
-                shares[key] = (shares.get(key, 0.0)
-                               + float(sample[regimes.labels == r, c].sum()))
+                shares[key] = shares.get(key, 0.0) + float(sample[regimes.labels == r, c].sum())
     positive = {key: max(value, 0.0) for key, value in shares.items()}
     whole = sum(positive.values()) or 1.0
     found: list[Located] = [

@@ -3,14 +3,13 @@
 """
 Where an unknown input acts: the part of the machine that a gap sits in, whatever its cause.
 
-An input of any course over time is let into each part in turn: a torque on a shaft, a voltage in
-an amplifier, a wrong reading. The machine's response to it is taken pulse by pulse, and the
-responses are fitted to what the nuisances leave of the gap. The part whose input explains the
-gap with the least effort is the likeliest. Pulses that are far enough apart for the machine to
-settle between them share a run.
+An input of any course over time is let into each part in turn: a torque on a shaft, a voltage, a
+wrong reading. The responses of the machine, pulse by pulse, are fitted to what the nuisances leave
+of the gap. The part whose input explains the gap with the least effort is the likeliest. Pulses
+that are far enough apart share a run.
 
-The measure is the evidence (marginal likelihood) of a linear model whose inputs are random, with
-a variance chosen for each place (D. J. C. MacKay, Bayesian interpolation, Neural Computation 4,
+The measure is the evidence (marginal likelihood) of a linear model whose inputs are random, with a
+variance chosen for each place (D. J. C. MacKay, Bayesian interpolation, Neural Computation 4,
 1992, Eq. 2.9 and 3.2). The nuisances, with their priors, are projected out.
 """
 
@@ -33,36 +32,21 @@ _RATIOS = np.logspace(-4.0, 4.0, 25)
 
 @dataclass(frozen=True)
 class Place:
-    """
-    A place where an unknown input may act.
+    """A place where an unknown input may act."""
 
-    Attributes
-    ----------
-    name : for people
-    component : the part of the machine
-    evidence : natural logarithm of how much likelier the gap is with an input there than without
-    explained : share of the gap's energy that an input there explains, 0 to 1
-
-    """
-
-    name: str
-    component: str
-    evidence: float
-    explained: float
+    name: str  # for people
+    component: str  # the part of the machine
+    evidence: float  # natural logarithm of how much likelier an input makes the gap
+    explained: float  # share of the gap's energy that an input explains, 0 to 1
 
 
 def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
-    """
-    Return where an unknown input may act, the likeliest place first.
-
-    `point` has the nuisances as fitted without any effect.
-    """
+    """Return where an unknown input may act, the likeliest first; `point` is of the nuisances."""
     evidence = _Evidence.at(problem, point)
     found = []
     for place in problem.machine.disturbance_inputs:
         responses, _ = _columns(problem, point, place, evidence.residual)
-        found.append(Place(place.name, place.component,
-                           *evidence.weighed(responses, problem)[:2]))
+        found.append(Place(place.name, place.component, *evidence.weighed(responses, problem)[:2]))
     scales = problem.machine.time_scales
     for c, channel in enumerate(problem.experiments[0].channels):
         found.append(Place(f'reading of {channel}', channel, *evidence.weighed(
@@ -73,13 +57,7 @@ def places(problem: LeastSquares, point: Mapping[str, float]) -> list[Place]:
 
 def courses(problem: LeastSquares, point: Mapping[str, float],
             place: DisturbanceInput) -> list[tuple[FloatArray, FloatArray]]:
-    """
-    Return what would have to enter at a place to explain a gap, over time.
-
-    `point` is as in `places`. For each experiment these are times, shape (m,) [s], and the
-    likeliest values at them, shape (m,), with straight lines between, in the unit of the machine's
-    `simulate_disturbed`.
-    """
+    """Return what would have to enter at a place, by test: times [s] and values, (m,) each."""
     evidence = _Evidence.at(problem, point)
     responses, times = _columns(problem, point, place, evidence.residual)
     _, _, heights = evidence.weighed(responses, problem)
@@ -93,11 +71,8 @@ def courses(problem: LeastSquares, point: Mapping[str, float],
 
 def _columns(problem: LeastSquares, point: Mapping[str, float], place: DisturbanceInput,
              residual: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
-    """
-    Return the response to each pulse at a place, and when each pulse has its peak [s].
-
-    Both are for each experiment; responses have the shape (n c, pulses), peaks (pulses,).
-    """
+    """Return the response to each pulse at a place, and when each pulse has its peak [s]."""
+    # Both are for each experiment; responses have the shape (n c, pulses), peaks (pulses,).
     here, scales = dict(point), problem.machine.time_scales
     responses: list[list[FloatArray]] = [[] for _ in problem.experiments]
     peaks: list[list[float]] = [[] for _ in problem.experiments]
@@ -115,11 +90,8 @@ def _columns(problem: LeastSquares, point: Mapping[str, float], place: Disturban
 
 
 def components(found: Sequence[Place], caution: float) -> dict[str, float]:
-    """
-    Return how likely each part of the machine is, by its best place; all sum to 1.
-
-    Of the evidence the share `caution` counts, because residuals are not white.
-    """
+    """Return how likely each part is, by its best place; all sum to 1."""
+    # the share `caution` of the evidence counts, because residuals are not white
     best: dict[str, float] = {}
     for place in found:
         best[place.component] = max(best.get(place.component, 0.0), place.evidence)
@@ -200,12 +172,7 @@ class _Evidence:
 
     def weighed(self, responses: Sequence[FloatArray],
                 problem: LeastSquares) -> tuple[float, float, FloatArray]:
-        """
-        Return the evidence for an input with these responses, and what it explains.
-
-        That is the share of the energy that it explains, and the likeliest factor of each
-        response, shape (pulses of all experiments,).
-        """
+        """Return the evidence for an input, the explained share of the energy, and its factors."""
         squares, slopes, crosses = [], [], []
         for k, columns in enumerate(responses):
             rows = problem.rows(k)

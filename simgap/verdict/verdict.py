@@ -3,13 +3,12 @@
 """
 From fitted hypotheses to probabilities, with 'unknown' and 'none' among the answers.
 
-A hypothesis is as probable as exp(-score / temperature). Its score is half a chi-square with
+A hypothesis is as probable as exp(-score / temperature); its score is half a chi-square with
 penalties. Such probabilities are right only as far as the models are. Differences of the cost are
 therefore divided by the inflation of the variance, as in QAIC (K. P. Burnham, D. R. Anderson,
 Model Selection and Multimodel Inference, 2nd edition, 2002, section 2.5), see
-`intervals.inflation`. The temperature is not one either: it and the other thresholds were set on
-trials with an independent machine (`settings.VerdictSettings`). 'Unknown' is an absolute test of
-the residual that the best hypothesis leaves.
+`intervals.inflation`. The thresholds were set on trials with an independent machine. 'Unknown' is
+an absolute test of the residual that the best hypothesis leaves.
 """
 
 from __future__ import annotations
@@ -26,98 +25,45 @@ from simgap.settings import Settings, VerdictSettings
 
 @dataclass(frozen=True)
 class LackOfFit:
-    """
-    What a hypothesis leaves unexplained.
+    """What a hypothesis leaves unexplained."""
 
-    Attributes
-    ----------
-    slow_excess : power of the slow residual over that of white noise, less one; 0 for noise
-    left : share of the gap, 0 to 1
-    fast : variance of the fast part of the loudest signal, over that of its sensor's noise
-    fast_left : share of that signal's fast part that was there without any effect
-    implausibility : of the effects' values, see `Form.implausibility`
-    explained : upper end of the interval of what its effects explain of withheld data; None
-        without effects
-    loudest : signal whose fast part is the loudest
-    enough : False if no signal has samples enough to be judged
-    named : False if the hypothesis names nothing that could have closed the gap
-    regular : greatest autocorrelation of a signal's residual, less if it is quieter than noise
-    most_regular : signal that it is of
-
-    """
-
-    slow_excess: float
-    left: float
-    fast: float = 1.0
-    fast_left: float = 1.0
-    implausibility: float = 0.0
-    explained: float | None = None
-    loudest: str = ''
-    enough: bool = True
-    named: bool = True
-    regular: float = 0.0
-    most_regular: str = ''
+    slow_excess: float  # power of the slow residual over that of white noise, less one
+    left: float  # share of the gap, 0 to 1
+    fast: float = 1.0  # variance of the loudest signal's fast part, over that of noise
+    fast_left: float = 1.0  # share of that fast part that was there without any effect
+    implausibility: float = 0.0  # of the effects' values, see `Form.implausibility`
+    explained: float | None = None  # upper end for withheld data; None without effects
+    loudest: str = ''  # signal whose fast part is the loudest
+    enough: bool = True  # False if no signal has samples enough
+    named: bool = True  # False if it names nothing that could have closed the gap
+    regular: float = 0.0  # greatest autocorrelation, less if it is quieter than noise
+    most_regular: str = ''  # signal that it is of
 
 
 @dataclass(frozen=True)
 class Answer:
-    """
-    What hypotheses that may name the same effects say.
+    """What hypotheses that may name the same effects say."""
 
-    Attributes
-    ----------
-    hypothesis : the fit with these effects alone; if there is none, the best that may name them
-    score : its score
-    probability : of all of them
-    effects : that it names: those that are larger than their tolerances
-
-    """
-
-    hypothesis: Hypothesis
-    score: float
-    probability: float
-    effects: tuple[str, ...]
+    hypothesis: Hypothesis  # with these effects alone, or else the best that may name them
+    score: float  # of the hypothesis
+    probability: float  # of all of them
+    effects: tuple[str, ...]  # those named, larger than their tolerances
 
 
 @dataclass(frozen=True)
 class Decision:
-    """
-    What a diagnosis concludes.
+    """What a diagnosis concludes."""
 
-    Attributes
-    ----------
-    word : no_gap, too_few_to_judge, explained, partly_explained or unknown_effect
-    answers : the likeliest first, with probabilities that leave room for `unknown`
-    unknown : probability of something outside the catalogue
-    lack : what the best hypothesis leaves
-    confusable : groups of effects that the data cannot tell apart
-
-    """
-
-    word: str
-    answers: Sequence[Answer]
-    unknown: float
-    lack: LackOfFit
-    confusable: Sequence[Sequence[str]]
+    word: str  # no_gap, too_few_to_judge, explained, partly_explained or unknown_effect
+    answers: Sequence[Answer]  # the likeliest first, with probabilities
+    unknown: float  # probability of something outside the catalogue
+    lack: LackOfFit  # what the best hypothesis leaves
+    confusable: Sequence[Sequence[str]]  # groups that data cannot tell apart
 
 
 def decide(hypotheses: Sequence[Hypothesis], lack: LackOfFit, settings: Settings,
            inflation: float = 1.0) -> Decision:
-    """
-    Conclude from fits.
-
-    Parameters
-    ----------
-    hypotheses
-        fitted ones, the nuisances alone among them
-    lack
-        what the best of them leaves
-    settings
-        thresholds
-    inflation
-        of the cost's differences
-
-    """
+    """Conclude from hypotheses, the nuisances alone among them, and what the best one leaves."""
     unknown = unknown_probability(lack, settings.verdict)
     answers = rank(hypotheses, unknown, settings, inflation)
     named = best(hypotheses, settings, inflation).named
@@ -135,17 +81,7 @@ def decide(hypotheses: Sequence[Hypothesis], lack: LackOfFit, settings: Settings
 def which(decision: Decision, settings: VerdictSettings,
           values: Callable[[Hypothesis], dict[str, Any]] = lambda hypothesis: {},
           ) -> list[dict[str, Any]]:
-    """
-    Return the likeliest answers for the JSON, 'none' and 'unknown' among them.
-
-    Parameters
-    ----------
-    decision, settings
-        from `decide`, and its thresholds
-    values
-        returns the parameters of an answer
-
-    """
+    """Return the likeliest answers, 'none' and 'unknown' among them, for the JSON."""
     entries: list[dict[str, Any]] = []
     likeliest = set(decision.answers[0].effects)
     for answer in decision.answers[:settings.entries]:
@@ -169,8 +105,7 @@ def which(decision: Decision, settings: VerdictSettings,
 
 def statements(decision: Decision, best_hypothesis: Hypothesis) -> dict[str, Any]:
     """Return what is named beside its runner-up, for the JSON."""
-    known = [(list(answer.effects) or ['none'], answer.probability)
-             for answer in decision.answers]
+    known = [(list(answer.effects) or ['none'], answer.probability) for answer in decision.answers]
     first, second, *_ = [*sorted([*known, (['unknown'], decision.unknown)],
                                  key=lambda item: -item[1]), ([], 0.0)]
     return {'named': {
@@ -191,7 +126,6 @@ class _Scores:
         self._inflation = inflation
 
     def __call__(self, hypothesis: Hypothesis) -> float:
-        """Return the cost of a hypothesis with all penalties."""
         settings = self._settings.verdict
         count = len(hypothesis.effects)
         total = hypothesis.penalised(self._settings.penalty) - hypothesis.cost
@@ -207,11 +141,8 @@ class _Scores:
 
 def also_seen(hypotheses: Sequence[Hypothesis], settings: Settings,
               inflation: float = 1.0) -> list[dict[str, Any]]:
-    """
-    Return effects that show and are not worth a name, for the JSON: the greatest gain first.
-
-    Each is within its tolerance, or explains a small share of the gap beside what is named.
-    """
+    """Return effects that show and are not worth a name, the greatest gain first, for the JSON."""
+    # each is within its tolerance, or explains a small share of the gap beside what is named
     top = best(hypotheses, settings, inflation)
     gap = max(h.cost for h in hypotheses if not h.effects) - top.cost
     found: dict[str, dict[str, Any]] = {}
@@ -268,23 +199,8 @@ def _logistic(logit: float) -> float:
 
 def rank(hypotheses: Sequence[Hypothesis], unknown: float, settings: Settings,
          inflation: float = 1.0) -> list[Answer]:
-    """
-    Return what the hypotheses may name, the likeliest first, with probabilities.
-
-    A hypothesis whose effects are in doubt gives some of its probability to fewer of them.
-
-    Parameters
-    ----------
-    hypotheses
-        fitted ones, the nuisances alone among them
-    unknown
-        probability of something else, from `unknown_probability`
-    settings
-        thresholds
-    inflation
-        of the cost's differences
-
-    """
+    """Return what the hypotheses may name, the likeliest first, with probabilities."""
+    # A hypothesis whose effects are in doubt gives some of its probability to fewer of them.
     score = _Scores(hypotheses, settings, inflation)
     scores = np.array([score(h) for h in hypotheses])
     weight = np.exp(-(scores - scores.min()) / settings.verdict.temperature)
@@ -311,11 +227,7 @@ def best(hypotheses: Sequence[Hypothesis], settings: Settings,
 
 def confusable(hypotheses: Sequence[Hypothesis], settings: Settings,
                inflation: float = 1.0) -> list[list[str]]:
-    """
-    Return groups of effects that the data cannot tell apart, the likeliest of each first.
-
-    Effects are in a group if one in the other's place costs hardly more.
-    """
+    """Return groups of effects whose exchange costs hardly more, the likeliest of each first."""
     score = _Scores(hypotheses, settings, inflation)
     top = min(hypotheses, key=score)
     limit = score(top) + settings.verdict.confusable
