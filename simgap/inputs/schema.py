@@ -126,22 +126,3 @@ def mapping_of(key: str, body: object,
             raise ParameterError(f'{where}: no such entry{nearest(str(name), allowed)}; '
                                  f'allowed are {", ".join(allowed)}')
     return body
-
-
-def check_changes(changes: Mapping[str, object], entries: Mapping[str, Entry]) -> dict[str, Value]:
-    """
-    Check a set of live changes, all or nothing.
-
-    Raises
-    ------
-    ParameterError : a key is unknown, not a tuning parameter, or its value is not allowed
-
-    """
-    checked: dict[str, Value] = {}
-    for key, value in changes.items():
-        if key not in entries:
-            raise ParameterError(f'{key}: no such parameter{nearest(key, tuple(entries))}')
-        if not entries[key].live:
-            raise ParameterError(f'{key}: a physical constant, read-only while the drive runs')
-        checked[key] = entries[key].check(key, value)
-    return checked

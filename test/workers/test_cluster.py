@@ -170,7 +170,7 @@ with open(f'{folder}/begun-{{case}}', 'a+') as stream:
     stream.seek(0)
     first = len(stream.read()) == 1
 if first and case in ('case_0001', 'case_0002'):
-    pathlib.Path(f'{folder}/waiting-{{case}}').write_text(os.environ['ANTENNA_DRIVE_PARENT'])
+    pathlib.Path(f'{folder}/waiting-{{case}}').write_text(os.environ['SIMGAP_PARENT'])
     open(f'{folder}/nothing').read()
 pathlib.Path(words[words.index('--json') + 1]).write_text(json.dumps({{'case': case}}))
 """

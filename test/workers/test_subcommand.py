@@ -66,7 +66,7 @@ def test_a_process_ends_at_once_if_its_starter_is_dead_and_not_yet_buried(module
             time.sleep(0.02)
         done = subprocess.run(
             [sys.executable, '-m', module], cwd=ROOT, capture_output=True, text=True,
-            env={**os.environ, 'ANTENNA_DRIVE_PARENT': str(starter.pid)}, timeout=PATIENCE_S)
+            env={**os.environ, 'SIMGAP_PARENT': str(starter.pid)}, timeout=PATIENCE_S)
     assert (done.returncode, done.stdout, done.stderr) == (0, '', '')
 
 
