@@ -83,13 +83,7 @@ def proposed(arguments: argparse.Namespace, tests: Callable[[dict[str, Any]], Te
     """
     Design the next test, and write what was asked for; 1 if no test within the limits helps.
 
-    Parameters
-    ----------
-    arguments
-        see `add_proposal_options`
-    tests
-        returns the tests that are allowed, from the entry `planning` of the verdict
-
+    `tests` returns the tests that are allowed, from the entry `planning` of the verdict.
     """
     check_options(arguments, jobs=Entry('', 1, whole=True), duration=Entry('s', 5.0, 600.0),
                   rate=Entry('Hz', 20.0, 10000.0), seed=Entry('', 0, whole=True))

@@ -22,14 +22,9 @@ def strict_json(result: object) -> str:
     """
     Return a result as strict JSON, as every command writes it.
 
-    NaN, which means that there is no value, becomes null; numpy scalars, arrays and paths
-    become numbers, lists and texts.
-
-    Raises
-    ------
-    ValueError : `result` holds an infinity
-    TypeError : `result` holds something that JSON has no word for
-
+    NaN, which means that there is no value, becomes null; numpy scalars, arrays and paths become
+    numbers, lists and texts. Raises ValueError if `result` holds an infinity, TypeError if it
+    holds something that JSON has no word for.
     """
     return json.dumps(_plain(result), indent=2, allow_nan=False, ensure_ascii=False) + '\n'
 
@@ -58,10 +53,8 @@ def from_json(text: str | bytes) -> Any:
     """
     Read strict JSON.
 
-    Raises
-    ------
-    PlainDataError : no JSON, nested too deeply, not UTF-8, or NaN or an infinity in it
-
+    Raises PlainDataError if it is no JSON, not UTF-8, nested too deeply, or holds NaN or an
+    infinity.
     """
     try:
         return json.loads(text, parse_constant=_refuse_constant)

@@ -52,11 +52,8 @@ def parse_yaml(text: str | bytes) -> Any:
     """
     Read YAML as plain data.
 
-    Raises
-    ------
-    ParameterError : no YAML, or a key given twice, or an alias; the message says where
-    ModuleNotFoundError : PyYAML is not installed
-
+    Raises ParameterError, with the place, if it is no YAML, or has an alias or a key given twice;
+    ModuleNotFoundError if PyYAML is not installed.
     """
     import yaml
     try:
@@ -83,10 +80,7 @@ def read_yaml(path: Path) -> Any:
     """
     Read a YAML file as plain data.
 
-    Raises
-    ------
-    ParameterError : the file cannot be read, is too long or is no YAML; the message names it
-
+    Raises ParameterError, with the file's name, if it cannot be read, is too long or is no YAML.
     """
     try:
         with path.open('rb') as file:

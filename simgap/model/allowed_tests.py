@@ -90,23 +90,10 @@ def own_tests(model: Model, duration_s: float) -> OwnTests:
 def propose(model: Model, verdict: Verdict | None = None, duration_s: float = 30.0,
             threads: int = 2, seed: int = 0) -> Proposal:
     """
-    Design the next test of a machine, among those that its model declares.
+    Design the next test of a machine, of `duration_s` [s], among those that its model declares.
 
-    Parameters
-    ----------
-    model
-        with its `tests` and `limits`
-    verdict
-        whose answers the test is to tell apart; None for the test that detects most
-    duration_s
-        of the test [s]
-    threads, seed
-        simulations at once, and the seed of the tests that are drawn
-
-    Raises
-    ------
-    ModelError : the model declares no tests
-
+    It tells the answers of `verdict` apart, or is the one that detects most. `seed` is that of the
+    tests that are drawn. Raises ModelError if the model declares no tests.
     """
     findings = Findings.of_data(verdict.planning) if verdict else Findings()
     return TestDesign(own_tests(model, duration_s), findings, objective_for(findings),
