@@ -40,8 +40,7 @@ _RULES = ('d-optimal', 'random')
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     add_proposal_options(parser)
-    parser.add_argument('--model', metavar='MODEL', required=True,
-                        help='as for simgap diagnose')
+    parser.add_argument('--model', metavar='MODEL', required=True, help='as for simgap diagnose')
 
 
 def add_proposal_options(parser: argparse.ArgumentParser) -> None:

@@ -40,8 +40,7 @@ class OwnTests(TestSpace):
         """Return the machine in one test, with the readings of the model as configured."""
         silent = self._with_readings(test, np.zeros((test.time.size, len(self._model.readings))))
         every_sample = OwnMachine(replace(self._model, judged_hz=_rate(test)), [silent])
-        return OwnMachine(self._model, [
-            self._with_readings(test, every_sample.predict({}, 0))])
+        return OwnMachine(self._model, [self._with_readings(test, every_sample.predict({}, 0))])
 
     def use(self, machine: Machine, points: Sequence[Point]) -> Mapping[str, float]:
         """Return the share of each limit that a test uses, the worst of some variants."""
@@ -69,8 +68,7 @@ class OwnTests(TestSpace):
         found = {path: '\n'.join(rows) + '\n'}
         if test.constants:
             import yaml
-            found[path.with_suffix('.yaml')] = yaml.safe_dump(
-                {'constants': dict(test.constants)})
+            found[path.with_suffix('.yaml')] = yaml.safe_dump({'constants': dict(test.constants)})
         return found
 
     def _with_readings(self, test: Log, readings: FloatArray) -> Log:

@@ -100,8 +100,7 @@ def _of_experiment(experiment: Experiment, before: FloatArray,
     measured = experiment.measured[:, channel]
     simulated = {'before': before[:, channel], 'after': after[:, channel]}
     return ((experiment.name, name, unit,
-             [(key, time, values)
-              for key, values in {'measured': measured, **simulated}.items()]),
+             [(key, time, values) for key, values in {'measured': measured, **simulated}.items()]),
             (experiment.name, 'measured less simulated', unit,
              [(key, time, measured - values) for key, values in simulated.items()]))
 

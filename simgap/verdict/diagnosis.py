@@ -88,8 +88,7 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         which=[Named(**answer) for answer in verdict.which(
             decision, settings.verdict, lambda answer: values_with_intervals(
                 answer, found.deviating(answer)))],
-        also_seen=verdict.also_seen(
-            found.evidence.hypotheses, settings, found.evidence.inflation),
+        also_seen=verdict.also_seen(found.evidence.hypotheses, settings, found.evidence.inflation),
         confusable=decision.confusable,
         how_far=found.reach,
         could_hide=hidden if healthy else [],
