@@ -108,22 +108,14 @@ class PlayedBy:
     """Plays tests by a command of the user."""
 
     def __init__(self, words: Sequence[str], test: str) -> None:
-        """
-        Take the command, and what stands in it for the file of a test.
-
-        Raises UserError if it has no place for the test, or none for the recording.
-        """
+        """Take the command and what stands in it for a test; UserError if a place is missing."""
         for place in (test, '{out}'):
             if not any(place in word for word in words):
                 raise UserError(f'--by: {place} is missing in {" ".join(words)}')
         self._words, self._test = words, test
 
     def __call__(self, number: int, test: Path, duration: float, out: Path) -> None:
-        """
-        Play a test, see `Bench.run`.
-
-        Raises UserError, with the command's last line, if it failed or wrote no recording.
-        """
+        """Play a test, see `Bench.run`; UserError if the command failed or wrote no recording."""
         words = [word.replace(self._test, str(test)).replace('{out}', str(out)).replace(
             '{duration}', f'{duration:g}').replace('{number}', str(number))
             for word in self._words]

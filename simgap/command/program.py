@@ -47,11 +47,7 @@ class Program:
     commands: Mapping[str, Command]  # by name
 
     def main(self, argv: Sequence[str] | None = None) -> int:
-        """
-        Run the program with arguments, None for those of the process.
-
-        Returns one of the exit codes that `--help` lists.
-        """
+        """Run the program; return one of the exit codes that `--help` lists."""
         arguments = list(sys.argv[1:] if argv is None else argv)
         # No option before the command takes a value, so the first plain word is the command.
         name = next((word for word in arguments if not word.startswith('-')), '')

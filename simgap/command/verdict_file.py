@@ -15,11 +15,7 @@ if TYPE_CHECKING:
 
 
 def planning_of(path: Path) -> dict[str, Any]:
-    """
-    Return the entry `planning` of a verdict. Raises OSError if it cannot be read.
-
-    Raises UserError if it is no JSON of a diagnosis, or one of an earlier version.
-    """
+    """Return a verdict's entry `planning`; UserError if it has none, OSError if unreadable."""
     try:
         data = json.loads(path.read_text(encoding='utf-8'))
         return dict(data['planning'])

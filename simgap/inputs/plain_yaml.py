@@ -77,11 +77,7 @@ def parse_yaml(text: str | bytes) -> Any:
 
 
 def read_yaml(path: Path) -> Any:
-    """
-    Read a YAML file as plain data.
-
-    Raises ParameterError, with the file's name, if it cannot be read, is too long or is no YAML.
-    """
+    """Read a YAML file as plain data; ParameterError, with its name, if that is impossible."""
     try:
         with path.open('rb') as file:
             text = file.read(LONGEST_FILE + 1)

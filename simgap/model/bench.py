@@ -22,11 +22,7 @@ Play = Callable[[int, Path, float, Path], None]
 
 
 class ModelBench(Bench):
-    """
-    A machine on which the tests of its model, of `duration_s` [s], are played.
-
-    Raises ModelError if the model declares no tests.
-    """
+    """A machine on which the tests of its model are played; ModelError if it declares none."""
 
     played = 'command_{number}.csv'
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from simgap.machine.contract import Experiment, FloatArray
 from simgap.machine.diagram import Diagram, DiagramBlock
+from simgap.report.curves import Panel
 from simgap.verdict.record import share_text, value_lines, Verdict
 
 _VERDICTS = {
@@ -25,10 +26,6 @@ _VERDICTS = {
 _SHOWN, _LEAST = 8, 0.001
 # An effect so probable is still open.
 _OPEN = 0.05
-
-# Name, times [s] and values of a curve, shape (n,); group, title, unit and curves of a panel.
-Curve = tuple[str, FloatArray, FloatArray]
-Panel = tuple[str, str, str, Sequence[Curve]]
 
 
 @dataclass(frozen=True)
