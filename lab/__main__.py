@@ -4,8 +4,8 @@
 
 import sys
 
+from antenna_drive.programs import end_with_starter
 from lab.cli import main
-from simgap.command.programs import end_with_starter
 
 if __name__ == '__main__':
     end_with_starter()

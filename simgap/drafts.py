@@ -17,19 +17,9 @@ def drafted(path: Path, check: Callable[[Path], object] | None = None) -> Iterat
     """
     Yield a stream whose content replaces `path` at the end if all went well.
 
-    A reader of `path` sees the old content or all of the new, never a part of it.
-
-    Parameters
-    ----------
-    path
-        the file
-    check
-        called with `path` just before the replacement; if it raises, nothing changes
-
-    Raises
-    ------
-    OSError : the file cannot be written there
-
+    A reader of `path` sees the old content or all of the new, never a part of it. `check` is
+    called with `path` just before the replacement; if it raises, nothing changes. Raises OSError
+    if the file cannot be written there.
     """
     handle, draft = tempfile.mkstemp(dir=path.parent, prefix=f'.{path.name}.')
     try:

@@ -43,7 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyse the tests and print which effects they separate."""
-    from antenna_drive.diagnosis.planned_tests import BUILT_IN, confusability_of, planned
+    from antenna_drive.diagnosis.planned_tests import (
+        BUILT_IN, confusability_of, groups, passing_for, planned, separated,
+    )
     from antenna_drive.parameters.loading import load
     from antenna_drive.recording.sheet import load_sheet
 
@@ -75,15 +77,15 @@ def run(arguments: argparse.Namespace) -> int:
         'effects': [{'effect': effect, 'detectable': size if np.isfinite(size) else None,
                      'unit': unit} for effect, size, unit in zip(
                          item.effects, item.detectable.tolist(), item.units, strict=True)],
-        'confusable': item.groups(), 'pairs_separated': item.separated(),
+        'confusable': groups(item), 'pairs_separated': separated(item),
         'alike': item.alike} for name, item in found.items()}
     whole = next(iter(found.values()))
     lines = ['smallest detectable size, and the effects that look alike']
     for i, effect in enumerate(whole.effects):
         lines.append(f'  {effect:36s} {whole.detectable[i]:10.3g} {whole.units[i]:12s} '
-                     + ', '.join(whole.passing_for(i, 3)))
+                     + ', '.join(passing_for(whole, i, 3)))
     for name, item in found.items():
-        lines.append(f'{name}: {100.0 * item.separated():.1f} % of all pairs of effects are '
-                     f'separated; {len(item.groups())} groups are not')
+        lines.append(f'{name}: {100.0 * separated(item):.1f} % of all pairs of effects are '
+                     f'separated; {len(groups(item))} groups are not')
     give(result, arguments.json, '\n'.join(lines))
     return 0

@@ -48,21 +48,39 @@ def confusability_of(tests: Mapping[str, Recording], drive: Drive,
                      progress: Callable[[float], None] = lambda share: None,
                      threads: int = 2) -> Confusability:
     """
-    Say which effects these tests can tell apart.
+    Say which effects these tests, planned or made ones by name, can tell apart.
 
-    Parameters
-    ----------
-    tests
-        planned or made ones, by name
-    drive
-        the configuration
-    progress
-        called with the share that is done
-    threads
-        simulations at once
-
+    `progress` gets the share that is done; `threads` simulations run at once.
     """
     machine = AntennaMachine(tests, drive, threads)
     machine.experiments = tuple(replace(e, measured=machine.predict({}, k))
                                 for k, e in enumerate(machine.experiments))
     return confusability(machine, progress)
+
+
+def passing_for(found: Confusability, index: int, most: int) -> list[str]:
+    """Return the effects that pass for one of them, the most alike first."""
+    return [found.effects[j] for j in np.argsort(-found.alike[index])
+            if j != index and found.alike[index, j] > found.limit][:most]
+
+
+def groups(found: Confusability) -> list[list[str]]:
+    """Return the groups of effects that pass for each other."""
+    left = set(range(len(found.effects)))
+    named = []
+    while left:
+        group = [min(left)]
+        left.discard(group[0])
+        for member in group:
+            near = [j for j in sorted(left) if found.alike[member, j] > found.limit]
+            group += near
+            left -= set(near)
+        if len(group) > 1:
+            named.append([found.effects[j] for j in group])
+    return named
+
+
+def separated(found: Confusability) -> float:
+    """Return the share of all pairs of effects that can be distinguished."""
+    pairs = found.alike[np.triu_indices(len(found.effects), 1)]
+    return float(np.mean(pairs < found.limit)) if pairs.size else 1.0

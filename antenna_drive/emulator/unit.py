@@ -13,9 +13,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar
 
+from antenna_drive.parameters.changes import check_changes
 from antenna_drive.physics.arrays import FloatArray
 from antenna_drive.physics.block import Signal
-from simgap.inputs.schema import check_changes, Entry, Value
+from simgap.inputs.schema import Entry, Value
 
 __all__ = ['FloatArray', 'Signal', 'Unit']
 

@@ -13,6 +13,7 @@ from typing import Any
 from antenna_drive.emulator.kernels import of_unit
 from antenna_drive.emulator.unit import FloatArray, Unit
 from antenna_drive.emulator.wiring import DRIVE, Wired, Wiring
+from antenna_drive.parameters.changes import check_changes
 from antenna_drive.parameters.loading import check_waveform
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import changed, Drive, values
@@ -21,7 +22,7 @@ from antenna_drive.physics import signal_generator
 from antenna_drive.physics.block import Block, Source
 from antenna_drive.physics.integrator import work_space
 import numpy as np
-from simgap.inputs.schema import check_changes, Entry, nearest, ParameterError, Value
+from simgap.inputs.schema import Entry, nearest, ParameterError, Value
 
 # Within a longer macro-step the fastest states are still integrated in steps of this length [s].
 INNER_STEP = 1e-3

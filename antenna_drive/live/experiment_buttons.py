@@ -16,13 +16,14 @@ from antenna_drive.article.published import Claim, CLAIMS
 from antenna_drive.emulator.units import build
 from antenna_drive.emulator.wiring import UNITS
 from antenna_drive.parameters import load
+from antenna_drive.parameters.changes import check_changes
 from antenna_drive.parameters.loading import check_waveform
 from antenna_drive.parameters.records import record_of
 from antenna_drive.parameters.sets import Drive, entries
 from antenna_drive.parameters.waveforms import Waveform
 from antenna_drive.physics import signal_generator
 import numpy as np
-from simgap.inputs.schema import check_changes, Entry, Value
+from simgap.inputs.schema import Entry, Value
 
 _DEGREES = 180.0 / math.pi
 

@@ -19,7 +19,8 @@ from threading import Event
 from types import FrameType
 from typing import Any, TYPE_CHECKING
 
-from simgap.command.programs import end_with_starter, OK, run_program
+from antenna_drive.programs import end_with_starter, run_program
+from simgap.command.programs import OK
 from simgap.errors import UserError
 
 if TYPE_CHECKING:

@@ -30,7 +30,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 import sys
 
-from simgap.command.programs import run_program
+from antenna_drive.programs import run_program
 
 
 def main(args: Sequence[str] | None = None) -> int:

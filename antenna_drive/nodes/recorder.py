@@ -25,7 +25,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 import sys
 
-from simgap.command.programs import end_with_starter, run_program
+from antenna_drive.programs import end_with_starter, run_program
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -28,12 +28,13 @@ from antenna_drive.recording.bag import (
     MESSAGE_TYPE, METADATA, NOTES,
 )
 from antenna_drive.recording.bag_description import description, StorageFile
+from antenna_drive.recording.plain import freeze, to_json
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import dump_sheet, FILE_NAME, TestSheet
 from mcap.writer import Writer
 import numpy as np
 from simgap.drafts import drafted
-from simgap.inputs.plain import freeze, PlainDataError, to_json
+from simgap.inputs.plain import PlainDataError
 from simgap.logs.channel import NANOSECONDS, RecordingError
 
 FLUSH_S = 0.5

@@ -24,20 +24,19 @@ import warnings
 
 from antenna_drive.readings import FIELD_COLUMNS, RATE_COMMAND, RATE_COMMAND_COLUMN
 from antenna_drive.recording.atomic import new_file, refuse_existing
+from antenna_drive.recording.plain import to_json
 from antenna_drive.recording.recording import Change, Recording, unit_of
 from antenna_drive.recording.row_order import Column, sorted_rows
 from antenna_drive.recording.sheet import dump_sheet, load_sheet, TestSheet
 import numpy as np
 from simgap.errors import one_line
 from simgap.inputs.limits import SAMPLES, SIGNALS
-from simgap.inputs.plain import from_json, PlainDataError, to_json
+from simgap.inputs.plain import from_json, PlainDataError
 from simgap.inputs.schema import nearest
 from simgap.logs.channel import (
-    Channel, check_name, IntArray, make_channel, RecordingError, RecordingWarning,
+    Channel, check_name, IntArray, make_channel, NANOSECONDS, RecordingError, RecordingWarning,
 )
-from simgap.logs.text import (
-    Cell, format_nanoseconds, open_text, parse_nanoseconds, parse_number, read_text, rows,
-)
+from simgap.logs.text import Cell, open_text, parse_nanoseconds, parse_number, read_text, rows
 
 TIME = 'time_s'
 _OWN_COLUMN = re.compile(r'(\S+) \[([^\[\]]*)\]', re.ASCII)
@@ -278,3 +277,10 @@ def _write_rows(stream: IO[bytes], columns: Sequence[str], channels: Sequence[Ch
                 column[place] = repr(value)
             cells.append(column)
         stream.write(('\n'.join(map(','.join, zip(*cells, strict=True))) + '\n').encode())
+
+
+def format_nanoseconds(stamp: int) -> str:
+    """Return a time stamp in seconds: all its nanoseconds, no idle zeros."""
+    whole, rest = divmod(abs(stamp), NANOSECONDS)
+    fraction = f'{rest:09d}'.rstrip('0') or '0'
+    return f'{"-" if stamp < 0 else ""}{whole}.{fraction}'

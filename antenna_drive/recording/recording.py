@@ -21,11 +21,12 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from antenna_drive.emulator.wiring import OUTPUTS
+from antenna_drive.recording.plain import freeze, thaw
 from antenna_drive.recording.sheet import TestSheet
 import numpy as np
 from numpy.typing import ArrayLike
 from simgap.errors import one_line
-from simgap.inputs.plain import freeze, PlainDataError, thaw
+from simgap.inputs.plain import PlainDataError
 from simgap.inputs.schema import nearest
 from simgap.logs.channel import (
     Channel, check_name, FloatArray, make_channel, Method, METHODS, NANOSECONDS, nanoseconds,

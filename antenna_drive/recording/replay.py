@@ -19,12 +19,12 @@ from antenna_drive.emulator.run import Emulator, MACRO_STEP
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.sets import changed, Drive
+from antenna_drive.recording.plain import thaw
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.runs import record, STEP
 from antenna_drive.recording.sheet import CircuitBias, FixedBias, FixedStepBias, TestSheet
 import numpy as np
 from scipy.ndimage import median_filter
-from simgap.inputs.plain import thaw
 from simgap.inputs.schema import Value
 from simgap.logs.channel import Channel, NANOSECONDS, nanoseconds, RecordingError
 

@@ -10,7 +10,8 @@ from contextlib import contextmanager
 import os
 import signal
 
-from simgap.command.programs import end_with_parent, expect_overflow
+from antenna_drive.programs import end_with_parent
+from simgap.command.programs import expect_overflow
 
 
 @contextmanager

@@ -14,8 +14,8 @@ from pathlib import Path
 import sys
 import traceback
 
+from antenna_drive.programs import end_with_parent
 from lab.campaign.trials import Outcome, run_trial
-from simgap.command.programs import end_with_parent
 
 
 def main(arguments: list[str]) -> int:

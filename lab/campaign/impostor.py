@@ -27,9 +27,9 @@ from antenna_drive.lockstep.frame import FrameLayout
 from antenna_drive.lockstep.leaving import leave
 from antenna_drive.lockstep.readings import CHANGES_QOS
 from antenna_drive.lockstep.ros_link import FRAME_QOS, FrameLink
+from antenna_drive.programs import end_with_starter
 import rclpy
 from rclpy.node import Node
-from simgap.command.programs import end_with_starter
 from std_msgs.msg import Float64, Float64MultiArray, String
 
 PERIOD_S = 1e-3

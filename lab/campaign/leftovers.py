@@ -10,7 +10,7 @@ from pathlib import Path
 import signal
 import time
 
-from simgap.command.programs import runs
+from antenna_drive.programs import runs
 
 # Set by the campaign for a trial; whatever the trial starts inherits it.
 TOKEN = 'ANTENNA_DRIVE_CAMPAIGN'

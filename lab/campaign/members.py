@@ -20,7 +20,7 @@ import sys
 import time
 from types import FrameType
 
-from simgap.command.programs import end_with_starter
+from antenna_drive.programs import end_with_starter
 
 
 def main(arguments: list[str]) -> int:

@@ -66,14 +66,7 @@ def add_investigation_options(parser: argparse.ArgumentParser) -> None:
 
 
 def plan_of(arguments: argparse.Namespace) -> InvestigationPlan:
-    """
-    Return what the options ask for.
-
-    Raises
-    ------
-    UserError : an option is out of its range
-
-    """
+    """Return what the options ask for; UserError if one is out of its range."""
     check_options(arguments, jobs=Entry('', 1, whole=True), max_tests=Entry('', 1, 50, whole=True),
                   until=Entry('', 0.5, 1.0), duration=Entry('s', 5.0, 600.0),
                   seed=Entry('', 0, whole=True))
@@ -115,28 +108,14 @@ class PlayedBy:
     """Plays tests by a command of the user."""
 
     def __init__(self, words: Sequence[str], test: str) -> None:
-        """
-        Take the command, and what stands in it for the file of a test.
-
-        Raises
-        ------
-        UserError : it has no place for the test, or none for the recording
-
-        """
+        """Take the command and what stands in it for a test; UserError if a place is missing."""
         for place in (test, '{out}'):
             if not any(place in word for word in words):
                 raise UserError(f'--by: {place} is missing in {" ".join(words)}')
         self._words, self._test = words, test
 
     def __call__(self, number: int, test: Path, duration: float, out: Path) -> None:
-        """
-        Play a test, see `Bench.run`.
-
-        Raises
-        ------
-        UserError : the command failed, or wrote no recording; the message has its last line
-
-        """
+        """Play a test, see `Bench.run`; UserError if the command failed or wrote no recording."""
         words = [word.replace(self._test, str(test)).replace('{out}', str(out)).replace(
             '{duration}', f'{duration:g}').replace('{number}', str(number))
             for word in self._words]

@@ -40,8 +40,7 @@ _RULES = ('d-optimal', 'random')
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     add_proposal_options(parser)
-    parser.add_argument('--model', metavar='MODEL', required=True,
-                        help='as for simgap diagnose')
+    parser.add_argument('--model', metavar='MODEL', required=True, help='as for simgap diagnose')
 
 
 def add_proposal_options(parser: argparse.ArgumentParser) -> None:
@@ -83,13 +82,7 @@ def proposed(arguments: argparse.Namespace, tests: Callable[[dict[str, Any]], Te
     """
     Design the next test, and write what was asked for; 1 if no test within the limits helps.
 
-    Parameters
-    ----------
-    arguments
-        see `add_proposal_options`
-    tests
-        returns the tests that are allowed, from the entry `planning` of the verdict
-
+    `tests` returns the tests that are allowed, from the entry `planning` of the verdict.
     """
     check_options(arguments, jobs=Entry('', 1, whole=True), duration=Entry('s', 5.0, 600.0),
                   rate=Entry('Hz', 20.0, 10000.0), seed=Entry('', 0, whole=True))

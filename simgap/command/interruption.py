@@ -22,13 +22,7 @@ def interruptible(say: Callable[[], int]) -> Iterator[None]:
     Answer Ctrl-C with KeyboardInterrupt, and then by leaving at once.
 
     What is under way may keep its results and end its processes as the interrupt goes through
-    it. Threads that still compute are not waited for.
-
-    Parameters
-    ----------
-    say
-        tells the user, and returns the exit code
-
+    it. Threads that still compute are not waited for. `say` returns the exit code.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

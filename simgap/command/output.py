@@ -36,15 +36,8 @@ def give(result: object, target: str | None, text: str) -> None:
     """
     Print a result as text, and write it as JSON where `--json` asks for it.
 
-    Parameters
-    ----------
-    result
-        as in `write_json`
-    target
-        a file, '-' for standard output, or None for no JSON
-    text
-        goes to standard output unless the JSON does; then it goes to standard error
-
+    `target` is a file, '-' for standard output, or None for no JSON. The text goes to standard
+    output unless the JSON does; then it goes to standard error.
     """
     if target:
         write_json(result, target)
@@ -52,14 +45,7 @@ def give(result: object, target: str | None, text: str) -> None:
 
 
 def check_options(arguments: argparse.Namespace, **allowed: Entry) -> None:
-    """
-    Check the numbers of options that are given.
-
-    Raises
-    ------
-    UserError : an option is outside the range of its entry
-
-    """
+    """Check the options that are given; UserError if one is outside its range."""
     for name, entry in allowed.items():
         value = getattr(arguments, name)
         if value is not None:
@@ -68,20 +54,9 @@ def check_options(arguments: argparse.Namespace, **allowed: Entry) -> None:
 
 def write_json(result: object, target: str | os.PathLike[str]) -> None:
     """
-    Write `result` as strict JSON to a file, whole or not at all, or to standard output.
+    Write `result` as strict JSON to a file, whole or not at all, or to standard output, '-'.
 
-    Parameters
-    ----------
-    result
-        see `strict_json`
-    target
-        a file, or '-' for standard output
-
-    Raises
-    ------
-    ValueError, TypeError : as `strict_json`
-    UserError : the file cannot be written
-
+    Raises UserError if the file cannot be written; ValueError, TypeError as `strict_json`.
     """
     text = strict_json(result)
     if str(target) == STANDARD_OUTPUT:
@@ -96,12 +71,8 @@ def replaced(path: Path) -> Iterator[IO[bytes]]:
     """
     Give a stream whose content takes the place of `path` at the end, if all went well.
 
-    A reader of `path` sees the old content or the new, never a part of it.
-
-    Raises
-    ------
-    UserError : the file cannot be written there; the message names it and the reason
-
+    A reader of `path` sees the old content or the new, never a part of it. Raises UserError, with
+    the reason, if the file cannot be written there.
     """
     try:
         with drafted(path) as stream:
@@ -121,14 +92,7 @@ class Progress:
 
     def __init__(self, label: str, total: float, *, quiet: bool = False,
                  stream: TextIO | None = None) -> None:
-        """
-        Prepare to show `label` and the done part of `total`, in any unit.
-
-        Raises
-        ------
-        ValueError : `total` is not more than zero
-
-        """
+        """Prepare to show how much of `total` is done; ValueError if that is not above zero."""
         if not total > 0:
             raise ValueError(f'total is {total}, must be more than zero')
         self._label = label

@@ -31,45 +31,23 @@ exit codes:
 
 
 class Command(NamedTuple):
-    """One subcommand: the module that does it, of the program's package if it has no dot."""
+    """One subcommand."""
 
-    module: str
+    module: str  # that does it, of the program's package if it has no dot
     summary: str
 
 
 @dataclass(frozen=True)
 class Program:
-    """
-    A program with subcommands.
+    """A program with subcommands."""
 
-    Attributes
-    ----------
-    name : as it is typed
-    package : whose modules are the subcommands; its docstring is the description
-    version : printed by --version
-    commands : by name
-
-    """
-
-    name: str
-    package: str
-    version: str
-    commands: Mapping[str, Command]
+    name: str  # as it is typed
+    package: str  # whose modules are the subcommands; its docstring is the description
+    version: str  # printed by --version
+    commands: Mapping[str, Command]  # by name
 
     def main(self, argv: Sequence[str] | None = None) -> int:
-        """
-        Run the program.
-
-        Parameters
-        ----------
-        argv
-            arguments without the program's name; None for those of the process
-
-        Returns
-        -------
-        the exit code, one of those that `--help` lists
-
-        """
+        """Run the program; return one of the exit codes that `--help` lists."""
         arguments = list(sys.argv[1:] if argv is None else argv)
         # No option before the command takes a value, so the first plain word is the command.
         name = next((word for word in arguments if not word.startswith('-')), '')

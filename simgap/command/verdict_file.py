@@ -15,15 +15,7 @@ if TYPE_CHECKING:
 
 
 def planning_of(path: Path) -> dict[str, Any]:
-    """
-    Return the entry `planning` of a verdict.
-
-    Raises
-    ------
-    UserError : the file is no JSON of a diagnosis, or one of an earlier version
-    OSError : it cannot be read
-
-    """
+    """Return a verdict's entry `planning`; UserError if it has none, OSError if unreadable."""
     try:
         data = json.loads(path.read_text(encoding='utf-8'))
         return dict(data['planning'])
@@ -35,14 +27,7 @@ def planning_of(path: Path) -> dict[str, Any]:
 
 
 def findings_of(path: Path, planning: dict[str, Any]) -> Findings:
-    """
-    Return what the tests of a verdict have told, from its entry `planning`.
-
-    Raises
-    ------
-    UserError : the entry is damaged
-
-    """
+    """Return what the tests of a verdict have told; UserError if its `planning` is damaged."""
     from simgap.next_test.rivals import Findings
     try:
         return Findings.of_data(planning)

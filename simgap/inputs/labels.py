@@ -14,12 +14,8 @@ def parse_labels(key: str, tree: object) -> tuple[tuple[str, str], ...]:
     """
     Read the labels of a test: what was different in it, such as load: A.
 
-    YAML reads on and off as truth values; here they are words again.
-
-    Raises
-    ------
-    ParameterError : no mapping from short names to short texts or numbers
-
+    YAML reads on and off as truth values; here they are words again. Raises ParameterError if it
+    is no mapping from short names to short texts or numbers.
     """
     found = {}
     for name, given in mapping_of(key, tree).items():

@@ -16,30 +16,14 @@ from simgap.errors import one_line, UserError
 
 
 class Limit(NamedTuple):
-    """
-    One limit.
+    """One limit on what is counted."""
 
-    Attributes
-    ----------
-    variable : the environment variable that sets another limit
-    default : the limit if it is not set
-    what : the things that are counted, for the error message
-
-    """
-
-    variable: str
-    default: int
-    what: str
+    variable: str  # of the environment, sets another limit
+    default: int  # if it is not set
+    what: str  # the things that are counted, for the error message
 
     def value(self) -> int:
-        """
-        Return the limit in force.
-
-        Raises
-        ------
-        UserError : the variable is no whole number above zero
-
-        """
+        """Return the limit in force; UserError if the variable is no whole number above zero."""
         text = os.environ.get(self.variable, '')
         if not text:
             return self.default

@@ -1,19 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Plain data (texts, numbers, lists, mappings) that travels beside the samples of a recording.
-
-Frozen on the way in, so that a recording cannot change; strict JSON on the way out.
-"""
+"""Plain data (texts, numbers, lists, mappings) as strict JSON, and back."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 import json
 import math
-import numbers
 import os
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -24,61 +18,13 @@ class PlainDataError(ValueError):
     """Something is no plain data: a text, number, truth value, None, list or mapping."""
 
 
-def freeze(value: object, where: str = '') -> Any:
-    """
-    Return an unchangeable copy: mappings become read-only views, lists become tuples.
-
-    Raises
-    ------
-    PlainDataError : a part is none of the plain kinds, or a number is not finite
-
-    """
-    if value is None or isinstance(value, (bool, str)):
-        return value
-    if isinstance(value, numbers.Integral):
-        return int(value)
-    if isinstance(value, numbers.Real):
-        if not math.isfinite(value):
-            raise PlainDataError(f'{where or "value"}: {value!r} is no finite number')
-        return float(value)
-    if isinstance(value, Mapping):
-        frozen = {}
-        for key, item in value.items():
-            if not isinstance(key, str):
-                raise PlainDataError(f'{where or "mapping"}: the key {key!r} is no text')
-            frozen[key] = freeze(item, f'{where}.{key}' if where else key)
-        return MappingProxyType(frozen)
-    if isinstance(value, Sequence) and not isinstance(value, (bytes, bytearray)):
-        return tuple(freeze(item, f'{where}[{i}]') for i, item in enumerate(value))
-    raise PlainDataError(f'{where or "value"}: {type(value).__name__} is no plain data')
-
-
-def thaw(value: Any) -> Any:
-    """Return frozen plain data as dicts and lists, the way json and yaml write them."""
-    if isinstance(value, Mapping):
-        return {key: thaw(item) for key, item in value.items()}
-    if isinstance(value, tuple):
-        return [thaw(item) for item in value]
-    return value
-
-
-def to_json(value: Any) -> str:
-    """Return frozen plain data as strict JSON; every double comes back to its last bit."""
-    return json.dumps(thaw(value), ensure_ascii=False, allow_nan=False, indent=1)
-
-
 def strict_json(result: object) -> str:
     """
     Return a result as strict JSON, as every command writes it.
 
-    NaN, which means that there is no value, becomes null; numpy scalars, arrays and paths
-    become numbers, lists and texts.
-
-    Raises
-    ------
-    ValueError : `result` holds an infinity
-    TypeError : `result` holds something that JSON has no word for
-
+    NaN, which means that there is no value, becomes null; numpy scalars, arrays and paths become
+    numbers, lists and texts. Raises ValueError if `result` holds an infinity, TypeError if it
+    holds something that JSON has no word for.
     """
     return json.dumps(_plain(result), indent=2, allow_nan=False, ensure_ascii=False) + '\n'
 
@@ -107,10 +53,8 @@ def from_json(text: str | bytes) -> Any:
     """
     Read strict JSON.
 
-    Raises
-    ------
-    PlainDataError : no JSON, nested too deeply, not UTF-8, or NaN or an infinity in it
-
+    Raises PlainDataError if it is no JSON, not UTF-8, nested too deeply, or holds NaN or an
+    infinity.
     """
     try:
         return json.loads(text, parse_constant=_refuse_constant)

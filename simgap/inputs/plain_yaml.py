@@ -52,11 +52,8 @@ def parse_yaml(text: str | bytes) -> Any:
     """
     Read YAML as plain data.
 
-    Raises
-    ------
-    ParameterError : no YAML, or a key given twice, or an alias; the message says where
-    ModuleNotFoundError : PyYAML is not installed
-
+    Raises ParameterError, with the place, if it is no YAML, or has an alias or a key given twice;
+    ModuleNotFoundError if PyYAML is not installed.
     """
     import yaml
     try:
@@ -80,14 +77,7 @@ def parse_yaml(text: str | bytes) -> Any:
 
 
 def read_yaml(path: Path) -> Any:
-    """
-    Read a YAML file as plain data.
-
-    Raises
-    ------
-    ParameterError : the file cannot be read, is too long or is no YAML; the message names it
-
-    """
+    """Read a YAML file as plain data; ParameterError, with its name, if that is impossible."""
     try:
         with path.open('rb') as file:
             text = file.read(LONGEST_FILE + 1)

@@ -21,29 +21,17 @@ class ParameterError(UserError, ValueError):
 
 @dataclass(frozen=True)
 class Entry:
-    """
-    One parameter: its unit, what is allowed, and what it means.
+    """One parameter: its unit, what is allowed, and what it means."""
 
-    Attributes
-    ----------
-    unit : SI unit, '1' for a plain number, '' for a choice or a text
-    low, high : the closed range allowed, for numbers
-    description : one sentence, for people
-    live : True for a tuning parameter, which may change while the drive runs
-    choices : the allowed texts, for a choice; None for a number
-    lengths : least and greatest number of values, for a list of numbers; None for one value
-    whole : True if only whole numbers are allowed
-
-    """
-
-    unit: str = ''
-    low: float = -math.inf
+    unit: str = ''  # SI unit, '1' for a plain number, '' for a choice or a text
+    low: float = -math.inf  # the closed range allowed, for numbers
     high: float = math.inf
-    description: str = ''
-    live: bool = False
-    choices: tuple[str, ...] | None = None
+    description: str = ''  # one sentence, for people
+    live: bool = False  # whether it may change while the machine runs
+    choices: tuple[str, ...] | None = None  # the allowed texts, for a choice; None for a number
+    # least and greatest number of values of a list; None for one value
     lengths: tuple[int, int] | None = None
-    whole: bool = False
+    whole: bool = False  # whether only whole numbers are allowed
 
     def allowed(self) -> str:
         """Say in words what is allowed."""
@@ -63,11 +51,8 @@ class Entry:
         """
         Return `value` as this parameter's own type.
 
-        Raises
-        ------
-        ParameterError : the value is of another kind, not finite or out of range; the message
-            names `key` and what is allowed
-
+        Raises ParameterError, with `key` and what is allowed, if the value is of another kind, not
+        finite or out of range.
         """
         if self.choices is not None:
             if value not in self.choices:
@@ -111,10 +96,7 @@ def mapping_of(key: str, body: object,
     """
     Return a mapping that a file holds under a key, '' for the file itself.
 
-    Raises
-    ------
-    ParameterError : it is no mapping, or one of its keys is not allowed
-
+    Raises ParameterError if it is no mapping, or one of its keys is not allowed.
     """
     if not isinstance(body, Mapping):
         where = f'{key}: ' if key else ''
@@ -126,22 +108,3 @@ def mapping_of(key: str, body: object,
             raise ParameterError(f'{where}: no such entry{nearest(str(name), allowed)}; '
                                  f'allowed are {", ".join(allowed)}')
     return body
-
-
-def check_changes(changes: Mapping[str, object], entries: Mapping[str, Entry]) -> dict[str, Value]:
-    """
-    Check a set of live changes, all or nothing.
-
-    Raises
-    ------
-    ParameterError : a key is unknown, not a tuning parameter, or its value is not allowed
-
-    """
-    checked: dict[str, Value] = {}
-    for key, value in changes.items():
-        if key not in entries:
-            raise ParameterError(f'{key}: no such parameter{nearest(key, tuple(entries))}')
-        if not entries[key].live:
-            raise ParameterError(f'{key}: a physical constant, read-only while the drive runs')
-        checked[key] = entries[key].check(key, value)
-    return checked

@@ -174,8 +174,7 @@ def _time(body: object) -> TimeMap:
         _text('time.unit', entries.get('unit', 's'), (*TIME_UNITS, ISO_8601)),
         nanoseconds(_number('time.offset_s', entries.get('offset_s', 0), 'clock_offset_s')),
         _text('time.origin', entries.get('origin', 'keep'), ('keep', 'first')) == 'first',
-        _text('time.duplicates', entries.get('duplicates', 'refuse'),
-              ('refuse', 'first', 'last')))
+        _text('time.duplicates', entries.get('duplicates', 'refuse'), ('refuse', 'first', 'last')))
 
 
 def _number(key: str, value: object, entry: str) -> float:
@@ -198,8 +197,7 @@ def _signal(key: str, name: str, body: object, known: KnownSignals) -> SignalMap
     sign = entries.get('sign', 1)
     if isinstance(sign, bool) or sign not in (1, -1):
         raise ParameterError(f'{key}.sign: {quoted(plain_value(sign))} given, allowed is 1 or -1')
-    written = _text(f'{key}.unit', entries.get('unit', unit or None),
-                    (*UNITS, COUNTS))
+    written = _text(f'{key}.unit', entries.get('unit', unit or None), (*UNITS, COUNTS))
     if written == COUNTS:
         if 'counts_per_revolution' in numbers:
             si, factor = 'rad', 2 * math.pi / numbers['counts_per_revolution']

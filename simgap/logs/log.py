@@ -104,8 +104,7 @@ class OneTest:
 
 def beginning(log: Log, until: float) -> Log:
     """Return a log's samples up to a time after its first [s]."""
-    count = max(int(np.searchsorted(log.time, log.time[0] + until, side='right')),
-                _LEAST_SAMPLES)
+    count = max(int(np.searchsorted(log.time, log.time[0] + until, side='right')), _LEAST_SAMPLES)
     if count >= log.time.size:
         return log
     return Log(log.name, log.time[:count],

@@ -85,8 +85,7 @@ class _Samples:
         self._decimal, self._duplicates = import_map.layout.decimal, import_map.time.duplicates
         self._name = ' and '.join(map(str, signal.number.references))
 
-    def read(self, line: int, row: Sequence[Text],
-             stamps: Mapping[str | int, int | None]) -> None:
+    def read(self, line: int, row: Sequence[Text], stamps: Mapping[str | int, int | None]) -> None:
         """Take the sample of a row, if it has one."""
         signal = self._signal
         numbers = []

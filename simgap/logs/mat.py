@@ -35,24 +35,11 @@ _NAMELESS = '__function_workspace__'
 
 def read_mat(path: Path) -> dict[str, Any]:
     """
-    Return the variables of a file that are plain real numbers.
+    Return the variables of a .mat file, version 4 to 7, that are plain real numbers.
 
-    Parameters
-    ----------
-    path
-        a .mat file, version 4 to 7
-
-    Returns
-    -------
-    names with arrays, shape as in MATLAB: at least two axes
-
-    Raises
-    ------
-    RecordingError
-        if it is of version 7.3, or has more numbers than `simgap.inputs.limits` allows
-    ValueError, or another error of scipy's
-        if it is damaged
-
+    Shapes are as in MATLAB: at least two axes. Raises RecordingError if it is of version 7.3, or
+    has more numbers than `simgap.inputs.limits` allows; ValueError, or another error of scipy's,
+    if it is damaged.
     """
     from scipy.io import loadmat, whosmat
     from scipy.io.matlab import matfile_version, MatReadError

@@ -55,13 +55,6 @@ def parse_nanoseconds(text: str, cell: Cell, per_unit: int = NANOSECONDS) -> int
     return int((Decimal(text) * per_unit).to_integral_value())
 
 
-def format_nanoseconds(stamp: int) -> str:
-    """Return a time stamp in seconds: all its nanoseconds, no idle zeros."""
-    whole, rest = divmod(abs(stamp), NANOSECONDS)
-    fraction = f'{rest:09d}'.rstrip('0') or '0'
-    return f'{"-" if stamp < 0 else ""}{whole}.{fraction}'
-
-
 def rows(path: Path, stream: TextIO, delimiter: str = ',') -> Iterator[tuple[int, list[str]]]:
     """
     Yield the rows of a CSV file with the number of the line that each ends on.

@@ -40,8 +40,7 @@ class OwnTests(TestSpace):
         """Return the machine in one test, with the readings of the model as configured."""
         silent = self._with_readings(test, np.zeros((test.time.size, len(self._model.readings))))
         every_sample = OwnMachine(replace(self._model, judged_hz=_rate(test)), [silent])
-        return OwnMachine(self._model, [
-            self._with_readings(test, every_sample.predict({}, 0))])
+        return OwnMachine(self._model, [self._with_readings(test, every_sample.predict({}, 0))])
 
     def use(self, machine: Machine, points: Sequence[Point]) -> Mapping[str, float]:
         """Return the share of each limit that a test uses, the worst of some variants."""
@@ -69,8 +68,7 @@ class OwnTests(TestSpace):
         found = {path: '\n'.join(rows) + '\n'}
         if test.constants:
             import yaml
-            found[path.with_suffix('.yaml')] = yaml.safe_dump(
-                {'constants': dict(test.constants)})
+            found[path.with_suffix('.yaml')] = yaml.safe_dump({'constants': dict(test.constants)})
         return found
 
     def _with_readings(self, test: Log, readings: FloatArray) -> Log:
@@ -90,23 +88,10 @@ def own_tests(model: Model, duration_s: float) -> OwnTests:
 def propose(model: Model, verdict: Verdict | None = None, duration_s: float = 30.0,
             threads: int = 2, seed: int = 0) -> Proposal:
     """
-    Design the next test of a machine, among those that its model declares.
+    Design the next test of a machine, of `duration_s` [s], among those that its model declares.
 
-    Parameters
-    ----------
-    model
-        with its `tests` and `limits`
-    verdict
-        whose answers the test is to tell apart; None for the test that detects most
-    duration_s
-        of the test [s]
-    threads, seed
-        simulations at once, and the seed of the tests that are drawn
-
-    Raises
-    ------
-    ModelError : the model declares no tests
-
+    It tells the answers of `verdict` apart, or is the one that detects most. `seed` is that of the
+    tests that are drawn. Raises ModelError if the model declares no tests.
     """
     findings = Findings.of_data(verdict.planning) if verdict else Findings()
     return TestDesign(own_tests(model, duration_s), findings, objective_for(findings),

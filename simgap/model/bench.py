@@ -17,35 +17,16 @@ from simgap.next_test.rivals import Rival
 from simgap.verdict.diagnosis import Progress
 from simgap.verdict.record import Verdict
 
-
+# Plays a test: number, CSV of its commands, duration [s], CSV of the log to write.
 Play = Callable[[int, Path, float, Path], None]
 
 
 class ModelBench(Bench):
-    """
-    A machine on which the tests of its model are played.
-
-    Parameters
-    ----------
-    model
-        with its `tests` and `limits`
-    duration_s
-        of a test [s]
-    play
-        plays a test: number, CSV of its commands, duration [s], CSV of the log to write
-    threads
-        simulations at once
-
-    Raises
-    ------
-    ModelError : the model declares no tests
-
-    """
+    """A machine on which the tests of its model are played; ModelError if it declares none."""
 
     played = 'command_{number}.csv'
 
-    def __init__(self, model: Model, duration_s: float,
-                 play: Play, threads: int = 2) -> None:
+    def __init__(self, model: Model, duration_s: float, play: Play, threads: int = 2) -> None:
         """Keep what the machine is."""
         self.space = own_tests(model, duration_s)
         self.limits = dict(model.limits)
@@ -72,18 +53,6 @@ class ModelBench(Bench):
 
 def investigate(model: Model, folder: Path, play: Play,
                 plan: InvestigationPlan = InvestigationPlan(), threads: int = 2) -> dict[str, Any]:
-    """
-    Test a machine until the answer is sure; return the story, see `Investigation.run`.
-
-    Parameters
-    ----------
-    model, play, threads
-        as in `ModelBench`
-    folder
-        of the investigation, with a file for each step
-    plan
-        what is to be done
-
-    """
+    """Test a machine until the answer is sure; return the story, see `Investigation.run`."""
     return Investigation(folder, ModelBench(model, plan.duration, play, threads), plan,
                          threads=threads).run()

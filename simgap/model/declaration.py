@@ -64,8 +64,7 @@ def size(low: float, high: float, unit: str = '1', *, tolerance: float = 0.0,
     return Number(0.0, low, high, unit, step, tolerance=tolerance)
 
 
-def shape(low: float, high: float, start: float, unit: str = '1', *,
-          step: float = 0.0) -> Number:
+def shape(low: float, high: float, start: float, unit: str = '1', *, step: float = 0.0) -> Number:
     """Return a number of an effect that means nothing while the effect is absent."""
     return Number(start, low, high, unit, step, is_shape=True)
 

@@ -37,18 +37,11 @@ _LEAST_ERROR = 0.01
 
 @dataclass(frozen=True, repr=False)
 class OwnVerdict(Verdict):
-    """
-    A verdict on a declared model.
+    """A verdict on a declared model."""
 
-    Attributes
-    ----------
-    numbers : value, configured and unit of each number of the simulation, as fitted
-    pushes : where something enters that no effect names: test, place, from_s, until_s, size and
-        unit of each push
-
-    """
-
+    # value, configured and unit of each number of the simulation, as fitted
     numbers: Mapping[str, Any]
+    # where something enters that no effect names: test, place, from_s, until_s, size and unit
     pushes: Sequence[Mapping[str, Any]]
 
     def summary(self) -> str:
@@ -64,33 +57,13 @@ def diagnose_logs(model: Model, logs: Sequence[Log],
     """
     Say where a machine and its model part, which effect is behind it, and how far it goes.
 
-    Parameters
-    ----------
-    model
-        of the machine
-    logs
-        of its tests
-    progress
-        called with the share that is done, 0 to 1, and what is being done
-    threads
-        how many hypotheses are fitted at once
-    settings
-        thresholds
-    without
-        effects that the catalogue shall lack
-    limits
-        for some readings, the remainder beyond noise from which it matters
-    earlier
-        answers of a verdict on some of the logs, see `diagnosis.diagnose`
+    Raises UserError if model or logs cannot be used; the message says what is wrong.
 
-    Returns
-    -------
-    the verdict, with the simulation's numbers and what pushes
-
-    Raises
-    ------
-    UserError : model or logs cannot be used; the message says what is wrong
-
+    progress : called with the share that is done, 0 to 1, and what is being done
+    threads : how many hypotheses are fitted at once
+    without : effects that the catalogue shall lack
+    limits : for some readings, the remainder beyond noise from which it matters
+    earlier : answers of a verdict on some of the logs, see `diagnosis.diagnose`
     """
     machine = OwnMachine(model, logs)
     for effect in without:

@@ -64,8 +64,7 @@ class FmuModel:
             if name in ports.inputs:
                 raise ModelError(f'{key}: {name}: a column of the log is fed into it; give the '
                                  'FMU an input of its own for the push')
-        self._inputs = self._references(
-            self._checked({**ports.inputs, **ports.pushes}, 'input'))
+        self._inputs = self._references(self._checked({**ports.inputs, **ports.pushes}, 'input'))
         self._outputs = self._references(self._checked(ports.outputs))
         self._slave = self._instance()
 

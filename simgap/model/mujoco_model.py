@@ -158,8 +158,7 @@ class _Worker:
                              f'{parts["field"]}[0] to [{values.size - 1}]')
         return values[index:index + 1]
 
-    def _field(self, place: str, key: str, kind: str, name: str,
-               field: str) -> FloatArray | None:
+    def _field(self, place: str, key: str, kind: str, name: str, field: str) -> FloatArray | None:
         """Return the values of a field of an object, shape (k,); None if there is none."""
         model = self._model
         if kind == 'option':

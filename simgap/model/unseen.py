@@ -38,20 +38,11 @@ class Unseen:
 def unseen(verdict: Verdict, log: Log,
            push: Mapping[str, FloatArray] | None = None) -> dict[str, Unseen]:
     """
-    Return how well a log that was not used is predicted, by reading.
+    Return how well a log of another test, which was not used, is predicted, by reading.
 
     Nothing is fitted to the log: a number that each test has of its own is the mean of those of
-    the diagnosed tests. An effect that has a size by label has that of the log's label.
-
-    Parameters
-    ----------
-    verdict
-        from `diagnose_logs`
-    log
-        another test of the same machine
-    push
-        what is known to have entered at some of the model's places, shape (n,) each
-
+    the diagnosed tests. An effect that has a size by label has that of the log's label. `push` is
+    what is known to have entered at some of the model's places, shape (n,) each.
     """
     whole, machine = verdict.machine, without_labels(verdict.machine)
     assert isinstance(machine, OwnMachine)

@@ -41,32 +41,6 @@ class Confusability:
     alike: FloatArray  # shape (m, m), share of an effect's squared remainder that another imitates
     limit: float  # share from which two effects count as alike
 
-    def passing_for(self, index: int, most: int) -> list[str]:
-        """Return the effects that pass for one of them, the most alike first."""
-        return [self.effects[j] for j in np.argsort(-self.alike[index])
-                if j != index and self.alike[index, j] > self.limit][:most]
-
-    def groups(self) -> list[list[str]]:
-        """Return the groups of effects that pass for each other."""
-        left = set(range(len(self.effects)))
-        found = []
-        while left:
-            group = [min(left)]
-            left.discard(group[0])
-            for member in group:
-                near = [j for j in sorted(left) if self.alike[member, j] > self.limit]
-                group += near
-                left -= set(near)
-            if len(group) > 1:
-                found.append([self.effects[j] for j in group])
-        return found
-
-    def separated(self) -> float:
-        """Return the share of all pairs of effects that can be distinguished."""
-        m = len(self.effects)
-        pairs = self.alike[np.triu_indices(m, 1)]
-        return float(np.mean(pairs < self.limit)) if pairs.size else 1.0
-
 
 def confusability(machine: Machine, progress: Callable[[float], None] = lambda share: None,
                   settings: Settings = DEFAULT, inflated: float = 1.0,

@@ -42,39 +42,21 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class InvestigationPlan:
-    """
-    What an investigation is to do.
+    """What an investigation is to do."""
 
-    Attributes
-    ----------
-    most : greatest number of tests
-    until : probability from which an answer that the verdict before also named is decided
-    duration : of each test [s]
-    seed : of the tests that are drawn
-
-    """
-
-    most: int = 4
+    most: int = 4  # greatest number of tests
+    # probability from which an answer that the verdict before also named is decided
     until: float = 0.9
-    duration: float = 30.0
-    seed: int = 0
+    duration: float = 30.0  # of each test [s]
+    seed: int = 0  # of the tests that are drawn
 
 
 class Bench(ABC):
-    """
-    A machine on which tests are run.
+    """A machine on which tests are run."""
 
-    Attributes
-    ----------
-    space : the tests that it allows
-    limits : that no test may exceed, as plain data
-    played : name of the file of a test, with {number}
-
-    """
-
-    space: TestSpace
-    limits: Mapping[str, Any]
-    played: str
+    space: TestSpace  # the tests that it allows
+    limits: Mapping[str, Any]  # that no test may exceed, as plain data
+    played: str  # name of the file of a test, with {number}
 
     @abstractmethod
     def save(self, test: Any, path: Path) -> None:
@@ -94,25 +76,9 @@ class Investigation:
     """
     An investigation of a machine.
 
-    Parameters
-    ----------
-    folder
-        where everything lies; made if it is not there
-    bench
-        the machine
-    plan
-        what is to be done
-    first
-        the first test; None for the one that detects most
-    threads
-        simulations at once
-    settings, effort
-        thresholds, and how much is searched
-
-    Raises
-    ------
-    UserError : the folder holds another investigation
-
+    Everything lies in `folder`, which is made if it is not there. `first` is the first test; None
+    asks for the one that detects most. `threads` simulations run at once. Raises UserError if the
+    folder holds another investigation.
     """
 
     def __init__(self, folder: Path, bench: Bench, plan: InvestigationPlan = InvestigationPlan(),

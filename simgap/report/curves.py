@@ -27,16 +27,10 @@ Panel = tuple[str, str, str, Sequence[Curve]]
 def plotted(panels: Sequence[Panel],
             colours: Mapping[str, str] = MappingProxyType({})) -> dict[str, Any]:
     """
-    Return panels as the plain data that plotter.js reads.
+    Return panels as the plain data that plotter.js reads, in the order in which they are drawn.
 
-    Parameters
-    ----------
-    panels
-        in the order in which they are drawn; what is not finite is left out, be it a sample, a
-        curve or a panel
-    colours
-        of curves by name; the others take theirs from COLOURS in turn
-
+    What is not finite is left out, be it a sample, a curve or a panel. `colours` are those of
+    curves by name; the others take theirs from COLOURS in turn.
     """
     found = [{
         'group': group, 'title': title, 'unit': unit,

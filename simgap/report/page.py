@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from simgap.machine.contract import Experiment, FloatArray
 from simgap.machine.diagram import Diagram, DiagramBlock
+from simgap.report.curves import Panel
 from simgap.verdict.record import share_text, value_lines, Verdict
 
 _VERDICTS = {
@@ -26,59 +27,32 @@ _SHOWN, _LEAST = 8, 0.001
 # An effect so probable is still open.
 _OPEN = 0.05
 
-# Name, times [s] and values of a curve, shape (n,); group, title, unit and curves of a panel.
-Curve = tuple[str, FloatArray, FloatArray]
-Panel = tuple[str, str, str, Sequence[Curve]]
-
 
 @dataclass(frozen=True)
 class Likely:
-    """
-    A hypothesis.
+    """A hypothesis."""
 
-    Attributes
-    ----------
-    effects : their ids
-    probability : 0 to 1
-    causes : the physical cause of each effect that the catalogue knows
-    values : of the parameters, a line each
-
-    """
-
-    effects: Sequence[str]
-    probability: float
-    causes: Sequence[str]
-    values: list[str]
+    effects: Sequence[str]  # their ids
+    probability: float  # 0 to 1
+    causes: Sequence[str]  # the physical cause of each effect that the catalogue knows
+    values: list[str]  # of the parameters, a line each
 
 
 @dataclass(frozen=True)
 class Contents:
-    """
-    All that the page says.
+    """All that the page says."""
 
-    Attributes
-    ----------
-    title, lead : the verdict in two words and in a sentence
-    explained : how much of the gap its effects explain; empty if it names none
-    result : the JSON of docs/diagnosis.md, which holds the tables and notes
-    diagram : of the machine
-    blocks : its blocks, each with the probability that an effect sits there
-    likely : the likeliest hypotheses
-    panels : for each experiment the channel that gains most, measured and simulated, and the
-        difference
-    advice : tests that would settle what is open
-
-    """
-
-    title: str
-    lead: str
-    explained: str
-    result: Mapping[str, Any]
-    diagram: Diagram
+    title: str  # the verdict in two words
+    lead: str  # the verdict in a sentence
+    explained: str  # how much of the gap its effects explain; empty if it names none
+    result: Mapping[str, Any]  # the JSON of docs/diagnosis.md, which holds the tables and notes
+    diagram: Diagram  # of the machine
+    # those of the diagram, each with the probability that an effect is there
     blocks: Sequence[tuple[DiagramBlock, float]]
-    likely: Sequence[Likely]
+    likely: Sequence[Likely]  # the likeliest hypotheses
+    # the channel of each experiment that gains most: measured, simulated and difference
     panels: Sequence[Panel]
-    advice: Sequence[str]
+    advice: Sequence[str]  # tests that would settle what is open
 
 
 def contents(verdict: Verdict) -> Contents:
@@ -123,8 +97,7 @@ def _of_experiment(experiment: Experiment, before: FloatArray,
     measured = experiment.measured[:, channel]
     simulated = {'before': before[:, channel], 'after': after[:, channel]}
     return ((experiment.name, name, unit,
-             [(key, time, values)
-              for key, values in {'measured': measured, **simulated}.items()]),
+             [(key, time, values) for key, values in {'measured': measured, **simulated}.items()]),
             (experiment.name, 'measured less simulated', unit,
              [(key, time, measured - values) for key, values in simulated.items()]))
 

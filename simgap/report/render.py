@@ -24,19 +24,9 @@ def render(template: str, folder: Path = TEMPLATES, **contents: object) -> str:
     """
     Return a page as HTML.
 
-    Parameters
-    ----------
-    template
-        name of a file whose first lines list the contents that it needs
-    folder
-        where it lies; what it extends or includes may lie in this room's templates/
-    contents
-        plain data by name
-
-    Raises
-    ------
-    jinja2.UndefinedError : the template needs something that was not given
-
+    `template` is the name of a file in `folder` whose first lines list the contents that it needs;
+    what it extends or includes may lie in this room's templates/. `contents` are plain data by
+    name. Raises jinja2.UndefinedError if the template needs something that was not given.
     """
     return _environment(folder).get_template(template).render(contents)
 

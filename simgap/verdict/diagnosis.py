@@ -36,27 +36,13 @@ def diagnose(machine: Machine, progress: Progress = lambda share, doing: None, t
     """
     Diagnose a machine in its experiments.
 
-    Parameters
-    ----------
-    machine
-        see `Machine`
-    progress
-        called with the share that is done, 0 to 1, and what is being done
-    threads
-        how many hypotheses are fitted at once
-    settings
-        thresholds
-    limits
-        for some signals, the remainder beyond noise from which it matters, in the signal's unit
-    earlier
-        answers of a verdict on some of the tests: they are fitted to all from where they have
-        ended, beside what the search finds. One whose effects the machine does not know is left
-        out
+    Raises MachineError if the machine breaks its contract; the message says where.
 
-    Raises
-    ------
-    MachineError : the machine breaks its contract; the message says where
-
+    progress : called with the share that is done, 0 to 1, and what is being done
+    threads : how many hypotheses are fitted at once
+    limits : for some signals, the remainder beyond noise from which it matters, in their units
+    earlier : answers of a verdict on some of the tests, fitted to all from where they have ended,
+        beside what the search finds; one whose effects the machine does not know is left out
     """
     with one_blas_thread():
         check_machine(machine)
@@ -102,8 +88,7 @@ def _diagnose(machine: Machine, progress: Progress, threads: int, settings: Sett
         which=[Named(**answer) for answer in verdict.which(
             decision, settings.verdict, lambda answer: values_with_intervals(
                 answer, found.deviating(answer)))],
-        also_seen=verdict.also_seen(
-            found.evidence.hypotheses, settings, found.evidence.inflation),
+        also_seen=verdict.also_seen(found.evidence.hypotheses, settings, found.evidence.inflation),
         confusable=decision.confusable,
         how_far=found.reach,
         could_hide=hidden if healthy else [],

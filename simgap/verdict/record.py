@@ -29,68 +29,40 @@ _HEADLINES = {
 
 @dataclass(frozen=True)
 class Named:
-    """
-    An answer.
+    """An answer."""
 
-    Attributes
-    ----------
-    effects : that it names, ['none'] or ['unknown']
-    probability : 0 to 1
-    parameters : value, ci95, unit and more of each number of its effects, by name
-
-    """
-
-    effects: Sequence[str]
-    probability: float
+    effects: Sequence[str]  # that it names, ['none'] or ['unknown']
+    probability: float  # 0 to 1
+    # value, ci95, unit and more of each number of its effects, by name
     parameters: Mapping[str, Any]
 
 
 @dataclass(frozen=True, repr=False)
 class Verdict:
-    """
-    What a diagnosis found. docs/diagnosis.md explains each entry of the JSON.
+    """What a diagnosis found. docs/diagnosis.md explains each entry of the JSON."""
 
-    Attributes
-    ----------
-    word : no_gap, too_few_to_judge, explained, partly_explained or unknown_effect
-    statements : what is named beside its runner-up
-    where : shares of the gap by part, signal and regime
-    which : the answers, the likeliest first
-    also_seen, confusable : effects that show a little, and groups that cannot be told apart
-    how_far : how much of the gap of withheld data the effects explain
-    could_hide : the least size of each effect that would have shown, where no gap does
-    remains, residual_tests : what is not explained, by signal
-    may_enter_at : places where an unknown input may act, the likeliest first
-    fits : every fit that the verdict was decided on
-    planning : what the design of a further test needs
-    seconds : of computing
-    notes : for people
-    labels : how effects differ between labels; None if they do not
-    machine : that was compared, with the noise of the motion that was found; where tests carry
-        labels, a `by_label.ByLabel` around it
-    none, best : the hypotheses without and with the likeliest effects
-
-    """
-
-    word: str
-    statements: Mapping[str, Any]
-    where: Sequence[Located]
-    which: Sequence[Named]
-    also_seen: Sequence[Mapping[str, Any]]
-    confusable: Sequence[Sequence[str]]
-    how_far: Mapping[str, Any]
+    word: str  # no_gap, too_few_to_judge, explained, partly_explained or unknown_effect
+    statements: Mapping[str, Any]  # what is named beside its runner-up
+    where: Sequence[Located]  # shares of the gap by part, signal and regime
+    which: Sequence[Named]  # the answers, the likeliest first
+    also_seen: Sequence[Mapping[str, Any]]  # effects that show a little
+    confusable: Sequence[Sequence[str]]  # groups of effects that cannot be told apart
+    how_far: Mapping[str, Any]  # how much of the gap of withheld data the effects explain
+    # the least size of each effect that would have shown, if no gap does
     could_hide: Sequence[Mapping[str, Any]]
-    remains: Mapping[str, Any]
+    remains: Mapping[str, Any]  # what is not explained, by signal
     residual_tests: Mapping[str, Any]
-    may_enter_at: Sequence[Place]
-    fits: Sequence[Mapping[str, Any]]
-    planning: Mapping[str, Any]
-    seconds: float
-    notes: Sequence[str]
+    may_enter_at: Sequence[Place]  # places where an unknown input may act, the likeliest first
+    fits: Sequence[Mapping[str, Any]]  # every fit that the verdict was decided on
+    planning: Mapping[str, Any]  # what the design of a further test needs
+    seconds: float  # of computing
+    notes: Sequence[str]  # for people
+    # how effects differ between labels; None if they do not
     labels: Sequence[Mapping[str, Any]] | None
+    # with the noise of the motion that was found; a `ByLabel` where tests carry labels
     machine: Machine
-    none: Hypothesis
-    best: Hypothesis
+    none: Hypothesis  # the hypothesis without effects
+    best: Hypothesis  # the one with the likeliest effects
 
     def __repr__(self) -> str:
         """Return the verdict and its first answer, in a line."""

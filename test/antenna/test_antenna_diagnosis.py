@@ -16,7 +16,7 @@ from typing import Any
 from antenna_drive.cli import main
 from antenna_drive.diagnosis.diagnose import diagnose_recordings
 from antenna_drive.diagnosis.machine import AntennaMachine
-from antenna_drive.diagnosis.planned_tests import BUILT_IN, confusability_of, planned
+from antenna_drive.diagnosis.planned_tests import BUILT_IN, confusability_of, groups, planned
 from antenna_drive.diagnosis.waves import Wave
 from antenna_drive.parameters import load
 from antenna_drive.readings import SIGNALS
@@ -171,7 +171,7 @@ def test_confusability_knows_what_one_elevation_cannot_tell() -> None:
     assert found.alike[at['motor_1.torque_constant'], at['encoder.cyclic_error']] < 0.5
     assert math.isfinite(found.detectable[at['axis.viscous_friction']])
     assert any({'axis.gravity_imbalance', 'axis.wind_steady'} <= set(group)
-               for group in found.groups())
+               for group in groups(found))
 
 
 def test_values_are_told_as_people_read_them() -> None:

@@ -12,14 +12,14 @@ import tempfile
 import warnings
 
 from antenna_drive.readings import FIELD_COLUMNS
-from antenna_drive.recording.csv_format import meta_path, read_csv, write_csv
+from antenna_drive.recording.csv_format import format_nanoseconds, meta_path, read_csv, write_csv
 from antenna_drive.recording.recording import Change, Recording
 from antenna_drive.recording.sheet import parse_sheet
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from simgap.logs.channel import Channel, RecordingError, RecordingWarning
-from simgap.logs.text import Cell, format_nanoseconds, parse_nanoseconds
+from simgap.logs.text import Cell, parse_nanoseconds
 
 HEADER = ('time_s,rate_command_rad_s,current_1_A,current_2_A,tach_rate_1_rad_s,'
           'tach_rate_2_rad_s,encoder_rad,bias_voltage_V')

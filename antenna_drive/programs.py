@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""How the programs of the drive begin, and how they end with the process that started them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+import os
+from pathlib import Path
+import signal
+import sys
+
+from simgap.command.programs import answered, OK, PARENT
+
+
+def run_program(name: str, description: str, args: Sequence[str] | None,
+                act: Callable[[list[str]], int]) -> int:
+    """Run a program or print its help; return its exit code. The arguments exclude its name."""
+    arguments = list(sys.argv[1:] if args is None else args)
+    if '-h' in arguments or '--help' in arguments:
+        print(description.strip())
+        return OK
+    return answered(name, lambda: act(arguments))
+
+
+def end_with_parent() -> None:
+    """Let the kernel send SIGTERM to this process when its parent ends (on Linux)."""
+    if sys.platform.startswith('linux'):
+        import ctypes
+        pr_set_pdeathsig = 1  # linux/prctl.h
+        ctypes.CDLL(None).prctl(pr_set_pdeathsig, int(signal.SIGTERM))
+
+
+def end_with_starter() -> None:
+    """
+    End with the process that has started this one, if the environment has its number.
+
+    The kernel tells of the end of a parent only if it was asked before. A starter that has ended
+    by then ends this process at once, also while it is a zombie that nobody has waited for.
+    """
+    if PARENT in os.environ:
+        end_with_parent()
+        if not runs(int(os.environ[PARENT])):
+            os._exit(OK)
+
+
+def runs(pid: int) -> bool:
+    """Return whether a process is there and is no zombie."""
+    try:
+        os.kill(pid, 0)
+        if sys.platform.startswith('linux'):
+            return Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0] not in 'ZX'
+    except PermissionError:
+        return True  # of another user
+    except OSError:
+        return False
+    return True
