@@ -73,7 +73,7 @@ def diagnosis(result: dict[str, Any], **machine: Any) -> Verdict:
     model = SimpleNamespace(
         experiments=[Experiment(name, TIME, ('speed', HOSTILE), ('m/s', 'V'), measured,
                                 np.full_like(true, 0.1)) for name in (HOSTILE, 'second')],
-        effects={'motors.friction': Effect('motors.friction', 'motors', HOSTILE, '', ()),
+        catalogue={'motors.friction': Effect('motors.friction', 'motors', HOSTILE, '', ()),
                  'dial.gain': Effect('dial.gain', 'dial', 'a bent needle', '', ())},
         simulate=lambda points: [[true - 1.0] * 2, [true] * 2],
         **{'diagram': None, 'advice': (), **machine})
