@@ -74,7 +74,7 @@ def diagnosis(result: dict[str, Any], **machine: Any) -> Verdict:
         experiments=[Experiment(name, TIME, ('speed', HOSTILE), ('m/s', 'V'), measured,
                                 np.full_like(true, 0.1)) for name in (HOSTILE, 'second')],
         catalogue={'motors.friction': Effect('motors.friction', 'motors', HOSTILE, '', ()),
-                 'dial.gain': Effect('dial.gain', 'dial', 'a bent needle', '', ())},
+                   'dial.gain': Effect('dial.gain', 'dial', 'a bent needle', '', ())},
         simulate=lambda points: [[true - 1.0] * 2, [true] * 2],
         **{'diagram': None, 'advice': (), **machine})
     fit: Any = SimpleNamespace(state=SimpleNamespace(point=dict))
