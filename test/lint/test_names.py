@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 
-@pytest.mark.parametrize('house', ['simgap', 'antenna_drive'])
+@pytest.mark.parametrize('house', ['simgap', 'antenna_drive', 'lab'])
 def test_a_class_name_means_one_thing(house: str) -> None:
     """A reader who searches a house for a class finds one."""
     files = defaultdict(list)
