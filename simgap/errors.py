@@ -14,6 +14,9 @@ class UserError(Exception):
     fault of the program is not.
     """
 
+    # The exit code of a program that ends with it: wrong input.
+    status = 2
+
     # A file may give a megabyte where a number should be. Paths have at most 4096 characters.
     LONGEST = 6000
 

@@ -12,6 +12,9 @@ in force too. Without --config it is the reference set at rest; give the test si
 --play plays a test sheet, such as `antenna-drive propose` writes: its waveform, bias, circuit and
 elevation are set on the nodes, and the bag carries it.
 
+The drive runs in a namespace of its own, so that it meets no other one. To watch it with other
+tools, give it the plain names, or any others: --namespace / or --namespace /east.
+
 To record a drive that runs already: ros2 run antenna_drive recorder --ros-args -p out:=run
 """
 
@@ -50,6 +53,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='macro-step [s]; 0.001 if not given')
     parser.add_argument('--pace', type=float, default=0.0, metavar='K',
                         help='times real time; 0, as fast as possible, if not given')
+    parser.add_argument('--namespace', metavar='NS',
+                        help='ROS namespace of the drive, such as /east; / for none; one of its '
+                             'own if not given')
     parser.add_argument('--quiet', action='store_true', help='show no progress')
 
 
@@ -62,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
         for unit, values in _played(args.play, sheet, args.config).items():
             parameters[unit] = {**values, **parameters.get(unit, {})}
     steps = record_drive(parameters, args.config, args.out, sheet, args.duration, args.step,
-                         args.pace, args.quiet)
+                         args.pace, args.quiet, args.namespace)
     print(f'{steps} steps, {round(args.duration / args.step) * args.step:g} s: {args.out}')
     return 0
 
@@ -81,7 +87,7 @@ def _played(path: Path, sheet: TestSheet | None,
 
 def record_drive(parameters: Mapping[str, Mapping[str, Any]], config: Sequence[str], out: Path,
                  sheet: TestSheet | None, duration: float, step_s: float = 0.001,
-                 pace: float = 0.0, quiet: bool = False) -> int:
+                 pace: float = 0.0, quiet: bool = False, namespace: str | None = None) -> int:
     """
     Start a drive in its five processes and record it.
 
@@ -97,22 +103,28 @@ def record_drive(parameters: Mapping[str, Mapping[str, Any]], config: Sequence[s
         simulated time and macro-step [s]
     pace, quiet
         times real time, 0 for as fast as possible; and whether to show no progress
+    namespace
+        None for one of the drive's own, see drive_namespace
 
     Returns
     -------
-    number of steps that were recorded
+    number of steps that were recorded, which are all of them
 
     Raises
     ------
-    UserError : a node has ended by itself, or the bag cannot be written
+    AnotherDrive : the namespace is not free, or nodes of others have taken part
+    UserError : a node has ended by itself, the bag cannot be written or lacks steps, or the drive
+        had not the parameters that were asked for
 
     """
     recorder = RunRecorder(
         out, {f'{unit}/{s.name}': s.unit for unit, own in OUTPUTS.items() for s in own},
         sheet, recorded_by=_NAME)
+    from antenna_drive.lockstep.namespaces import drive_namespace
     from antenna_drive.lockstep.observer import Observer
     from antenna_drive.lockstep.processes import DriveProcesses
     from antenna_drive.lockstep.sampling import RunWatch
+    from antenna_drive.recording.own_drive import check_rows, check_settings
     last = round(duration / step_s)
     parameters = {**parameters, TEST_SIGNAL: {**parameters.get(TEST_SIGNAL, {}), **{
         'run.step': step_s, 'run.pace': pace, 'run.duration': last * step_s,
@@ -131,11 +143,15 @@ def record_drive(parameters: Mapping[str, Mapping[str, Any]], config: Sequence[s
         return recorder.knows_configuration or time.monotonic() > watch.deadline
 
     try:
-        with Observer(_NAME, step, on_begin=recorder.begin, on_change=recorder.told) as observer, \
-                DriveProcesses(parameters, config=config) as processes, \
-                Progress('recording', last, quiet=quiet) as progress:
+        with drive_namespace(namespace, 'record') as space, Observer(
+                _NAME, step, on_begin=recorder.begin, on_change=recorder.told,
+                namespace=space) as observer, \
+                DriveProcesses(parameters, config=config, namespace=space) as processes, \
+                Progress(f'recording {space}', last, quiet=quiet) as progress:
             watch = RunWatch(last, progress.update)
             observer.spin(complete)
     finally:
         recorder.close()
-    return recorder.steps
+    check_rows(out, last + 1)
+    check_settings(out, recorder.settings, parameters, config)
+    return last + 1

@@ -26,7 +26,7 @@ KEPT = 6000
 # A step this far ahead of the last one was not made by the drive.
 _FARTHEST = 100_000
 
-_RUN, _STEP, _STEP_S = range(len(HEADER))
+_RUN, _STEP, _STEP_S, _SENDER = range(len(HEADER))
 # kind, number of intervals, number of signals, a reserve; run, number of the first interval, its
 # length [s], time of the last step [s], macro-step [s]
 _PACKED = struct.Struct('<4I5d')
@@ -110,6 +110,7 @@ class History:
         self._per = max(1, round(INTERVAL_S / step_s))
         self._newest = -1
         self._last = dict.fromkeys(self._columns, -1)
+        self._senders: dict[str, float] = {}
         for ring in (self._lows, self._highs, self._ends):
             ring[:] = np.nan
 
@@ -145,7 +146,9 @@ class History:
                 # of a run that the conductor's frames, which are read first, did not tell yet
                 self._early[unit] = frames[frames[:, _RUN] > self._run]
             if self._run and len(mine):
-                self._file(unit, mine)
+                # where two nodes have one name, those of the first: a mixture is no curve
+                sender = self._senders.setdefault(unit, float(mine[0, _SENDER]))
+                self._file(unit, mine[mine[:, _SENDER] == sender])
 
     def _file(self, unit: str, frames: FloatArray) -> None:
         last = self._last[unit]

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 import secrets
 import signal
@@ -19,6 +20,7 @@ from antenna_drive.live.link import DriveLink
 from antenna_drive.live.own_processes import OwnDrive, RecorderProcess
 from antenna_drive.live.server import Server
 from antenna_drive.live.session import Session
+from antenna_drive.lockstep.namespaces import AnotherDrive, drive_namespace
 from simgap.errors import UserError
 
 
@@ -50,13 +52,22 @@ def serve(options: LiveOptions) -> int:
 
     Raises
     ------
+    AnotherDrive : there is a drive already where one is to be started
     UserError : a port is taken, a configuration or a namespace is not allowed
 
     """
     if options.foxglove is not None:
         # what is not installed is to be said before a drive is started
         import antenna_drive.live.foxglove  # noqa: F401
-    return asyncio.run(_serve(options))
+    with ExitStack() as held:
+        if not options.join:
+            # other tools look for the drive of a page where they were told: it has to be free
+            try:
+                space = held.enter_context(drive_namespace(options.namespace, 'live'))
+            except AnotherDrive as error:
+                raise AnotherDrive(f'{error}, or show it with --join') from None
+            options = replace(options, namespace=space)
+        return asyncio.run(_serve(options))
 
 
 async def _serve(options: LiveOptions) -> int:

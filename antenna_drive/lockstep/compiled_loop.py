@@ -17,7 +17,7 @@ from collections import namedtuple
 from typing import Any
 
 from antenna_drive.lockstep.delays import count
-from antenna_drive.lockstep.frame import HEADER, LATEST_BIRTH
+from antenna_drive.lockstep.frame import HEADER, LATEST_BIRTH, SENDER
 from antenna_drive.lockstep.inbox import DEPTH
 from antenna_drive.physics.block import rows
 from llvmlite import ir  # type: ignore[import-untyped]
@@ -27,7 +27,7 @@ from numba.extending import intrinsic
 import numpy as np
 from simgap.laws.compiling import inner, shared
 
-_HEADER = len(HEADER)
+_HEADER, _SENDER = len(HEADER), SENDER
 
 # Why the loop returns.
 STEPPED, LIMIT, FOREIGN, MISSING, LAST_STEP, FAULT, TAKE_FAILED, PUBLISH_FAILED = range(1, 9)
@@ -71,8 +71,8 @@ _CLOCK_MONOTONIC = 1
 _LONGEST_WAIT_S = 0.1
 
 State = namedtuple('State', (
-    'words', 'times', 'calls', 'peers', 'order', 'frames', 'held', 'used', 'sources', 'numbers',
-    'outgoing', 'clock', 'incoming', 'readings', 'scales', 'value', 'stamp', 'delays',
+    'words', 'times', 'calls', 'peers', 'order', 'frames', 'held', 'used', 'senders', 'sources',
+    'numbers', 'outgoing', 'clock', 'incoming', 'readings', 'scales', 'value', 'stamp', 'delays',
     'stamps', 'u', 'y'))
 
 
@@ -118,6 +118,9 @@ def _take(s: Any, peer: int) -> int:
         total += s.numbers[n]
     if s.numbers[0] != t[Time.run] or not np.isfinite(total):
         return FOREIGN
+    sender = s.numbers[_SENDER]
+    if sender != s.senders[peer] and not np.isnan(s.senders[peer]):  # NaN: none is known yet
+        return FOREIGN
     step = w[Word.step]
     if not s.peers[peer, Peer.stepping]:
         # an observer says how far it is
@@ -125,6 +128,7 @@ def _take(s: Any, peer: int) -> int:
         if used < 0.0 or used >= LATEST_BIRTH or used % 1.0 != 0.0:
             return FOREIGN
         s.used[peer] = max(s.used[peer], used)
+        s.senders[peer] = sender
         return _GO_ON
     slot = step % DEPTH
     if s.numbers[1] != step or s.held[peer, slot]:
@@ -132,6 +136,7 @@ def _take(s: Any, peer: int) -> int:
     for n in range(length):
         s.frames[peer, slot, n] = s.numbers[n]
     s.held[peer, slot] = 1
+    s.senders[peer] = sender
     return _GO_ON
 
 

@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.wiring import OUTPUTS
-from antenna_drive.lockstep.frame import LATEST_BIRTH, NO_RUN
+from antenna_drive.lockstep.frame import LATEST_BIRTH, NO_RUN, SENDER
 from antenna_drive.lockstep.inbox import DEPTH, Frame, Refusal
 from antenna_drive.lockstep.member import DECEIVED_STANDSTILL_S, Member, MEMORY
 
@@ -81,7 +81,9 @@ class Conductor(Member):
             else:
                 self._elsewhere_at[peer] = self.step
         elif peer in self.used and frame[0] == self.run:
-            self.used[peer] = max(self.used[peer], frame[1])
+            if self.inbox.speaks_for(peer, frame):
+                self.inbox.senders[peer] = frame[SENDER]
+                self.used[peer] = max(self.used[peer], frame[1])
         else:
             self.inbox.offer(peer, frame)
             for name, birth in self.inbox.hellos:

@@ -23,7 +23,7 @@ from antenna_drive.lockstep.compiled_loop import Call, Peer, Reading, Time, Word
 from antenna_drive.lockstep.compiled_unit import CompiledForm, form_of
 from antenna_drive.lockstep.conductor import Conductor, SLACK
 from antenna_drive.lockstep.delays import empty_counts
-from antenna_drive.lockstep.frame import HEADER, READING_PREFIX
+from antenna_drive.lockstep.frame import HEADER, READING_PREFIX, SENDER
 from antenna_drive.lockstep.inbox import DEPTH, Frame
 from antenna_drive.lockstep.member import Member
 from antenna_drive.lockstep.pace import Pace
@@ -122,7 +122,7 @@ def _state(peers: int, stepping: int, longest: int, length: int, readings: int, 
         words=np.zeros(len(Word), np.int64), times=np.zeros(len(Time)),
         calls=np.zeros(len(Call), np.int64), peers=np.zeros((peers, len(Peer)), np.int64),
         order=np.arange(stepping), frames=np.zeros((peers + 1, DEPTH, longest)),
-        held=np.zeros((peers, DEPTH), np.int64), used=np.zeros(peers),
+        held=np.zeros((peers, DEPTH), np.int64), used=np.zeros(peers), senders=np.zeros(peers),
         sources=np.zeros((inputs, 2), np.int64), numbers=np.zeros(longest),
         outgoing=np.zeros(length), clock=np.zeros(2, np.int64),
         incoming=np.zeros(loop.MESSAGE_WORDS, np.int64),
@@ -174,6 +174,7 @@ class Exchange:
                              own.length, len(channel.readings), len(member.sources),
                              form.outputs, stamps)._replace(
                                  incoming=channel.incoming)
+        s.outgoing[SENDER] = member.sender
         s.order[:] = [self._rows[peer] for peer in stepping]
         s.sources[:] = np.array(
             [(self._rows.get(peer, len(self._peers)), column) for peer, column in member.sources],
@@ -183,7 +184,7 @@ class Exchange:
         # what the addresses in `peers` and in the outgoing message point to
         self._prefixes = [np.frombuffer(member.layouts[peer].prefix, np.uint8)
                           for peer in self._peers]
-        self._out = np.frombuffer(bytearray(own.encode(0.0, 0, 0.0, bytes(own.packed_size))),
+        self._out = np.frombuffer(bytearray(own.encode(0.0, 0, 0.0, 0.0, bytes(own.packed_size))),
                                   np.uint8)
         for row, (peer, prefix) in enumerate(zip(self._peers, self._prefixes)):
             s.peers[row] = (channel.subscriptions[peer], prefix.ctypes.data, prefix.size,
@@ -298,6 +299,7 @@ class Exchange:
             for peer, used in member.used.items():
                 s.used[self._rows[peer]] = used
         for row, (peer, length) in enumerate(zip(self._peers, self._lengths)):
+            s.senders[row] = inbox.senders.get(peer, np.nan)
             for slot, frame in enumerate(inbox.slots[peer]):
                 s.held[row, slot] = frame is not None
                 if frame is not None:
@@ -317,6 +319,8 @@ class Exchange:
             inbox.slots[peer][:] = [
                 tuple(frames[slot, :length].tolist()) if held[slot] else None
                 for slot in range(DEPTH)]
+        inbox.senders.update((peer, sender) for peer, sender in zip(
+            self._peers, s.senders.tolist()) if not np.isnan(sender))
         if isinstance(member, Conductor):
             for peer in member.used:
                 member.used[peer] = float(s.used[self._rows[peer]])

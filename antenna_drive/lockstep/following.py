@@ -16,7 +16,7 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from antenna_drive.lockstep.frame import all_finite, HEADER, LARGEST_RUN, NO_RUN
+from antenna_drive.lockstep.frame import all_finite, HEADER, LARGEST_RUN, NO_RUN, SENDER
 
 Frame = tuple[float, ...]
 
@@ -44,7 +44,7 @@ class _Run:
         self.steps: dict[int, dict[str, Frame]] = {}
         self.complete: deque[int] = deque()
         self.next: int | None = None
-        self.heard: set[str] = set()
+        self.senders: dict[str, float] = {}
         # the conductor's newest step when every unit was heard: what is older are memories
         self.newest: int | None = None
 
@@ -79,8 +79,9 @@ class Follower:
     ----------
     run : the run in progress, 0 for none
     lost : steps that were missed after the first that was seen, in all runs together
-    refused : frames that are none: wrong length, NaN or infinite, no run, no step, or another
-        than was sent before
+    refused : frames that are none: wrong length, NaN or infinite, no run, no step, another than
+        was sent before, or of a second sender
+    doubled : of each unit in whose name two have sent frames of one run, those two
 
     """
 
@@ -104,6 +105,7 @@ class Follower:
         self.run = 0
         self.lost = 0
         self.refused = 0
+        self.doubled: dict[str, tuple[float, float]] = {}
         self._over = False
 
     def finish(self) -> None:
@@ -131,7 +133,11 @@ class Follower:
         return run
 
     def _file(self, unit: str, frame: Frame, run: _Run) -> None:
-        number = int(frame[1])
+        number, sender = int(frame[1]), run.senders.setdefault(unit, frame[SENDER])
+        if frame[SENDER] != sender:
+            self.refused += 1
+            self.doubled[unit] = sender, frame[SENDER]
+            return
         if run.next is not None and number < run.next:
             return
         frames = run.steps.get(number)
@@ -143,8 +149,7 @@ class Follower:
             self.refused += frames[unit] != frame
             return
         frames[unit] = frame
-        run.heard.add(unit)
-        if run.newest is None and len(run.heard) == len(self._lengths):
+        if run.newest is None and len(run.senders) == len(self._lengths):
             # A unit goes one step ahead of the conductor. The conductor may be waiting for the
             # follower, so the unit's last step need not become complete before this one begins.
             run.newest = max(number - (self._conductor not in of_step)

@@ -3,7 +3,7 @@
 """
 The frame: what one node tells the others about one macro-step, and its bytes on the wire.
 
-A frame is a std_msgs/Float64MultiArray holding run, step, step_s, then value and time
+A frame is a std_msgs/Float64MultiArray holding run, step, step_s, sender, then value and time
 derivative of each output of the unit. Its layout names them, so that a frame can be read
 without this package. Nothing here needs ROS.
 """
@@ -12,11 +12,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 import math
+import os
+import secrets
 import struct
 
 from antenna_drive.emulator.unit import Signal
 
-HEADER = ('run', 'step', 'step_s')
+HEADER = ('run', 'step', 'step_s', 'sender')
+SENDER = HEADER.index('sender')
+
+# A sender is a whole number that a double can hold: drawn at random, but for the last bits, which
+# are the number of its process (Linux has none greater), so that people find it.
+_PROCESS_BITS = 22
+_DRAWN_BITS = 30
 
 # A frame with this run is a hello: "I am here and have no part in any run".
 NO_RUN = 0.0
@@ -47,23 +55,24 @@ class FrameLayout:
         self.label = ', '.join(columns)
         self.prefix = _cdr_prefix(self.label, self.length)
         self._data = struct.Struct(f'<{self.length}d')
-        self._header = struct.Struct('<3d')
+        self._header = struct.Struct(f'<{len(HEADER)}d')
         self._outputs = struct.Struct(f'<{2 * len(self.signals)}d')
         self._size = len(self.prefix) + self._data.size
 
-    def encode(self, run: float, step: int, step_s: float, packed: bytes = b'') -> bytes:
+    def encode(self, run: float, step: int, step_s: float, sender: float,
+               packed: bytes = b'') -> bytes:
         """
         Return the serialised message.
 
         Parameters
         ----------
-        run, step, step_s
-            the run's id, the macro-step, its length [s]
+        run, step, step_s, sender
+            the run's id, the macro-step, its length [s], who sends it, see `new_sender`
         packed
             value and time derivative of each signal, as little-endian doubles
 
         """
-        return self.prefix + self._header.pack(run, step, step_s) + packed
+        return self.prefix + self._header.pack(run, step, step_s, sender) + packed
 
     @property
     def packed_size(self) -> int:
@@ -74,15 +83,32 @@ class FrameLayout:
         """Return the values and derivatives that `encode` packs behind the header."""
         return self._outputs.unpack(packed)
 
-    def hello(self, birth: float) -> bytes:
+    def hello(self, birth: float, sender: float) -> bytes:
         """Return the serialised hello of a node born at `birth` [us of wall time]."""
-        return self.encode(NO_RUN, int(birth), 0.0, bytes(self._outputs.size))
+        return self.encode(NO_RUN, int(birth), 0.0, sender, bytes(self._outputs.size))
 
     def decode(self, message: bytes) -> tuple[float, ...] | None:
         """Return the numbers of a message of exactly this layout, None for any other message."""
         if len(message) != self._size or not message.startswith(self.prefix):
             return None
         return self._data.unpack_from(message, len(self.prefix))
+
+
+def new_sender() -> float:
+    """Return an identity for a node of this process: no two nodes have the same."""
+    return float(secrets.randbits(_DRAWN_BITS) << _PROCESS_BITS | os.getpid())
+
+
+def process_of(sender: float) -> int:
+    """Return the number of the process that a sender is."""
+    return int(sender) % 2**_PROCESS_BITS
+
+
+def two_of_one_name(name: str, senders: tuple[float, float]) -> str:
+    """Say that two nodes of one name have sent frames of one run, and what to do."""
+    first, second = map(process_of, senders)
+    return (f'two nodes are called {name}, processes {first} and {second}; end one of them, or '
+            'give each drive a namespace of its own')
 
 
 def _cdr_prefix(label: str, length: int) -> bytes:

@@ -14,7 +14,7 @@ from collections.abc import Collection, Mapping
 from enum import Enum
 import math
 
-from antenna_drive.lockstep.frame import all_finite, LARGEST_RUN, LATEST_BIRTH, NO_RUN
+from antenna_drive.lockstep.frame import all_finite, LARGEST_RUN, LATEST_BIRTH, NO_RUN, SENDER
 
 # A neighbour may be one step ahead and its neighbour two; four is the next power of two.
 DEPTH = 4
@@ -37,6 +37,7 @@ class Refusal(str, Enum):
     TOO_FAR_AHEAD = 'too far ahead'
     DUPLICATE = 'duplicate'
     CONTRADICTION = 'contradicts an earlier frame'
+    SECOND_SENDER = 'second sender'
 
 
 class Inbox:
@@ -46,6 +47,8 @@ class Inbox:
     Attributes
     ----------
     run, step : the run in progress (0.0: none) and the step whose frames are wanted next
+    senders : who speaks for each peer in this run: whose frame of it was taken in first
+    doubled : of each peer in whose name another has sent frames of this run, those two
     refused : how many frames were refused, by (peer, reason)
     hellos : births [us] of peers that said hello, in order of arrival; the owner empties it
 
@@ -61,6 +64,8 @@ class Inbox:
         self.step = 0
         self.refused: Counter[tuple[str, Refusal]] = Counter()
         self.hellos: list[tuple[str, float]] = []
+        self.senders: dict[str, float] = {}
+        self.doubled: dict[str, tuple[float, float]] = {}
         self.slots: dict[str, list[Frame | None]] = {peer: [None] * DEPTH for peer in lengths}
         self._lengths = dict(lengths)
         self._stepping = {peer: slots for peer, slots in self.slots.items()
@@ -75,6 +80,8 @@ class Inbox:
         self.run = run
         self.step = step
         self._awaited = (run, float(step))
+        self.senders.clear()
+        self.doubled.clear()
         for slots in self.slots.values():
             slots[:] = [None] * DEPTH
         early, self._early = self._early, deque()
@@ -118,10 +125,12 @@ class Inbox:
         a fraction of their cost. Any other is left to them.
         """
         if (frame[:2] == self._awaited and len(frame) == self._lengths[peer]
-                and math.isfinite(sum(frame)) and peer in self._stepping):
+                and math.isfinite(sum(frame)) and peer in self._stepping
+                and frame[SENDER] == self.senders.get(peer, frame[SENDER])):
             slots = self._stepping[peer]
             slot = self.step % DEPTH
             if slots[slot] is None:
+                self.senders[peer] = frame[SENDER]
                 slots[slot] = frame
                 return True
         return False
@@ -191,9 +200,25 @@ class Inbox:
         """Return whether the next frame of a peer in good order would find a place."""
         return self.slots[peer][(self.step + DEPTH - 1) % DEPTH] is None
 
+    def speaks_for(self, peer: str, frame: Frame) -> bool:
+        """
+        Return whether a frame of this run is of the sender that speaks for the peer; else refuse.
+
+        A node that is started again joins no run that began before it. So two senders of one run
+        are two nodes of one name.
+        """
+        known = self.senders.get(peer, frame[SENDER])
+        if frame[SENDER] == known:
+            return True
+        self.doubled[peer] = known, frame[SENDER]
+        self.refuse(peer, Refusal.SECOND_SENDER)
+        return False
+
     def _file(self, peer: str, frame: Frame) -> None:
         step = int(frame[1])
         ahead = step - self.step
+        if not self.speaks_for(peer, frame):
+            return
         if ahead < 0:
             self.refuse(peer, Refusal.TOO_OLD)
         elif ahead >= DEPTH:
@@ -201,6 +226,7 @@ class Inbox:
         else:
             slots = self.slots[peer]
             held = slots[step % DEPTH]
+            self.senders[peer] = frame[SENDER]
             if held is None:
                 slots[step % DEPTH] = frame
             else:

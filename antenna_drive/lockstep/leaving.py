@@ -64,13 +64,13 @@ def _turn(name: str, deadline: float) -> Iterator[None]:
         return
     # A name in the abstract namespace is no file and vanishes with its process.
     with socket.socket(socket.AF_UNIX) as place:
-        while _is_taken(place, name) and time.monotonic() < deadline:
+        while is_taken(place, name) and time.monotonic() < deadline:
             time.sleep(_LOOK_S)
         yield
 
 
-def _is_taken(place: socket.socket, name: str) -> bool:
-    """Take a name, unless another process has it."""
+def is_taken(place: socket.socket, name: str) -> bool:
+    """Return whether another process has a name; if none has, the socket takes it."""
     try:
         place.bind(f'\0{name}')
     except OSError as error:

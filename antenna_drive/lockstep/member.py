@@ -14,7 +14,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
-from antenna_drive.lockstep.frame import all_finite, FrameLayout, HEADER, NO_RUN
+from antenna_drive.lockstep.frame import all_finite, FrameLayout, HEADER, new_sender, NO_RUN, SENDER
 from antenna_drive.lockstep.inbox import DEPTH, Frame, Inbox, Refusal
 import numpy as np
 
@@ -45,7 +45,7 @@ class Member:
     Attributes
     ----------
     run, step, step_s : the run (0.0: none yet), the step last put out, its length [s]
-    resting : True when the conductor has said that no run is in progress
+    sender : the identity of this member in all of its frames
     fault : why the unit cannot go on in this run, '' if it can
     sources : of each input of the unit, the peer and the column of its value in a frame
     packed : the bytes of the outputs last put out
@@ -95,8 +95,9 @@ class Member:
                            in_bulk)
         self.step = 0
         self.step_s = 0.0
-        self.resting = False
+        self.sender = new_sender()
         self.fault = ''
+        self._rests_at: tuple[float, int] | None = None
         self._announced: Frame | None = None
         self._announced_at = 0
         self._deceived_at: int | None = None  # the step at which a frame was last found false
@@ -114,6 +115,11 @@ class Member:
     def run(self) -> float:
         """Return the id of the run in progress, 0.0 for none."""
         return self.inbox.run
+
+    @property
+    def resting(self) -> bool:
+        """Return whether the conductor said after its last step that no run is in progress."""
+        return self._rests_at == (self.run, self.inbox.reached(self.conductor))
 
     def receive(self, peer: str, frame: Frame) -> None:
         """Take in a frame or refuse it."""
@@ -138,9 +144,10 @@ class Member:
     def _receive_from_conductor(self, frame: Frame) -> None:
         run, step, step_s = frame[:3]
         if run == NO_RUN:
-            self.resting = True
+            # that of another node says nothing of the run whose conductor is known
+            if frame[SENDER] == self.inbox.senders.get(self.conductor, frame[SENDER]):
+                self._rests_at = (self.run, self.inbox.reached(self.conductor))
         elif run == self.run:
-            self.resting = False
             self.inbox.offer(self.conductor, frame)
         elif run <= self.birth:
             self.inbox.forget(run)
@@ -222,7 +229,11 @@ class Member:
 
     def message(self) -> bytes:
         """Return the serialised message of the step last put out."""
-        return self.layout.encode(self.run, self.step, self.step_s, self.packed)
+        return self.layout.encode(self.run, self.step, self.step_s, self.sender, self.packed)
+
+    def hello(self) -> bytes:
+        """Return the serialised message that this member is here and takes part in no run."""
+        return self.layout.hello(self.birth, self.sender)
 
     def _begin(self, run: float, step_s: float, step: int = 0) -> FloatArray | None:
         if self._deceived_at is not None:
@@ -230,7 +241,6 @@ class Member:
         self.inbox.begin(run, step)
         self.step = step
         self.step_s = step_s
-        self.resting = False
         self.fault = ''
         return self._checked(self.unit.start(step_s))
 
@@ -261,7 +271,7 @@ class Member:
                 self.packed = packed
                 if self._reads_itself:
                     self._own_slots[self.step % DEPTH] = (
-                        self.run, float(self.step), self.step_s, *values)
+                        self.run, float(self.step), self.step_s, self.sender, *values)
                 return outputs
             signal = self.unit.outputs[
                 int(np.argmin(np.isfinite(outputs).all(axis=1)))].name

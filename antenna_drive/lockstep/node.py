@@ -292,7 +292,7 @@ class DriveNode:
             self._link.publish(self._member.message())
 
     def _hello(self) -> None:
-        self._link.publish(self._member.layout.hello(self._member.birth))
+        self._link.publish(self._member.hello())
 
     def _go_on(self) -> FloatArray | None:
         if self.tuning.pending:

@@ -22,7 +22,7 @@ from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.wiring import OUTPUTS
 from antenna_drive.lockstep.changes import read_record
 from antenna_drive.lockstep.entry import choose_transport
-from antenna_drive.lockstep.frame import NO_RUN
+from antenna_drive.lockstep.frame import NO_RUN, two_of_one_name
 from antenna_drive.lockstep.guest import Guest
 from antenna_drive.lockstep.inbox import Frame
 from antenna_drive.lockstep.leaving import leave
@@ -126,7 +126,7 @@ class Observer:
         if on_change is not None:
             self._listen(outputs, on_change)
         if not guest:
-            self._link.publish(self._member.layout.hello(birth))
+            self._link.publish(self._member.hello())
 
     def _listen(self, outputs: Mapping[str, Sequence[Signal]], on_change: OnChange) -> None:
         for unit in outputs:
@@ -156,6 +156,22 @@ class Observer:
     def missing(self) -> tuple[str, ...]:
         """Return the units that are waited for."""
         return self._member.missing()
+
+    @property
+    def senders(self) -> dict[str, float]:
+        """Return whose frames of this run are read, by unit."""
+        return dict(self._member.inbox.senders)
+
+    @property
+    def doubled(self) -> str:
+        """Say which name two nodes have that took part in this run or can do so, '' for none."""
+        for unit, senders in self._member.inbox.doubled.items():
+            return two_of_one_name(unit, senders)
+        for unit, count in self._link.publishers().items():
+            if count > 1:
+                return (f'{count} nodes are called {unit}; end all but one, or give each drive a '
+                        'namespace of its own')
+        return ''
 
     @property
     def resting(self) -> bool:

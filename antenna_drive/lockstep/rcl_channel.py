@@ -140,7 +140,7 @@ class RclChannel:
             Float64MultiArray, topic, lambda message: None, FRAME_QOS, raw=True,
             callback_group=NotForExecutors())
         try:
-            frame = FrameLayout(()).encode(1.0, 2, 3.0)
+            frame = FrameLayout(()).encode(1.0, 2, 3.0, 4.0)
             with publisher.handle, subscription.handle:
                 if self._round_trip(publisher.handle.pointer, subscription.handle.pointer,
                                     frame) != frame:

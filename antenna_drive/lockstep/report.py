@@ -10,6 +10,7 @@ from antenna_drive.lockstep.conductor import Conductor
 from antenna_drive.lockstep.delays import PERCENTILES
 from antenna_drive.lockstep.diagnostics import diagnostics
 from antenna_drive.lockstep.exchange import Exchange
+from antenna_drive.lockstep.frame import two_of_one_name
 from antenna_drive.lockstep.member import Member
 from antenna_drive.lockstep.pace import Pace
 from antenna_drive.lockstep.partner_link import PartnerLink
@@ -57,6 +58,7 @@ class Report:
         self._waiting_since: float | None = None
         self._told: str | None = None  # why it may wait in vain, as the log has it; None: no word
         self._fault_told = ''
+        self._doubled_told: set[tuple[float, str]] = set()  # by run and peer
         self._next_s = 0.0
         self._awake_s: float | None = None
         self._slept_s = 0.0
@@ -172,8 +174,16 @@ class Report:
             self.waiting(now)  # the log never says less than the report
             if self._told is not None and self._why() != self._told:
                 self._warn()
+        self._warn_of_doubles()
         level, message = self._judge(now)
         self._topic.publish(diagnostics(self._node, level, message, self._values(now)))
+
+    def _warn_of_doubles(self) -> None:
+        for peer, senders in self._member.inbox.doubled.items():
+            if (self._member.run, peer) not in self._doubled_told:
+                self._doubled_told.add((self._member.run, peer))
+                self._node.get_logger().warning(
+                    f'{two_of_one_name(peer, senders)}; frames of the second are refused')
 
     def _judge(self, now: float) -> tuple[bytes, str]:
         member = self._member
@@ -184,8 +194,10 @@ class Report:
             if member.fault:
                 return DiagnosticStatus.ERROR, member.fault
             if refused > self._refused_before:
-                return (DiagnosticStatus.WARN,
-                        f'{refused - self._refused_before} frames refused')
+                doubled_in_run = [two_of_one_name(peer, senders)
+                                  for peer, senders in member.inbox.doubled.items()]
+                return DiagnosticStatus.WARN, '; '.join([
+                    f'{refused - self._refused_before} frames refused', *doubled_in_run])
             if self._waits_long(now):
                 return DiagnosticStatus.WARN, self._waits_for()
             if self.partner is not None and self.partner.trouble():

@@ -11,6 +11,8 @@ import time
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.emulator.units import home
 from antenna_drive.emulator.wiring import TEST_SIGNAL
+from antenna_drive.lockstep.frame import process_of
+from antenna_drive.lockstep.namespaces import AnotherDrive, drive_namespace
 from antenna_drive.lockstep.observer import Observer
 from antenna_drive.lockstep.processes import DriveProcesses, Parameter
 import numpy as np
@@ -45,7 +47,7 @@ class Sampled:
 
 def sample_processes(steps: int, step_s: float, *, name: str = 'observer',
                      settings: Mapping[str, Parameter] | None = None,
-                     config: Sequence[str] = (), pace: float = 0.0, namespace: str = '',
+                     config: Sequence[str] = (), pace: float = 0.0, namespace: str | None = None,
                      domain_id: int | None = None,
                      progress: Callable[[int], None] | None = None) -> Sampled:
     """
@@ -56,11 +58,13 @@ def sample_processes(steps: int, step_s: float, *, name: str = 'observer',
     steps, step_s
         number and length [s] of the macro-steps
     name
-        name of the observing node
+        name of the observing node, and of the drive's own namespace
     settings
         parameters of the drive by dotted name, such as 'torque_share.circuit.bias_pot'
-    config, namespace, domain_id
+    config, domain_id
         see DriveProcesses
+    namespace
+        None for one of the drive's own, see drive_namespace
     pace
         how many times faster than real time, 0 for as fast as possible
     progress
@@ -68,6 +72,7 @@ def sample_processes(steps: int, step_s: float, *, name: str = 'observer',
 
     Raises
     ------
+    AnotherDrive : the namespace is not free, or nodes of others have taken part
     UserError : a process has ended by itself or the drive does not go on
 
     """
@@ -77,7 +82,6 @@ def sample_processes(steps: int, step_s: float, *, name: str = 'observer',
     for parameter, value in (settings or {}).items():
         unit, key = home(parameter)
         given.setdefault(unit, {})[key] = value
-    processes = DriveProcesses(given, config=config, namespace=namespace, domain_id=domain_id)
     watch = RunWatch(steps, progress)
     moments: dict[str, float] = {}
 
@@ -91,8 +95,10 @@ def sample_processes(steps: int, step_s: float, *, name: str = 'observer',
             samples[k] = values
             watch.done = k
 
-    with Observer(name, take, on_begin=begin, namespace=namespace,
-                  domain_id=domain_id) as observer, processes:
+    with drive_namespace(namespace, name, domain_id) as space, Observer(
+            name, take, on_begin=begin, namespace=space, domain_id=domain_id) as observer, \
+            DriveProcesses(given, config=config, namespace=space,
+                           domain_id=domain_id) as processes:
         moments['started'] = time.monotonic()
         samples = np.zeros((steps + 1, len(observer.names), 2))
         observer.spin(lambda: watch.complete(processes, observer))
@@ -126,13 +132,17 @@ class RunWatch:
 
         Raises
         ------
+        AnotherDrive : frames have come from a process that is none of these
         UserError : a process has ended, or no step comes any more
 
         """
         now = time.monotonic()
-        if self.done >= self._last or now < self._next_look:
-            return self.done >= self._last
+        if self.done < self._last and now < self._next_look:
+            return False
         self._next_look = now + 0.1
+        _check_senders(processes, observer)
+        if self.done >= self._last:
+            return True
         processes.check()
         if self.done != self._seen or observer.paused:
             self._seen, self.deadline = self.done, now + STEP_PATIENCE_S
@@ -142,3 +152,12 @@ class RunWatch:
             raise UserError(f'the drive does not go on at step {self.done + 1}: waiting for '
                             f'{", ".join(observer.missing)}')
         return False
+
+
+def _check_senders(processes: DriveProcesses, observer: Observer) -> None:
+    if observer.doubled:
+        raise AnotherDrive(f'{observer.doubled}: nobody knows whose values the others used')
+    for unit, sender in observer.senders.items():
+        if process_of(sender) != processes.process(unit).pid:
+            raise AnotherDrive(f'{unit}: its frames come from process {process_of(sender)}, which '
+                               'is none of this drive; give each drive a namespace of its own')

@@ -76,10 +76,10 @@ class Thinning:
 
         """
         frames = frames[np.isfinite(frames).all(axis=1)]
-        run, step, step_s = frames[:, :len(HEADER)].T
+        run, step, step_s, _ = frames[:, :len(HEADER)].T
         frames = frames[(run > NO_RUN) & (run < LARGEST_RUN) & (run % 1.0 == 0.0)
                         & (step >= 0.0) & (step < LARGEST_RUN) & (step_s > 0.0)]
-        _, step, step_s = frames[:, :len(HEADER)].T
+        _, step, step_s, _ = frames[:, :len(HEADER)].T
         every = np.maximum(1.0, np.round(1.0 / (self._rate_hz * step_s)))
         for frame in frames[step % every == 0.0]:
             key = int(frame[0]), int(frame[1])
@@ -94,7 +94,7 @@ class Thinning:
         for key in sorted(self._incomplete):
             frames = self._incomplete[key]
             if len(frames) == len(self._units):
-                step_s = float(frames[self._units[0]][len(HEADER) - 1])
+                step_s = float(frames[self._units[0]][HEADER.index('step_s')])
                 found.append(Thinned(*key, step_s, {
                     unit: frame[len(HEADER)::2] for unit, frame in frames.items()}))
                 self._last = key

@@ -17,7 +17,7 @@ from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.lockstep.changes import read_record
 from antenna_drive.lockstep.entry import ros_node
 from antenna_drive.lockstep.following import Follower, Step
-from antenna_drive.lockstep.frame import FrameLayout
+from antenna_drive.lockstep.frame import FrameLayout, new_sender, two_of_one_name
 from antenna_drive.lockstep.readings import CHANGES_QOS
 from antenna_drive.lockstep.ros_link import FrameLink
 from antenna_drive.lockstep.serving import Serving
@@ -49,7 +49,8 @@ def run(arguments: Sequence[str]) -> int:
 
     Returns
     -------
-    0 if everything was recorded, 1 if a bag could not be written or steps were lost
+    0 if everything was recorded, 1 if a bag could not be written, steps were lost, or two nodes
+    of one name took part
 
     Raises
     ------
@@ -88,7 +89,7 @@ class _RecorderNode:
             split_s=split_s or math.inf, recorded_by=NAME)
         layouts = {unit: FrameLayout(signals) for unit, signals in OUTPUTS.items()}
         self._follower = Follower({u: layout.length for u, layout in layouts.items()}, TEST_SIGNAL)
-        self._own = FrameLayout(())
+        self._own, self._sender = FrameLayout(()), new_sender()
         self._link = FrameLink(node, layouts)
         self._run = 0
         self._failed = False  # in this run
@@ -96,6 +97,7 @@ class _RecorderNode:
         self._stop = False
         self._told_lost = 0
         self._told_refused = 0
+        self._told_doubled: set[str] = set()
         self._ask_by = float('inf')
         for unit in OUTPUTS:
             node.create_subscription(String, f'{unit}/changes', self._listener(unit), CHANGES_QOS)
@@ -113,7 +115,7 @@ class _RecorderNode:
     def spin(self) -> int:
         """Record until told to stop; return the exit code."""
         serving = Serving(self._node)
-        self._link.publish(self._own.hello(float(time.time_ns() // 1000)))
+        self._link.publish(self._own.hello(float(time.time_ns() // 1000), self._sender))
         try:
             while not self._stop:
                 came = self._link.wait(tuple(OUTPUTS), _LONGEST_WAIT_S)
@@ -129,7 +131,8 @@ class _RecorderNode:
             serving.close()
         if self._recorder.steps and not self._failed:
             self._log.info(f'{self._recorder.steps} steps recorded to {self._recorder.path}')
-        return FAILED if self._ever_failed or self._follower.lost else OK
+        return (FAILED if self._ever_failed or self._follower.lost or self._follower.doubled
+                else OK)
 
     def _gather(self, peers: Iterable[str]) -> None:
         for peer in peers:
@@ -154,7 +157,7 @@ class _RecorderNode:
         self._publish(step, step.number + 1)
 
     def _publish(self, step: Step, number: int) -> None:
-        self._link.publish(self._own.encode(step.run, number, step.step_s))
+        self._link.publish(self._own.encode(step.run, number, step.step_s, self._sender))
 
     def _guarded(self, write: Any, *arguments: Any) -> bool:
         if self._failed:
@@ -174,6 +177,10 @@ class _RecorderNode:
                             'node was killed before it had sent them; '
                             '-p run.observers:=[recorder] on test_signal makes the drive wait')
         self._told_lost = lost
+        for unit in self._follower.doubled.keys() - self._told_doubled:
+            self._log.error(f'{two_of_one_name(unit, self._follower.doubled[unit])}: nobody knows '
+                            'whose values the others used')
+            self._told_doubled.add(unit)
         refused = self._recorder.refused + self._follower.refused
         if refused > self._told_refused:
             self._log.warning(f'{refused} messages refused: they are no frame or no change of '

@@ -78,6 +78,21 @@ def read_bag(path: str | Path, *, partial: bool = False) -> Recording:
         raise RecordingError(f'{path}: {error}') from None
 
 
+def message_counts(path: Path) -> dict[str, int]:
+    """
+    Return how many messages of each topic the description of a bag tells of.
+
+    Raises
+    ------
+    RecordingError : it is no bag, or it has no description
+
+    """
+    counts = _files(path)[1]
+    if not counts:
+        raise RecordingError(f'{path}: holds no description of its messages')
+    return counts
+
+
 def _files(path: Path) -> tuple[list[Path], dict[str, int] | None]:
     """Return the storage files of a bag in their order, and its topics' message counts."""
     if path.is_file():

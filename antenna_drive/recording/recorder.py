@@ -164,6 +164,11 @@ class RunRecorder:
         """Tell whether every unit has said what is in force in this run."""
         return set(self._settings.get(self._run, {})) >= self._units
 
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """Return by unit what it has said that is in force as this run begins."""
+        return dict(self._settings.get(self._run, {}))
+
     def _catch_up(self) -> None:
         fresh = False
         while True:

@@ -48,7 +48,7 @@ def main() -> int:
     node = Node(unit, enable_rosout=False, start_parameter_services=False)
     link = FrameLink(node, {peer: FrameLayout(OUTPUTS[peer]) for peer in peers_of(unit)})
     stamps = Stamps(path, int(last))
-    message = FrameLayout(OUTPUTS[unit]).encode(1.0, 1, 1e-3, bytes(16 * len(OUTPUTS[unit])))
+    message = FrameLayout(OUTPUTS[unit]).encode(1.0, 1, 1e-3, 1.0, bytes(16 * len(OUTPUTS[unit])))
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     if kind == 'compiled':
         bare_loop.compile_ahead()

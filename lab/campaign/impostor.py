@@ -23,7 +23,7 @@ import time
 from typing import Any
 
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL, UNITS
-from antenna_drive.lockstep.frame import FrameLayout
+from antenna_drive.lockstep.frame import FrameLayout, SENDER
 from antenna_drive.lockstep.leaving import leave
 from antenna_drive.lockstep.readings import CHANGES_QOS
 from antenna_drive.lockstep.ros_link import FRAME_QOS, FrameLink
@@ -46,6 +46,8 @@ class Garbage:
         self._rng = rng
         self._layouts = {unit: FrameLayout(signals) for unit, signals in OUTPUTS.items()}
         self.run, self.step = 0.0, 0
+        self.senders = dict.fromkeys(UNITS, 1.0)
+        self._sender = 1.0
         self._kinds: list[Callable[[FrameLayout], bytes]] = [
             self._bytes, self._numbers, self._other_run, self._past, self._ahead, self._broken,
             self._not_finite, self._other_length, self._hello, self._announcement]
@@ -53,12 +55,14 @@ class Garbage:
     def one(self) -> tuple[str, bytes]:
         """Return a unit in whose name to speak, and a message."""
         unit = self._rng.choice(UNITS)
+        self._sender = self.senders[unit]
         return unit, self._rng.choice(self._kinds)(self._layouts[unit])
 
     def _frame(self, layout: FrameLayout, run: float, step: float, values: Any = None) -> bytes:
         if values is None:
             values = [self._rng.gauss(0.0, 1.0) for _ in range(2 * len(layout.signals))]
-        return layout.prefix + struct.pack(f'<{3 + len(values)}d', run, step, 1e-3, *values)
+        return layout.prefix + struct.pack(f'<{4 + len(values)}d', run, step, 1e-3,
+                                           self._sender, *values)
 
     def _bytes(self, layout: FrameLayout) -> bytes:
         # the four bytes of the encapsulation are rcl's own: without them it logs each message
@@ -106,8 +110,7 @@ def garbage(node: Node, seed: int, count: int) -> None:
     """Publish `count` messages at 1 kHz, or as fast as it can."""
     rng = random.Random(seed)
     made = Garbage(rng)
-    layouts = {TEST_SIGNAL: FrameLayout(OUTPUTS[TEST_SIGNAL])}
-    link = FrameLink(node, layouts)
+    link = FrameLink(node, {unit: FrameLayout(signals) for unit, signals in OUTPUTS.items()})
     publishers = {unit: node.create_publisher(Float64MultiArray, f'{unit}/frame', FRAME_QOS)
                   for unit in UNITS}
     changes = {unit: node.create_publisher(String, f'{unit}/changes', CHANGES_QOS)
@@ -133,11 +136,16 @@ def garbage(node: Node, seed: int, count: int) -> None:
 
 
 def _follow(link: FrameLink, made: Garbage) -> None:
+    for unit in UNITS[1:]:
+        while (frame := link.take(unit)) is not None:
+            if len(frame) > SENDER and made.senders[unit] == 1.0:  # a genuine one comes first
+                made.senders[unit] = frame[SENDER]
     while (frame := link.take(TEST_SIGNAL)) is not None:
         # our own messages come back too: only a run that goes on is followed
         if len(frame) > 2 and frame[1] in (made.step + 1.0, made.step + 2.0) and (
                 frame[0] == made.run) or not made.run and len(frame) > 2 and frame[0] > 1e12:
             made.run, made.step = frame[0], int(frame[1])
+            made.senders[TEST_SIGNAL] = frame[SENDER]
 
 
 def echo(node: Node) -> None:

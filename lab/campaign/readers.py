@@ -178,7 +178,7 @@ def reader(name: str, folder: Path) -> Reader:
     assert name == 'frame'
     layout = FrameLayout(OUTPUTS['plant'])
     values = struct.pack('<12d', *range(12))
-    return Reader('frame', layout.encode(5.0, 3, 1e-3, values),
+    return Reader('frame', layout.encode(5.0, 3, 1e-3, 7.0, values),
                   lambda path: _frame(layout, (path / 'frame').read_bytes()))
 
 

@@ -21,7 +21,7 @@ def answered(name: str, act: Callable[[], int]) -> int:
     try:
         return act()
     except UserError as error:
-        return say(name, str(error), BAD_INPUT)
+        return say(name, str(error), error.status)
     except ModuleNotFoundError as error:
         needed = remedy(error)
         if needed is None:

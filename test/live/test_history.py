@@ -19,10 +19,10 @@ RUN = 1795262948317196
 def frames(unit: str, steps: Any, run: int = RUN, step_s: float = 1e-3) -> Any:
     """Return frames whose values tell their step and signal."""
     steps = np.asarray(steps)
-    rows = np.zeros((len(steps), 3 + 2 * SIGNALS[unit]))
+    rows = np.zeros((len(steps), 4 + 2 * SIGNALS[unit]))
     rows[:, 0], rows[:, 1], rows[:, 2] = run, steps, step_s
     for signal in range(SIGNALS[unit]):
-        rows[:, 3 + 2 * signal] = value(unit, signal, steps)
+        rows[:, 4 + 2 * signal] = value(unit, signal, steps)
     return rows
 
 
@@ -117,7 +117,7 @@ def test_what_the_drive_did_not_send_is_left_out() -> None:
     bad = frames('plant', [19, 3, 10**15, 10**7])
     odd = frames('plant', [20, 21, 22], run=RUN + 3)
     nan = frames('plant', [20])
-    nan[0, 4] = np.nan
+    nan[0, 5] = np.nan
     kept.take('plant', np.concatenate([bad, odd, nan]))
     kept.take('test_signal', frames('test_signal', [5], run=0))
     after = kept.since(0, 0)

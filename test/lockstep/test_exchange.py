@@ -38,19 +38,19 @@ class Conducted:
         self.channel = MemoryChannel(self.member.layout, self.member.layouts, self.sent.append,
                                      readings)
         self.exchange = Exchange(self.member, form, self.channel)
-        self.member.receive('plant', (0.0, 2.0, 0.0, 0.0, 0.0))
-        self.member.receive('watcher', (0.0, 2.0, 0.0))
+        self.member.receive('plant', (0.0, 2.0, 0.0, 7.0, 0.0, 0.0))
+        self.member.receive('watcher', (0.0, 2.0, 0.0, 8.0))
         assert self.member.new_run(10.0) is not None
         self.run_id = self.member.run
 
     def give(self, first: int, last: int) -> None:
         """Let the plant's frames arrive."""
         self.channel.arrived['plant'] += [
-            (self.run_id, float(k), 1e-3, 0.0, 0.0) for k in range(first, last + 1)]
+            (self.run_id, float(k), 1e-3, 7.0, 0.0, 0.0) for k in range(first, last + 1)]
 
     def report(self, *steps: int) -> None:
         """Let the observer's reports of its progress arrive."""
-        self.channel.arrived['watcher'] += [(self.run_id, float(k), 1e-3) for k in steps]
+        self.channel.arrived['watcher'] += [(self.run_id, float(k), 1e-3, 8.0) for k in steps]
 
 
 def test_every_unit_of_the_drive_has_a_loop_but_a_subclass_has_none() -> None:
@@ -90,7 +90,7 @@ def test_the_loop_gives_the_steps_of_python() -> None:
     assert drive.exchange.run(limit_s=60.0) == compiled_loop.LAST_STEP
     alone.start(1e-3)
     law = [alone.step(k, drive.exchange.outputs[:0]).ravel().tolist() for k in range(40)]
-    assert [list(frame[3:]) for frame in drive.sent] == law
+    assert [list(frame[4:]) for frame in drive.sent] == law
 
 
 def test_the_loop_publishes_readings_and_the_clock() -> None:
@@ -103,7 +103,7 @@ def test_the_loop_publishes_readings_and_the_clock() -> None:
     assert drive.exchange.run(every=1000, limit_s=60.0) == compiled_loop.LAST_STEP
     want = []
     for k in (1000, 2000, 3000):
-        values = drive.sent[k - 1][3:]
+        values = drive.sent[k - 1][4:]
         want += [(50, struct.pack('<4sd', b'\0\1\0\0', values[2])),
                  (51, struct.pack('<4sd', b'\0\1\0\0', 6.25 * values[0])),
                  (52, struct.pack('<4siI', b'\0\1\0\0', *divmod(70_300_000 * k, 10**9)))]

@@ -19,17 +19,17 @@ import pytest
 from simgap.logs.channel import RecordingError
 
 UNITS = {'test_signal': 1, 'motor_1': 2, 'plant': 1}
-LENGTHS = {unit: 3 + 2 * count for unit, count in UNITS.items()}
+LENGTHS = {unit: 4 + 2 * count for unit, count in UNITS.items()}
 RUN = 1_700_000_000_000_000
 
 
-def frame(unit: str, step: int, run: int = RUN) -> tuple[float, ...]:
+def frame(unit: str, step: int, run: int = RUN, sender: float = 7.0) -> tuple[float, ...]:
     """Return a frame whose values tell unit, signal and step."""
     base = 1000.0 * list(UNITS).index(unit)
     values: list[float] = []
     for signal in range(UNITS[unit]):
         values += [base + 100.0 * signal + 1e-3 * step, -1.0]
-    return (float(run), float(step), 1e-3, *values)
+    return (float(run), float(step), 1e-3, sender, *values)
 
 
 def expected(step: int) -> list[float]:

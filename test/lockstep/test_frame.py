@@ -27,16 +27,16 @@ def test_what_is_encoded_is_decoded_to_the_same_bits(
     count = len(layout.signals)
     numbers = data.draw(st.lists(finite, min_size=2 * count, max_size=2 * count))
     outputs = np.array(numbers, dtype=float).reshape(count, 2)
-    frame = layout.decode(layout.encode(float(run), step, 1e-3, outputs.tobytes()))
+    frame = layout.decode(layout.encode(float(run), step, 1e-3, 7.0, outputs.tobytes()))
     assert frame is not None
-    assert frame[:3] == (run, step, 1e-3)
-    assert np.array(frame[3:]).tobytes() == outputs.tobytes()
+    assert frame[:4] == (run, step, 1e-3, 7.0)
+    assert np.array(frame[4:]).tobytes() == outputs.tobytes()
 
 
 @given(layouts(), st.data())
 def test_a_message_of_another_length_is_not_decoded(
         layout: FrameLayout, data: st.DataObject) -> None:
-    message = layout.hello(5.0)
+    message = layout.hello(5.0, 7.0)
     cut = data.draw(st.integers(0, len(message) - 1))
     assert layout.decode(message[:cut]) is None
     assert layout.decode(message + b'\0' * (cut + 1)) is None
@@ -49,8 +49,8 @@ def test_rclpy_reads_our_bytes(layout: FrameLayout, run: int) -> None:
     messages = pytest.importorskip('std_msgs.msg', reason='std_msgs is not installed')
     outputs = np.arange(2.0 * len(layout.signals)).reshape(-1, 2)
     message = serialization.deserialize_message(
-        layout.encode(float(run), 7, 1e-3, outputs.tobytes()), messages.Float64MultiArray)
-    assert list(message.data) == [run, 7.0, 1e-3, *outputs.ravel()]
+        layout.encode(float(run), 7, 1e-3, 9.0, outputs.tobytes()), messages.Float64MultiArray)
+    assert list(message.data) == [run, 7.0, 1e-3, 9.0, *outputs.ravel()]
     [dimension] = message.layout.dim
     assert dimension.size == dimension.stride == layout.length
     assert len(dimension.label.split(', ')) == layout.length
@@ -88,7 +88,7 @@ def test_a_count_of_billions_is_refused_at_once() -> None:
 
 def test_the_labels_name_every_number_with_its_unit() -> None:
     layout = FrameLayout([Signal('axis_rate', 'rad/s', ''), Signal('current', 'A', '')])
-    assert layout.label == ('run, step, step_s, axis_rate [rad/s], d/dt axis_rate [rad/s^2], '
+    assert layout.label == ('run, step, step_s, sender, axis_rate [rad/s], d/dt axis_rate [rad/s^2], '
                             'current [A], d/dt current [A/s]')
 
 

@@ -39,7 +39,7 @@ class Speaker:
         layout = FrameLayout(OUTPUTS[unit])
         for step in steps:
             self._publishers[unit].publish(
-                layout.encode(run, step, 1e-3, bytes(layout.packed_size)))
+                layout.encode(run, step, 1e-3, 7.0, bytes(layout.packed_size)))
 
     def close(self) -> None:
         leave(self._node)

@@ -136,7 +136,7 @@ class Network:
             self.queues[other, name] = deque()
             # a new reader gets what a living writer remembers: here, its last frames
             self.queues[name, other] = self.queues.get((name, other), deque())
-        self.publish(name, (0.0, self.clock, 0.0, 0.0, 0.0, 0.0, 0.0))
+        self.publish(name, (0.0, self.clock, 0.0, self.members[name].sender, *[0.0] * 4))
 
     def _compile(self, name: str) -> None:
         member = self.members[name]
@@ -145,9 +145,9 @@ class Network:
         self.exchanges[name] = Exchange(member, FORMS[Chaotic](member.unit), channel)
 
     def _sent_by_loop(self, name: str, frame: tuple[float, ...]) -> None:
-        self.sent[name, frame[0]].append(np.array(frame[3:]).reshape(2, 2))
+        self.sent[name, frame[0]].append(np.array(frame[4:]).reshape(2, 2))
         assert len(self.sent[name, frame[0]]) == frame[1] + 1
-        assert frame[2] == self.step_s
+        assert frame[2:4] == (self.step_s, self.members[name].sender)
         self.publish(name, frame)
 
     def publish(self, name: str, frame: tuple[float, ...]) -> None:
@@ -160,7 +160,8 @@ class Network:
         for name, member in self.members.items():
             for other in self.members:
                 if other != name:
-                    self.queues[name, other].append((0.0, member.birth, *[0.0] * 5))
+                    self.queues[name, other].append(
+                        (0.0, member.birth, 0.0, member.sender, *[0.0] * 4))
 
     def deliver(self, source: str, target: str) -> None:
         queue = self.queues.get((source, target))
@@ -202,7 +203,7 @@ class Network:
         if outputs is not None:
             self.sent.setdefault((name, member.run), []).append(outputs.copy())
             assert len(self.sent[name, member.run]) == member.step + 1
-            self.publish(name, (member.run, float(member.step), member.step_s,
+            self.publish(name, (member.run, float(member.step), member.step_s, member.sender,
                                 *outputs.ravel().tolist()))
 
     def _has_arrived(self, name: str) -> bool:
@@ -312,7 +313,7 @@ foreign = st.tuples(
 
 @settings(deadline=None, max_examples=100)
 @given(some, st.lists(st.tuples(st.sampled_from(UNITS[1:]), st.sampled_from(UNITS),
-                                foreign, st.sampled_from([0, 3, 7, 8])), max_size=40))
+                                foreign, st.sampled_from([0, 4, 8, 9])), max_size=40))
 def test_foreign_frames_change_nothing_and_are_counted(
         in_loops: Collection[str], attacks: list[tuple[str, str, tuple[float, ...], int]]) -> None:
     network = Network(in_loops)
@@ -326,13 +327,14 @@ def test_foreign_frames_change_nothing_and_are_counted(
     counted = 0
     for source, target, head, length in attacks:
         member = network.members[target]
-        frame = (*head, *[0.25] * 4)[:length] if length <= 7 else (*head, *[0.25] * 5)
-        if len(frame) == 7 and frame[0] == run and float(frame[1]).is_integer():
+        # in every other respect it is the peer's own
+        frame = (*head, network.members[source].sender, *[0.25] * 5)[:length]
+        if len(frame) == 8 and frame[0] == run and float(frame[1]).is_integer():
             continue  # a frame that looks right in everything cannot be told from a right one
         if source in member.peers:
             network.attack(source, target, frame)
             # what is left over of a past run passes, and is no refusal
-            counted += not (len(frame) == 7 and frame[0] in past)
+            counted += not (len(frame) == 8 and frame[0] in past)
         network.settle(1)
     network.settle(40)
     assert {member.run for member in network.members.values()} == {run}
@@ -348,7 +350,7 @@ def invent(network: Network, target: str, run: float) -> None:
     """Let a member hear of another run, as if from the conductor."""
     if run < 1000.0:
         run += network.members['test_signal'].run
-    network.members[target].receive('test_signal', (run, 0.0, 1e-3, *[0.25] * 4))
+    network.members[target].receive('test_signal', (run, 0.0, 1e-3, 7.0, *[0.25] * 4))
 
 
 def begun_network(in_loops: Collection[str]) -> Network:
@@ -422,7 +424,7 @@ def test_an_invented_hello_ends_no_run_and_leaves_room_for_the_next(
     network = begun_network(in_loops)
     run = network.members['test_signal'].run
     conductor = network.members['test_signal']
-    conductor.receive('plant', (0.0, birth, *[0.0] * 5))
+    conductor.receive('plant', (0.0, birth, 0.0, 7.0, *[0.0] * 4))
     network.quiet = False  # the plant goes on
     network.settle(20)
     network.quiet = True
@@ -518,13 +520,13 @@ def test_a_frame_that_comes_before_the_announcement_of_its_run_is_kept(invented:
     values = [0.25] * 4
     for run in (invented, 30.0, 31.0):
         if run == invented:
-            member.receive('test_signal', (run, 0.0, 1e-3, *values))
+            member.receive('test_signal', (run, 0.0, 1e-3, 7.0, *values))
             member.go_on()
             # both runs reach the plant before this member hears of either
-            member.receive('plant', (30.0, 0.0, 1e-3, *values))
-            member.receive('plant', (31.0, 0.0, 1e-3, *values))
+            member.receive('plant', (30.0, 0.0, 1e-3, 7.0, *values))
+            member.receive('plant', (31.0, 0.0, 1e-3, 7.0, *values))
         else:
-            member.receive('test_signal', (run, 0.0, 1e-3, *values))
+            member.receive('test_signal', (run, 0.0, 1e-3, 7.0, *values))
             assert member.go_on() is not None
         assert (member.run, member.step) == (run, 0)
     assert member.go_on() is not None
@@ -533,15 +535,15 @@ def test_a_frame_that_comes_before_the_announcement_of_its_run_is_kept(invented:
 
 
 def test_who_is_slow_is_named_first_but_bulk_is_waited_for_at_no_step() -> None:
-    inbox = Inbox({'plant': 3, 'motor_1': 3, 'recorder': 3}, in_bulk=('recorder',))
+    inbox = Inbox({'plant': 4, 'motor_1': 4, 'recorder': 4}, in_bulk=('recorder',))
     inbox.begin(9.0)
     inbox.put_first('motor_1')
     inbox.put_first('recorder')
     assert inbox.missing() == ('motor_1', 'plant')
     for peer in inbox.missing():
-        assert inbox.accept(peer, (9.0, 0.0, 1e-3))
+        assert inbox.accept(peer, (9.0, 0.0, 1e-3, 7.0))
     assert not inbox.missing()
-    assert not inbox.accept('recorder', (9.0, 0.0, 1e-3))
+    assert not inbox.accept('recorder', (9.0, 0.0, 1e-3, 7.0))
 
 
 @pytest.mark.parametrize('frame', [
@@ -583,13 +585,13 @@ class Listener(Unit):
 @settings(deadline=None, max_examples=60)
 @given(st.lists(st.integers(0, 15), min_size=5, max_size=5),
        st.lists(st.sampled_from(UNITS), max_size=200),
-       st.sampled_from([[], [('test_signal', (2.0**51, 0.0, 1e-3, *[0.25] * 4))],
-                        [('plant', (10.0, 7.0, 1e-3, *[0.25] * 4))]]))
+       st.sampled_from([[], [('test_signal', (2.0**51, 0.0, 1e-3, 7.0, *[0.25] * 4))],
+                        [('plant', (10.0, 7.0, 1e-3, 7.0, *[0.25] * 4))]]))
 def test_a_guest_joins_in_the_middle_and_misses_nothing_from_there(
         forgotten: list[int], choices: list[str],
         invented: list[tuple[str, tuple[float, ...]]]) -> None:
     history = expected(40, 1e-3)
-    queues = {name: deque((9.0, float(k), 1e-3, *history[name][k].ravel().tolist())
+    queues = {name: deque((9.0, float(k), 1e-3, 7.0, *history[name][k].ravel().tolist())
                           for k in range(first, 41))
               for name, first in zip(UNITS, forgotten)}
     listener = Listener('guest')
@@ -630,7 +632,7 @@ def test_a_guest_joins_again_behind_a_hole_in_what_it_is_told_of_the_past(
     queues = {}
     for name in UNITS:
         begin, length = holes.get(name, (0, 0))
-        queues[name] = deque((9.0, float(k), 1e-3, *history[name][k].ravel().tolist())
+        queues[name] = deque((9.0, float(k), 1e-3, 7.0, *history[name][k].ravel().tolist())
                              for k in range(last + 1) if not begin <= k < begin + length)
     listener = Listener('guest')
     guest = Guest(listener, OUTPUTS)
@@ -651,7 +653,7 @@ def conductor_with_recorder(last_step: int | None = None) -> Conductor:
     """Return a conductor that has begun a run, for which its recorder has yet to begin."""
     conductor = Conductor(Chaotic('test_signal'), 1.0, 1e-3, last_step, OUTPUTS, ('recorder',))
     for name in (*UNITS[1:], 'recorder'):
-        conductor.receive(name, (0.0, 2.0, 0.0, *([] if name == 'recorder' else [0.0] * 4)))
+        conductor.receive(name, (0.0, 2.0, 0.0, 7.0, *([] if name == 'recorder' else [0.0] * 4)))
     assert conductor.new_run(10.0) is not None
     return conductor
 
@@ -660,7 +662,7 @@ def step_as_far_as_possible(conductor: Conductor) -> int:
     for _ in range(SLACK + 50):
         for name in UNITS[1:]:
             if name in conductor.missing():
-                conductor.receive(name, (conductor.run, float(conductor.step), 1e-3, *[0.5] * 4))
+                conductor.receive(name, (conductor.run, float(conductor.step), 1e-3, 7.0, *[0.5] * 4))
         conductor.go_on()
     return conductor.step
 
@@ -670,17 +672,17 @@ def test_the_conductor_waits_for_an_observer_that_falls_behind() -> None:
     run = conductor.run
     assert step_as_far_as_possible(conductor) == 0, 'the recorder has not begun the run'
     assert conductor.missing() == ('recorder',)
-    conductor.receive('recorder', (run, 0.0, 1e-3))
+    conductor.receive('recorder', (run, 0.0, 1e-3, 7.0))
     assert step_as_far_as_possible(conductor) == SLACK + 1
     assert conductor.missing() == ('recorder',)
-    conductor.receive('recorder', (run, 5.0, 1e-3))
+    conductor.receive('recorder', (run, 5.0, 1e-3, 7.0))
     assert step_as_far_as_possible(conductor) == SLACK + 6
-    conductor.receive('recorder', (run, 500.0, 1e-3))
+    conductor.receive('recorder', (run, 500.0, 1e-3, 7.0))
     assert step_as_far_as_possible(conductor) == SLACK + 21, (
         'one more than the last: nobody uses it')
     assert not conductor.ended
     assert conductor.missing() == ('recorder',)
-    conductor.receive('recorder', (run, SLACK + 21.0, 1e-3))
+    conductor.receive('recorder', (run, SLACK + 21.0, 1e-3, 7.0))
     step_as_far_as_possible(conductor)
     assert conductor.ended
 
@@ -688,7 +690,7 @@ def test_the_conductor_waits_for_an_observer_that_falls_behind() -> None:
 def waiting_for_its_recorder() -> Conductor:
     """Return a conductor that has made every step that its recorder, at step 5, lets it make."""
     conductor = conductor_with_recorder()
-    conductor.receive('recorder', (conductor.run, 5.0, 1e-3))
+    conductor.receive('recorder', (conductor.run, 5.0, 1e-3, 7.0))
     step_as_far_as_possible(conductor)
     assert conductor.missing() == ('recorder',)
     return conductor
@@ -697,7 +699,7 @@ def waiting_for_its_recorder() -> Conductor:
 def test_an_observer_that_was_led_into_an_invented_run_is_fetched_back() -> None:
     conductor = waiting_for_its_recorder()
     run = conductor.run
-    conductor.receive('recorder', (run + 7.0, 0.0, 1e-3))
+    conductor.receive('recorder', (run + 7.0, 0.0, 1e-3, 7.0))
     assert conductor.new_run(20.0) is None, 'the drive does not stand still yet'
     assert conductor.new_run(20.0, stands_still=True) is not None
     assert conductor.run > run + 7.0
@@ -706,8 +708,8 @@ def test_an_observer_that_was_led_into_an_invented_run_is_fetched_back() -> None
 def test_an_observer_that_reads_on_has_not_left() -> None:
     """The other run was somebody else's word in the observer's name."""
     conductor = waiting_for_its_recorder()
-    conductor.receive('recorder', (conductor.run + 7.0, 0.0, 1e-3))
-    conductor.receive('recorder', (conductor.run, 6.0, 1e-3))
+    conductor.receive('recorder', (conductor.run + 7.0, 0.0, 1e-3, 7.0))
+    conductor.receive('recorder', (conductor.run, 6.0, 1e-3, 7.0))
     step_as_far_as_possible(conductor)
     assert conductor.missing()[-1:] == ('recorder',)
     assert conductor.new_run(20.0, stands_still=True) is None
@@ -717,15 +719,15 @@ def test_a_node_that_was_killed_before_an_observer_had_its_frames_is_not_waited_
     """The conductor has those frames; the observer never gets them, and can say nothing."""
     conductor = waiting_for_its_recorder()
     assert conductor.new_run(20.0, stands_still=True) is None, 'a slow observer is no reason'
-    conductor.receive('plant', (0.0, 12.0, 0.0, *[0.0] * 4))
+    conductor.receive('plant', (0.0, 12.0, 0.0, 7.0, *[0.0] * 4))
     assert conductor.patience_s == DECEIVED_STANDSTILL_S, 'the observer may just take its time'
     assert conductor.new_run(20.0, stands_still=True) is not None
 
 
 def test_a_hello_is_false_if_the_observer_and_the_member_go_on() -> None:
     conductor = waiting_for_its_recorder()
-    conductor.receive('plant', (0.0, 12.0, 0.0, *[0.0] * 4))
-    conductor.receive('recorder', (conductor.run, 5.0 + 2 * DEPTH, 1e-3))
+    conductor.receive('plant', (0.0, 12.0, 0.0, 7.0, *[0.0] * 4))
+    conductor.receive('recorder', (conductor.run, 5.0 + 2 * DEPTH, 1e-3, 7.0))
     step_as_far_as_possible(conductor)
     assert 'recorder' in conductor.missing()
     assert conductor.new_run(20.0, stands_still=True) is None
@@ -751,7 +753,7 @@ def test_who_was_deceived_is_patient_for_a_second_of_steps(in_loops: Collection[
 
 
 @pytest.mark.parametrize('frame', [
-    (9.0, 0.0, 1e-3), (math.nan, 0.0, 1e-3, *[0.5] * 4), (9.0, 0.5, 1e-3, *[0.5] * 4)])
+    (9.0, 0.0, 1e-3), (math.nan, 0.0, 1e-3, 7.0, *[0.5] * 4), (9.0, 0.5, 1e-3, 7.0, *[0.5] * 4)])
 @none_some_all
 def test_a_frame_that_no_node_makes_is_a_warning(
         in_loops: Collection[str], frame: tuple[float, ...]) -> None:
@@ -768,8 +770,8 @@ def test_a_frame_that_no_node_makes_is_a_warning(
 
 def test_a_member_that_went_on_after_a_hello_in_its_name_was_spoken_for() -> None:
     conductor = conductor_with_recorder()
-    hello = (0.0, 5.0, 0.0, *[0.0] * 4)
-    conductor.receive('recorder', (conductor.run, 0.0, 1e-3))
+    hello = (0.0, 5.0, 0.0, 7.0, *[0.0] * 4)
+    conductor.receive('recorder', (conductor.run, 0.0, 1e-3, 7.0))
     conductor.receive('plant', hello)
     assert conductor.patience_s == STANDSTILL_S, 'it may be true'
     step_as_far_as_possible(conductor)
@@ -782,6 +784,6 @@ def test_a_member_that_went_on_after_a_hello_in_its_name_was_spoken_for() -> Non
 
 def test_a_hello_begins_a_new_run_only_where_the_drive_stands_still() -> None:
     conductor = conductor_with_recorder()
-    conductor.receive('plant', (0.0, 12.0, 0.0, *[0.0] * 4))
+    conductor.receive('plant', (0.0, 12.0, 0.0, 7.0, *[0.0] * 4))
     assert conductor.new_run(20.0) is None
     assert conductor.new_run(20.0, stands_still=True) is not None

@@ -17,9 +17,9 @@ RUN = 1795262948317196
 def frames(unit: str, steps: Any, run: int = RUN, step_s: float = 1e-3) -> Any:
     """Return frames of one signal, which tells its step and unit."""
     steps = np.asarray(list(steps), float)
-    rows = np.zeros((len(steps), 5))
+    rows = np.zeros((len(steps), 6))
     rows[:, 0], rows[:, 1], rows[:, 2] = run, steps, step_s
-    rows[:, 3] = steps + 0.5 * UNITS.index(unit)
+    rows[:, 4] = steps + 0.5 * UNITS.index(unit)
     return rows
 
 
@@ -44,7 +44,7 @@ def test_what_was_not_sent_is_left_out_and_another_run_begins_at_0() -> None:
     thinning.take('plant', frames('plant', [0, 10, 20, 30]))
     thinning.take('motor_1', frames('motor_1', [0, 20, 30]))
     bad = frames('motor_1', [40] * 5)
-    bad[0, 4], bad[1, 0], bad[2, 2], bad[3, 1], bad[4, 0] = np.nan, 0.0, 0.0, -10.0, np.inf
+    bad[0, 5], bad[1, 0], bad[2, 2], bad[3, 1], bad[4, 0] = np.nan, 0.0, 0.0, -10.0, np.inf
     thinning.take('motor_1', bad)
     thinning.take('plant', frames('plant', [40]))
     assert [step.step for step in thinning.complete()] == [0, 20, 30]

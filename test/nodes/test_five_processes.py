@@ -176,12 +176,13 @@ def _change_live(watch: Watch) -> None:
 
 
 def _attack(watch: Watch, recorder: Recorder) -> None:
-    length = 3 + 2 * sum(name.startswith('plant/') for name in recorder.observer.names)
-    rest = [0.5] * (length - 3)
+    sender = recorder.observer.senders['plant']
+    rest = [sender, *[0.5] * (2 * sum(
+        name.startswith('plant/') for name in recorder.observer.names))]
     run = float(recorder.runs[-1])
     soon = float(recorder.steps)
     watch.publish_frames('plant/frame', [
-        [run, soon, 2e-3, math.nan, *rest[1:]],
+        [run, soon, 2e-3, sender, math.nan, *rest[2:]],
         [run, soon, 2e-3, *rest[1:], math.inf],
         [run, soon, 2e-3, *rest[1:]],
         [3.0, soon, 2e-3, *rest],
@@ -208,7 +209,7 @@ def _invent_runs(watch: Watch, recorder: Recorder) -> None:
 def _announcement(recorder: Recorder, run: float) -> list[float]:
     """Return frame 0 of a run, as if from test_signal."""
     signals = sum(name.startswith('test_signal/') for name in recorder.observer.names)
-    return [run, 0.0, 1e-3, *[0.5] * (2 * signals)]
+    return [run, 0.0, 1e-3, recorder.observer.senders['test_signal'], *[0.5] * (2 * signals)]
 
 
 @pytest.mark.usefixtures('fresh_domain')

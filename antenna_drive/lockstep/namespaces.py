@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Where a drive runs, so that it meets no other one.
+
+Nodes of the same name in the same namespace and domain hear each other, and everybody's domain is
+0 unless they say otherwise. Who starts a drive that nobody else has to find gives it a namespace
+of its own. A namespace that was asked for must be free: no drive of this machine that was started
+by us holds it, which cannot be missed, and no nodes of these names are seen. What this leaves
+undiscovered, nodes that somebody starts later or on another machine, the frames tell by their
+senders.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+import os
+import secrets
+import socket
+import sys
+import time
+
+from antenna_drive.emulator.wiring import UNITS
+from antenna_drive.lockstep.entry import choose_transport
+from antenna_drive.lockstep.leaving import is_taken, leave
+from rclpy.context import Context
+from rclpy.node import Node
+from simgap.errors import UserError
+
+# For how long to look for nodes [s]; they find each other in a tenth of it.
+_LOOK_S = 1.0
+_GLANCE_S = 0.05
+
+
+class AnotherDrive(UserError):
+    """Another drive has the names of this one, or took part in it."""
+
+    status = 1
+
+
+@contextmanager
+def drive_namespace(given: str | None, command: str, domain_id: int | None = None,
+                    units: Collection[str] = UNITS) -> Iterator[str]:
+    """
+    Give a drive its namespace, as long as it runs.
+
+    Parameters
+    ----------
+    given
+        the namespace that was asked for, '' or '/' for none; None for one of the drive's own
+    command
+        what the drive is started for; a namespace of its own begins with it
+    domain_id
+        the ROS 2 domain; None for the one in the environment
+    units
+        the names of the drive's nodes
+
+    Yields
+    ------
+    the namespace, '/east', or '' for none
+
+    Raises
+    ------
+    AnotherDrive : the namespace is not free
+    UserError : it is no name of a namespace
+
+    """
+    if given is None:
+        yield f'/{command}_{secrets.token_hex(4)}'
+        return
+    namespace = f'/{given.strip("/")}'.rstrip('/')
+    choose_transport(os.environ)
+    context = Context()
+    context.init(args=[], domain_id=domain_id)
+    try:
+        node = Node(f'look_{os.getpid()}', namespace=namespace, context=context)
+    except ValueError as error:  # rclpy names what is wrong with it
+        context.try_shutdown()
+        raise UserError(f'--namespace {given}: {error}') from error
+    domain = context.get_domain_id()
+    with _held(f'antenna_drive/drive/{domain}{namespace}') as free:
+        try:
+            found = _seen(node, namespace, units) if free else list(units)
+        finally:
+            leave(node)
+        if found:
+            raise AnotherDrive(
+                f'a drive runs already in namespace {namespace or "/"} of ROS domain {domain} '
+                f'({", ".join(found)}); end it, or choose another with --namespace')
+        yield namespace
+
+
+def _seen(node: Node, namespace: str, units: Collection[str]) -> list[str]:
+    """Return the units whose names nodes have in a namespace."""
+    deadline = time.monotonic() + _LOOK_S
+    while True:
+        there = set(node.get_node_names_and_namespaces())
+        found = [unit for unit in units if (unit, namespace or '/') in there]
+        if found or time.monotonic() > deadline:
+            return found
+        time.sleep(_GLANCE_S)
+
+
+@contextmanager
+def _held(name: str) -> Iterator[bool]:
+    """Hold a name on this machine; yield whether it was free."""
+    if sys.platform != 'linux':
+        yield True
+        return
+    with socket.socket(socket.AF_UNIX) as place:
+        yield not is_taken(place, name)
