@@ -125,6 +125,19 @@ def test_what_the_drive_did_not_send_is_left_out() -> None:
     assert after.highs.tolist() == before.highs.tolist()
 
 
+def test_two_nodes_of_one_name_are_not_mixed_in_one_curve() -> None:
+    kept, alone = History(SIGNALS, 'test_signal'), History(SIGNALS, 'test_signal')
+    other = frames('plant', range(40))
+    other[:, 3], other[:, 4:] = 8.0, 5.0
+    kept.take('test_signal', frames('test_signal', range(40)))
+    kept.take('plant', np.concatenate([frames('plant', range(20)), other]))
+    kept.take('plant', np.concatenate([other, frames('plant', range(20, 40))]))
+    for unit in SIGNALS:
+        alone.take(unit, frames(unit, range(40)))
+    assert kept.since(0, 0).highs.tolist() == alone.since(0, 0).highs.tolist()
+    assert kept.lost == 0
+
+
 def test_the_page_reads_what_was_packed() -> None:
     kept = History(SIGNALS, 'test_signal')
     for unit in SIGNALS:

@@ -200,6 +200,25 @@ def test_invented_frames_take_no_step_away(
     assert follower.lost == 0
 
 
+def test_frames_of_a_second_node_of_one_name_are_refused_and_told() -> None:
+    follower = Follower(LENGTHS, 'test_signal')
+    assert feed(follower, range(3)) == [0, 1, 2]
+    for k in range(1, 6):  # it may be late, or the first
+        other = (*frame('plant', k, sender=8.0)[:4], -5.0, -5.0)
+        follower.receive('plant', other)
+    assert (follower.refused, follower.doubled) == (5, {'plant': (7.0, 8.0)})
+    for k in range(3, 6):
+        for unit in UNITS:
+            follower.receive(unit, frame(unit, k))
+    assert [step.values for step in follower.steps()] == [expected(k) for k in range(3, 6)]
+    follower = Follower(LENGTHS, 'test_signal')
+    feed(follower, range(3))
+    for unit in UNITS:  # a node that was started again is none: it takes part in younger runs
+        follower.receive(unit, frame(unit, 0, RUN + 1, sender=9.0))
+    assert [step.number for step in follower.steps()] == [0]
+    assert not follower.doubled
+
+
 def test_a_flood_of_invented_steps_is_not_kept() -> None:
     follower = Follower(LENGTHS, 'test_signal')
     feed(follower, range(2))

@@ -106,13 +106,15 @@ def test_its_compiled_loop_puts_out_the_answer_and_sees_the_inputs() -> None:
     answer = (0.0, *np.arange(1.0, len(unit.outputs) + 1.0))
     unit.tune({'answer': answer})
     for k in range(3):
-        channel.arrived['plant'].append((RUN, float(k), 1e-3, 7.0, *(k + np.array(zeros['plant']))))
+        channel.arrived['plant'].append(
+            (RUN, float(k), 1e-3, 7.0, *(k + np.array(zeros['plant']))))
         if k:
-            channel.arrived['test_signal'].append((RUN, float(k), 1e-3, 7.0, *zeros['test_signal']))
+            channel.arrived['test_signal'].append(
+                (RUN, float(k), 1e-3, 7.0, *zeros['test_signal']))
     exchange.pauses = [3]
     assert exchange.run(limit_s=60.0) == compiled_loop.STEPPED
     assert [frame[4::2] for frame in sent] == [answer[1:]] * 3
-    assert not any(any(frame[4::2]) for frame in sent), 'it holds: no slope'
+    assert not any(any(frame[5::2]) for frame in sent), 'it holds: no slope'
     assert unit.seen.tolist() == [[2.0, 2.0], [0.0, 0.0]]
 
 

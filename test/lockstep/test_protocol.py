@@ -436,6 +436,37 @@ def test_an_invented_hello_ends_no_run_and_leaves_room_for_the_next(
     assert_as_expected(network, at_least=10)
 
 
+@settings(deadline=None, max_examples=60)
+@given(some, st.lists(st.tuples(st.sampled_from(UNITS), st.sampled_from(UNITS), st.integers(0, 60),
+                                st.floats(-1.0, 1.0)), min_size=1, max_size=40))
+def test_frames_of_a_second_node_of_one_name_are_refused_and_told(
+        in_loops: Collection[str], frames: list[tuple[str, str, int, float]]) -> None:
+    """Right in everything, they were stepped on if they came first, and nobody knew."""
+    network = begun_network(in_loops)
+    run = network.members['plant'].run
+    told = set()
+    for source, target, step, value in frames:
+        if source in network.members[target].peers:
+            network.attack(source, target, (run, float(step), 1e-3, 7.0, *[value] * 4))
+            told.add((source, target))
+        network.settle(1)
+    network.settle(40)
+    assert_as_expected(network, at_least=20)
+    for source, target in told:
+        inbox = network.members[target].inbox
+        assert inbox.refused[source, Refusal.SECOND_SENDER]
+        assert inbox.doubled[source] == (network.members[source].sender, 7.0)
+    assert sum(len(member.inbox.doubled) for member in network.members.values()) == len(told)
+
+
+def test_a_second_observer_of_one_name_does_not_speak_for_the_first() -> None:
+    conductor = conductor_with_recorder()
+    conductor.receive('recorder', (conductor.run, 0.0, 1e-3, 7.0))
+    conductor.receive('recorder', (conductor.run, 400.0, 1e-3, 8.0))
+    assert step_as_far_as_possible(conductor) == SLACK + 1
+    assert conductor.inbox.doubled == {'recorder': (7.0, 8.0)}
+
+
 @none_some_all
 def test_the_run_ends_when_everybody_has_used_the_last_step(in_loops: Collection[str]) -> None:
     network = Network(in_loops, last_step=12)

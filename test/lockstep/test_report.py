@@ -14,6 +14,7 @@ import pytest
 pytest.importorskip('rclpy', reason='rclpy is not installed: there is nothing to report to')
 
 from antenna_drive.lockstep import report  # noqa: E402, I100
+from antenna_drive.lockstep.frame import HEADER  # noqa: E402
 from antenna_drive.lockstep.member import Member  # noqa: E402
 from builtin_interfaces.msg import Time  # noqa: E402
 from rclpy.node import Node  # noqa: E402
@@ -28,7 +29,7 @@ class Told:
         node: Any = create_autospec(Node, instance=True)
         node.get_fully_qualified_name.return_value = '/motor_1'
         node.get_clock.return_value.now.return_value.to_msg.return_value = Time()
-        member = Member(build('motor_1', load()), 0.0)
+        self.member = member = Member(build('motor_1', load()), 0.0)
         self.report = report.Report(node, member, None, dict)
         self._warning = node.get_logger.return_value.warning
         self._publish = node.create_publisher.return_value.publish
@@ -39,6 +40,14 @@ class Told:
     def published(self) -> str:
         message: str = self._publish.call_args.args[0].status[0].message
         return message
+
+    def hear(self, peer: str, run: float, step: float, sender: float) -> None:
+        """Hear a frame, and do what it lets the member do."""
+        length = self.member.layouts[peer].length
+        frame = [run, step, 1e-3, sender, *[0.0] * length][:len(HEADER)]
+        self.member.receive(peer, (*frame, *[0.0] * (length - len(frame))))
+        if self.member.go_on() is not None:
+            self.report.stepped()
 
     def wait(self, begin_s: float, end_s: float) -> None:
         """Wait from one moment [s] to another, and look around as often as a node does."""
@@ -83,3 +92,60 @@ def test_what_is_found_out_later_is_logged_too(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(report, 'is_cut_off', lambda: True)
     told.wait(5.2, 8.0)
     assert told.log() == [WAITS, WAITS + report.CUT_OFF]
+
+
+RUN = 9.0
+SENDERS = {'test_signal': 5.0, 'torque_share': 6.0, 'plant': 7.0}
+# births of nodes that say hello, and who they are: of the same name as one that is there
+HELLOS = [(birth, sender) for birth in (1.0, 1e3, 2.0**51) for sender in (3.0, 4.0)]
+
+
+def running(steps: int) -> Told:
+    """Return a report on a member that has made some steps of a run."""
+    told = Told()
+    for k in range(steps):
+        for peer in SENDERS:
+            told.hear(peer, RUN, float(k), SENDERS[peer])
+    assert (told.member.run, told.member.step) == (RUN, steps)
+    return told
+
+
+@pytest.mark.parametrize('times', [1, 3])
+@pytest.mark.parametrize('peer', SENDERS)
+def test_no_hello_changes_what_a_running_member_reports(peer: str, times: int) -> None:
+    told = running(5)
+    for birth, sender in times * HELLOS:
+        told.hear(peer, 0.0, birth, sender)
+    told.report.publish_if_due(0.0)
+    assert told.published() == 'stepping'
+    told.wait(0.2, 5.0)
+    names = ', '.join(told.member.missing())
+    assert told.log() == [f'waiting for {names} at step 5 of run 9']
+    assert told.published() == told.log()[0]
+
+
+def test_the_end_of_a_run_is_no_trouble_and_the_next_step_ends_it() -> None:
+    told = running(5)
+    told.hear('test_signal', 0.0, 1.0, SENDERS['test_signal'])
+    told.wait(0.0, 5.0)
+    assert told.log() == []
+    assert told.published() == 'no run in progress'
+    for peer, sender in SENDERS.items():
+        told.hear(peer, RUN, 5.0, sender)
+    told.report.publish_if_due(7.0)
+    assert told.published() == 'stepping'
+
+
+def test_two_nodes_of_one_name_are_told_with_their_processes() -> None:
+    told = running(5)
+    one, other = 4711.0, 2.0**40 + 4712.0
+    told = Told()
+    told.hear('test_signal', RUN, 0.0, one)
+    for peer in ('plant', 'torque_share'):
+        told.hear(peer, RUN, 0.0, 3.0)
+    for k in range(1, 4):
+        told.hear('test_signal', RUN, float(k), other)
+        told.report.publish_if_due(2.0 * k)
+    words = 'two nodes are called test_signal, processes 4711 and 4712'
+    assert [words in line for line in told.log()] == [True]
+    assert told.published().startswith('1 frames refused; ' + words)
