@@ -190,6 +190,10 @@ class Conductor(Member):
                 or self._left(self._elsewhere_at, missing)
                 or any(self._strayed_at.get(name) == self.used[name] for name in behind))
 
+    def hello(self) -> bytes:
+        """Return the serialised message that no run is in progress, and which has just ended."""
+        return self.layout.hello(self.birth, self.sender, self.run)
+
     def begin_again(self) -> None:
         """Leave the run in progress, if any, for a new one."""
         self._begin_again = True

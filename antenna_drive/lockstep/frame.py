@@ -83,9 +83,13 @@ class FrameLayout:
         """Return the values and derivatives that `encode` packs behind the header."""
         return self._outputs.unpack(packed)
 
-    def hello(self, birth: float, sender: float) -> bytes:
-        """Return the serialised hello of a node born at `birth` [us of wall time]."""
-        return self.encode(NO_RUN, int(birth), 0.0, sender, bytes(self._outputs.size))
+    def hello(self, birth: float, sender: float, ended: float = NO_RUN) -> bytes:
+        """
+        Return the serialised hello of a node born at `birth` [us of wall time].
+
+        In the place of step_s a conductor names the run that has just ended.
+        """
+        return self.encode(NO_RUN, int(birth), ended, sender, bytes(self._outputs.size))
 
     def decode(self, message: bytes) -> tuple[float, ...] | None:
         """Return the numbers of a message of exactly this layout, None for any other message."""

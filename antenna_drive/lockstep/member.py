@@ -144,8 +144,9 @@ class Member:
     def _receive_from_conductor(self, frame: Frame) -> None:
         run, step, step_s = frame[:3]
         if run == NO_RUN:
-            # that of another node says nothing of the run whose conductor is known
-            if frame[SENDER] == self.inbox.senders.get(self.conductor, frame[SENDER]):
+            # Others of its name, and what it said of earlier runs, tell nothing of this one.
+            if self.run == NO_RUN or step_s == self.run and (
+                    frame[SENDER] == self.inbox.senders.get(self.conductor)):
                 self._rests_at = (self.run, self.inbox.reached(self.conductor))
         elif run == self.run:
             self.inbox.offer(self.conductor, frame)

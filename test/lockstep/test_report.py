@@ -41,10 +41,11 @@ class Told:
         message: str = self._publish.call_args.args[0].status[0].message
         return message
 
-    def hear(self, peer: str, run: float, step: float, sender: float) -> None:
+    def hear(self, peer: str, run: float, step: float, sender: float,
+             step_s: float = 1e-3) -> None:
         """Hear a frame, and do what it lets the member do."""
         length = self.member.layouts[peer].length
-        frame = [run, step, 1e-3, sender, *[0.0] * length][:len(HEADER)]
+        frame = [run, step, step_s, sender][:len(HEADER)]
         self.member.receive(peer, (*frame, *[0.0] * (length - len(frame))))
         if self.member.go_on() is not None:
             self.report.stepped()
@@ -96,8 +97,8 @@ def test_what_is_found_out_later_is_logged_too(monkeypatch: pytest.MonkeyPatch) 
 
 RUN = 9.0
 SENDERS = {'test_signal': 5.0, 'torque_share': 6.0, 'plant': 7.0}
-# births of nodes that say hello, and who they are: of the same name as one that is there
-HELLOS = [(birth, sender) for birth in (1.0, 1e3, 2.0**51) for sender in (3.0, 4.0)]
+# births of nodes that say hello, and which run has ended
+HELLOS = [(birth, ended) for birth in (1.0, 1e3, 2.0**51) for ended in (0.0, 8.0)]
 
 
 def running(steps: int) -> Told:
@@ -112,10 +113,15 @@ def running(steps: int) -> Told:
 
 @pytest.mark.parametrize('times', [1, 3])
 @pytest.mark.parametrize('peer', SENDERS)
-def test_no_hello_changes_what_a_running_member_reports(peer: str, times: int) -> None:
+@pytest.mark.parametrize('own', [False, True])
+def test_no_hello_changes_what_a_running_member_reports(
+        own: bool, peer: str, times: int) -> None:
+    """Somebody has the name of a peer, or repeats what the peer has said before."""
     told = running(5)
-    for birth, sender in times * HELLOS:
-        told.hear(peer, 0.0, birth, sender)
+    for birth, ended in times * HELLOS:
+        told.hear(peer, 0.0, birth, SENDERS[peer] if own else 3.0, ended)
+        if not own:
+            told.hear(peer, 0.0, birth, 3.0, RUN)
     told.report.publish_if_due(0.0)
     assert told.published() == 'stepping'
     told.wait(0.2, 5.0)
@@ -126,7 +132,7 @@ def test_no_hello_changes_what_a_running_member_reports(peer: str, times: int) -
 
 def test_the_end_of_a_run_is_no_trouble_and_the_next_step_ends_it() -> None:
     told = running(5)
-    told.hear('test_signal', 0.0, 1.0, SENDERS['test_signal'])
+    told.hear('test_signal', 0.0, 1.0, SENDERS['test_signal'], RUN)
     told.wait(0.0, 5.0)
     assert told.log() == []
     assert told.published() == 'no run in progress'
