@@ -4,31 +4,56 @@
 The configuration as a healthy machine has it: the tolerances of a quiet record, fitted.
 
 It is the first fit of a diagnosis, the one without effects. A twin that has the machine's own
-numbers is several times closer to it than one with the numbers of the drawing.
+numbers is several times closer to it than one with the numbers of the drawing. What the fit leaves
+is beyond the tolerances: the machine is not the one of the configuration.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 import tempfile
 
 from antenna_drive.diagnosis.corrected import correct
 from antenna_drive.diagnosis.machine import AntennaMachine
+from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.sets import Drive
+from antenna_drive.readings import READINGS
 from antenna_drive.recording.recording import Recording
+import numpy as np
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.starts import with_initial_conditions
+from simgap.fit.state import FitState
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import DEFAULT
 
 # Fits, each with the noise that the one before has left, and steps of each.
 _PASSES, _STEPS = 3, 12
+# What a signal may keep, in standard deviations of its sensor's noise: a healthy drive's recorder
+# may be two and a half times as noisy as the sheet says.
+_NOISE = 3.0
 
 
-def tuned(recording: Recording, drive: Drive) -> str:
+@dataclass(frozen=True)
+class Tuned:
     """
-    Return a configuration file with the tolerances in it, as a quiet record shows them.
+    What a quiet record shows of a drive.
+
+    Attributes
+    ----------
+    text : of a configuration file with the tolerances as they were fitted
+    outside : what the record has beyond all tolerances, a line for each signal, the greatest first
+
+    """
+
+    text: str
+    outside: tuple[str, ...] = ()
+
+
+def tuned(recording: Recording, drive: Drive) -> Tuned:
+    """
+    Return the configuration with the tolerances as a quiet record shows them, and what is beyond.
 
     Parameters
     ----------
@@ -52,7 +77,35 @@ def tuned(recording: Recording, drive: Drive) -> str:
         problem = problem.at_scale(level if level > DEFAULT.search.strong else 1.0)
         state = problem.start(machine.nuisances, with_initial_conditions(problem, state.point()))
         state = problem.fit(state, _STEPS)
-    return correct(drive, machine.records, Hypothesis((), (), state)).text
+    return Tuned(correct(drive, machine.records, Hypothesis((), (), state)).text,
+                 _outside(problem, state))
+
+
+def _outside(problem: LeastSquares, state: FitState) -> tuple[str, ...]:
+    """Return the signals of which a fit of the tolerances leaves more than noise."""
+    [test] = problem.experiments
+    [predicted] = problem.machine.simulate([state.point()])[0]
+    left = problem.residuals_of(state, 0)
+    found = []
+    for column, reading in enumerate(READINGS):
+        there = np.isfinite(left[:, column])
+        if predicted is None or not there.any():
+            continue
+        level = problem.scale * _size(left[there, column])
+        if level > _NOISE:
+            apart = (test.measured - predicted)[there, column]
+            found.append((level, f'{reading.signal}: {np.sqrt(np.mean(apart**2)):.3g} '
+                                 f'{reading.unit} rms, {level:.0f} times its noise'))
+    return tuple(line for _, line in sorted(found, reverse=True))
+
+
+def _size(z: FloatArray) -> float:
+    """Return the size of residuals [of noise]; the few that are far off count as outliers."""
+    z = np.abs(z)
+    level = float(np.sqrt(np.mean(z**2)))
+    for _ in range(10):
+        level = float(np.sqrt(np.mean(np.minimum(z, DEFAULT.fit.outlier * level)**2)))
+    return level
 
 
 def loaded(text: str) -> Drive:

@@ -57,11 +57,12 @@ _LATE_S = 2.0
 _LEVELS = {watch.OK: DiagnosticStatus.OK, watch.WAITING: DiagnosticStatus.STALE,
            watch.STALE: DiagnosticStatus.STALE, watch.GAP: DiagnosticStatus.ERROR,
            watch.BAD_INPUT: DiagnosticStatus.WARN, watch.SETTLING: DiagnosticStatus.OK,
-           watch.LEARNING: DiagnosticStatus.OK}
+           watch.LEARNING: DiagnosticStatus.OK, watch.OUTSIDE: DiagnosticStatus.WARN}
 _ENTRIES = {
     'alarms_per_day': Entry('1', 1e-6, 1e4, 'false alarms that are allowed a day'),
     'quiet': Entry('s', 20.0, 3600.0, 'length of the quiet record'),
 }
+_AS_LEARNED = 'the drive is as in its quiet record'
 _TEXTS = ('real', 'map', 'sheet', 'quiet_file')
 _SWITCHES = {'tune': True, 'verdict': False}
 
@@ -119,16 +120,16 @@ class _TwinNode:
         sheet = load_sheet(Path(texts['sheet'])) if texts['sheet'] else TestSheet()
         drive = load(*config)
         self._quiet_file = Path(texts['quiet_file']) if texts['quiet_file'] else None
-        kept, configuration = _read_quiet(self._quiet_file)
+        kept, configuration, outside = _read_quiet(self._quiet_file)
         with told_while_compiling(node):
             self._twin = Twin(
                 loaded(configuration) if configuration else drive, sheet,
                 TwinSettings(alarms_per_day=numbers['alarms_per_day'], quiet_s=numbers['quiet']),
-                kept, tuned if switches['tune'] and kept is None else None)
+                kept, tuned if switches['tune'] and kept is None else None, outside)
         self._written = kept is not None
         self._arrived: SimpleQueue[tuple[Topic, tuple[float, ...], int, int]] = SimpleQueue()
         self._tests: SimpleQueue[None] = SimpleQueue()
-        self._state = ''
+        self._state = '', ''
         self._growing: GrowingVerdict | None = None
         self._next: NextTest | None = None
         self._asked = Event()
@@ -198,7 +199,7 @@ class _TwinNode:
                     self._growing = self._next = None
                     self._log.error('the process of the diagnosis was ended; no more verdicts')
                 now = time.monotonic()
-                if self._twin.state != self._state or now >= report_at:
+                if self._twin.state != self._state[0] or now >= report_at:
                     report_at = now + _REPORT_S
                     self._report()
         finally:
@@ -230,7 +231,8 @@ class _TwinNode:
         try:
             with drafted(self._quiet_file) as stream:
                 stream.write(json.dumps({'baseline': self._twin.judge.baseline.plain(),
-                                         'configuration': self._twin.configuration}).encode())
+                                         'configuration': self._twin.configuration,
+                                         'outside': self._twin.outside}).encode())
             self._log.info(f'the quiet record is kept in {self._quiet_file}')
         except OSError as error:
             self._log.error(f'{self._quiet_file}: {one_line(error)}')
@@ -265,25 +267,25 @@ class _TwinNode:
         self._next_test.publish(String(data=json.dumps(following.message())))
 
     def _report(self) -> None:
-        twin, state = self._twin, self._twin.state
-        message, values = _told(twin)
+        named = self._growing.named if self._growing is not None else ''
+        level, message, values = told(self._twin, named)
         behind_s = time.monotonic() - self._taken_at
         values.append(('behind', f'{behind_s:.1f} s'))
         if behind_s > _LATE_S:
             message += f'; {behind_s:.0f} s behind, the computer is too slow'
-        self._diagnostics.publish(diagnostics(self._node, _LEVELS[state], message, values))
-        if state != self._state:
+        self._diagnostics.publish(diagnostics(self._node, level, message, values))
+        if (self._twin.state, named) != self._state:
             # rclpy keeps one severity for each line of a program
-            if _LEVELS[state] == DiagnosticStatus.OK:
+            if level == DiagnosticStatus.OK:
                 self._log.info(message)
             else:
                 self._log.warning(message)
-            self._state = state
+            self._state = self._twin.state, named
 
 
-def _read_quiet(path: Path | None) -> tuple[Baseline | None, str]:
+def _read_quiet(path: Path | None) -> tuple[Baseline | None, str, tuple[str, ...] | None]:
     """
-    Return what is kept of a quiet record, and the configuration that was tuned to it.
+    Return a quiet record that is kept, the configuration tuned to it, and what is outside.
 
     Raises
     ------
@@ -291,19 +293,33 @@ def _read_quiet(path: Path | None) -> tuple[Baseline | None, str]:
 
     """
     if path is None or not path.exists():
-        return None, ''
+        return None, '', None
     try:
         data = json.loads(path.read_text(encoding='utf-8'))
-        return Baseline.of_plain(data['baseline']), str(data['configuration'])
+        outside = data.get('outside')  # files of earlier releases do not know
+        return (Baseline.of_plain(data['baseline']), str(data['configuration']),
+                None if outside is None else tuple(map(str, outside)))
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise UserError(f'{path}: no quiet record of a twin, {one_line(error)}; remove it, and '
                         'the twin learns another') from None
 
 
-def _told(twin: Twin) -> tuple[str, list[tuple[str, str]]]:
-    """Return the state in a line, and in named values."""
+def told(twin: Twin, named: str = '') -> tuple[bytes, str, list[tuple[str, str]]]:
+    """
+    Return how bad the state of a twin is, in a line, and in named values.
+
+    Parameters
+    ----------
+    twin
+        that reports
+    named
+        what a verdict on the same drive names, '' for nothing
+
+    """
     state, settings, judge = twin.state, twin.settings, twin.judge
     values = [('state', state), ('tuning', twin.tuned or 'not yet'),
+              ('tolerances', 'not compared' if twin.outside is None else
+               '; '.join(twin.outside) or 'the quiet record lies within them'),
               ('watched', ', '.join(judge.baseline.signals) if judge.baseline else 'nothing yet'),
               ('false alarms per day', f'{settings.alarms_per_day:g}'),
               ('blocks judged', str(judge.blocks - judge.unjudged)),
@@ -317,10 +333,14 @@ def _told(twin: Twin) -> tuple[str, list[tuple[str, str]]]:
     if state == watch.GAP:
         newest = max(twin.intake.newest().values(), default=0)
         since = (newest - min(gap.since_ns for gap in gaps)) / NANOSECONDS if gaps else 0.0
-        return (f'gap since {since:.0f} s: ' + '; '.join(map(str, gaps))
-                if gaps else 'gap, closing'), values
-    return {
-        watch.OK: 'ok: the drive and its twin agree',
+        return _LEVELS[state], (f'gap since {since:.0f} s: ' + '; '.join(map(str, gaps))
+                                if gaps else 'gap, closing'), values
+    if state == watch.OK and named:
+        return DiagnosticStatus.WARN, f'{_AS_LEARNED}, but the verdict is {named}', values
+    return _LEVELS[state], {
+        watch.OK: _agreement(twin),
+        watch.OUTSIDE: (f'outside the tolerances: {"; ".join(twin.outside or ())}; {_AS_LEARNED}, '
+                        'and that is not healthy: diagnose it'),
         watch.WAITING: f'waiting for {RATE_COMMAND}',
         watch.SETTLING: 'settling: an unknown start is being forgotten',
         watch.LEARNING: 'learning the quiet record: the drive has to be healthy',
@@ -328,3 +348,10 @@ def _told(twin: Twin) -> tuple[str, list[tuple[str, str]]]:
         watch.BAD_INPUT: 'bad input: ' + '; '.join(
             f'{name}: {what}' for name, what in sorted(twin.bad_signals().items())),
     }[state], values
+
+
+def _agreement(twin: Twin) -> str:
+    if twin.outside is not None:
+        return 'ok: the drive and its twin agree'
+    why = twin.tuned.removeprefix('not tuned: ') or 'the twin was not tuned to it'
+    return f'ok: {_AS_LEARNED}, which was not compared with the configuration: {why}'

@@ -128,6 +128,12 @@ class GrowingVerdict:
             self.planning = result['planning']
         return True
 
+    @property
+    def named(self) -> str:
+        """Return what the last look has named first, '' before the first one and for no gap."""
+        first = self.looks[-1].first if self.looks else ('none',)
+        return '' if first == ('none',) else ' and '.join(first)
+
     def message(self) -> dict[str, Any]:
         """Return what there is to say, as plain data for JSON."""
         now = self.looks[-1] if self.looks else None

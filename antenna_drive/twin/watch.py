@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from antenna_drive.diagnosis.tuned import loaded
+from antenna_drive.diagnosis.tuned import loaded, Tuned
 from antenna_drive.emulator.run import MACRO_STEP
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.parameters.sets import Drive
@@ -32,13 +32,14 @@ from simgap.logs.channel import NANOSECONDS
 
 WAITING, SETTLING, LEARNING = 'waiting', 'settling', 'learning'
 OK, GAP, STALE, BAD_INPUT = 'ok', 'gap', 'stale input', 'bad input'
+OUTSIDE = 'outside the tolerances'
 # The twin's course is kept at every macro-step that this number divides.
 _EVERY = 5
 # Motors stand still if the first readings of their tachometers are below this [rad/s]. The next
 # ones may be of the motion already.
 _STILL = 0.1
-# Returns the text of a configuration file, as a quiet record shows the drive.
-Tune = Callable[[Recording, Drive], str]
+# Returns the configuration as a quiet record shows the drive.
+Tune = Callable[[Recording, Drive], Tuned]
 
 
 @dataclass(frozen=True)
@@ -94,8 +95,10 @@ class Twin:
     baseline
         of an earlier quiet record; None: learn one
     tune
-        returns the configuration with the tolerances of a quiet record in it; None: it stays as
-        it is
+        returns the configuration with the tolerances of a quiet record in it, and what is beyond
+        them; None: it stays as it is
+    outside
+        what an earlier quiet record had beyond the tolerances; None: nobody has compared it
     step_s
         macro-step [s]
 
@@ -103,6 +106,8 @@ class Twin:
     ----------
     tuned : what became of the tuning, for people
     configuration : text of the tuned configuration; '' if it is as it was
+    outside : what the quiet record has beyond the tolerances of the configuration, () for
+        nothing; None if the two were not compared
     drive : the configuration in force
     judge, faults : of the blocks, and what is wrong with what the real drive sends
 
@@ -110,7 +115,8 @@ class Twin:
 
     def __init__(self, drive: Drive, sheet: TestSheet | None = None,
                  settings: TwinSettings | None = None, baseline: Baseline | None = None,
-                 tune: Tune | None = None, step_s: float = MACRO_STEP) -> None:
+                 tune: Tune | None = None, outside: tuple[str, ...] | None = None,
+                 step_s: float = MACRO_STEP) -> None:
         """Begin with nothing known of the real drive."""
         self.settings = settings or TwinSettings()
         self.sheet = sheet or TestSheet()
@@ -120,7 +126,7 @@ class Twin:
         self.judge = BlockJudge(self.settings.alarms_per_day, self.settings.reference,
                                 self.settings.clip)
         self._step_s, self._tune = step_s, tune
-        self.tuned, self.configuration = '', ''
+        self.tuned, self.configuration, self.outside = '', '', outside
         self._stretch, self._run_in = 0, self.settings.run_in_s
         self._given: dict[str, int] = {}
         self._build(drive)
@@ -264,7 +270,8 @@ class Twin:
             self._next_block -= 1
             return
         try:
-            self.configuration = self._tune(recording, self.drive)
+            found = self._tune(recording, self.drive)
+            self.configuration, self.outside = found.text, found.outside
             self.drive = loaded(self.configuration)
             self.tuned = 'tuned to the quiet record'
         except UserError as error:
@@ -285,7 +292,9 @@ class Twin:
             return GAP
         if self._next_block * BLOCK_S < self._run_in:
             return SETTLING
-        return LEARNING if self.judge.baseline is None else OK
+        if self.judge.baseline is None:
+            return LEARNING
+        return OUTSIDE if self.outside else OK
 
     def bad_signals(self) -> dict[str, str]:
         """Return the signals whose samples are rubbish or missing, and what is wrong with each."""

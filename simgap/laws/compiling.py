@@ -12,6 +12,7 @@ wait for a compiler. Without numba the functions run slowly, with the same numbe
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
 import hashlib
@@ -55,13 +56,35 @@ class Compiled:
         if folder:
             numba.config.CACHE_DIR = str(folder)
         try:
-            return numba.njit(cache=folder is not None, **{**_OPTIONS, **self._options})(
+            dispatcher = numba.njit(cache=folder is not None, **{**_OPTIONS, **self._options})(
                 self.function)
+            if folder and not numba.config.DISABLE_JIT:
+                _forgive(dispatcher._cache, folder)
+            return dispatcher
         finally:
             numba.config.CACHE_DIR = before
 
     def __call__(self, *arguments: Any) -> Any:
         return self.dispatcher(*arguments)
+
+
+def _forgive(kept: Any, folder: Path) -> None:
+    """Let numba's cache of a function miss what cannot be read or written."""
+    def tried(act: Callable[..., Any], *key: Any) -> Any:
+        try:
+            return act(*key)
+        except Exception as error:  # noqa: B902 (whatever a damaged file makes pickle raise)
+            _say(folder, getattr(error, 'strerror', None) or 'a file is damaged')
+            with suppress(OSError):
+                kept.flush()  # what is saved next replaces it
+
+    kept.load_overload = partial(tried, kept.load_overload)
+    kept.save_overload = partial(tried, kept.save_overload)
+
+
+@cache
+def _say(folder: Path, why: str) -> None:
+    print(f'{folder}: compiled code is compiled again, {why}', file=sys.stderr)
 
 
 @cache
@@ -108,17 +131,20 @@ def generated(keeping: Keeping, name: str, text: str, names: Mapping[str, Any]) 
     digest = _digest(keeping.sources, text)
     module = ModuleType(f'{keeping.owner}.generated.{name}_{digest}')
     sys.modules[module.__name__] = module  # where numba looks for it when it loads what it kept
-    keep = partial(keeping.folder, text)
-    vars(module).update(names, inner=inner, shared=shared,
-                        compiled=lambda function: Compiled(function, keep))
-    folder = keep()
+    folder = keeping.folder(text)
     path = folder / f'{name}.py' if folder else Path(name)
     if folder and not path.exists():
-        with tempfile.NamedTemporaryFile('w', dir=folder, delete=False) as file:
-            file.write(text)
-        # numba compares the time of a source: it must not depend on which process wrote it
-        os.utime(file.name, (0, 0))
-        os.replace(file.name, path)
+        try:
+            with tempfile.NamedTemporaryFile('w', dir=folder, delete=False) as file:
+                file.write(text)
+            # numba compares the time of a source: it must not depend on which process wrote it
+            os.utime(file.name, (0, 0))
+            os.replace(file.name, path)
+        except OSError as error:
+            _say(folder, error.strerror or 'it cannot be written')
+            folder = None
+    vars(module).update(names, inner=inner, shared=shared,
+                        compiled=lambda function: Compiled(function, lambda: folder))
     exec(compile(text, str(path), 'exec'), vars(module))
     return module
 

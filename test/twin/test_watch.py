@@ -21,6 +21,11 @@ from lab.trials import onset
 import numpy as np
 import pytest
 
+pytest.importorskip('rclpy', reason='rclpy is not installed: nobody to report to')
+
+from antenna_drive.nodes.twin_node import told  # noqa: E402, I100
+from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
+
 pytestmark = pytest.mark.slow
 # A shorter quiet record than usual, to save the machine's time.
 BRIEF = TwinSettings(quiet_s=40.0)
@@ -28,7 +33,8 @@ ONSET_S, END_S = 75.0, 92.0
 
 
 @cache
-def case(effect: str = '', size: float = 0.6) -> tuple[dict[str, Any], dict[str, Any]]:
+def case(effect: str = '', size: float = 0.6, onset_s: float = ONSET_S,
+         ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return recording and sheet of a triangle test; an effect is switched on in the middle."""
     number = 0
     while True:
@@ -36,7 +42,7 @@ def case(effect: str = '', size: float = 0.6) -> tuple[dict[str, Any], dict[str,
         truth = onset.draw_truths(number, 41, 0.02)[-1]
         if truth['sheets'][0]['waveform']['type'] == 'triangle':
             break
-    truth.update(onset_s=ONSET_S, duration_s=END_S, effects=[])
+    truth.update(onset_s=onset_s, duration_s=END_S, effects=[])
     if effect:
         random = np.random.default_rng(1)
         truth['effects'] = [{'id': effect, 'parameters': CATALOGUE[effect].draw(size, random)}]
@@ -90,6 +96,40 @@ def test_effect_is_told_soon_and_dated(learned: Twin, effect: str) -> None:
     assert all(gap.unit and abs(gap.sigma) > 1.0 for gap in gaps)
     if effect == 'current_1.gain':
         assert gaps[0].name == 'motor_1/ammeter'
+
+
+@pytest.mark.parametrize(('effect', 'signal'), [
+    ('gearbox_2.stiffness', 'motor_2/tach_rate'), ('current_1.gain', 'motor_1/ammeter')])
+def test_a_fault_that_was_there_before_is_not_taken_for_health(effect: str, signal: str) -> None:
+    """The twin learns it, and then says that no tolerance explains it."""
+    columns, sheet = case(effect, onset_s=0.1)
+    twin = new_twin(sheet)
+    found = [word for _, word in states(twin, columns)]
+    assert found[-1] == watch.OUTSIDE
+    assert watch.OK not in found
+    assert twin.outside is not None
+    assert any(line.startswith(f'{signal}: ') and ' times its noise' in line
+               for line in twin.outside)
+    level, message, values = told(twin)
+    assert level == DiagnosticStatus.WARN
+    assert twin.outside[0] in message
+    assert 'agree' not in message
+    assert dict(values)['tolerances'] == '; '.join(twin.outside)
+
+
+def test_nobody_agrees_beside_a_verdict_or_before_a_comparison(learned: Twin) -> None:
+    columns, sheet = case()
+    assert told(learned)[:2] == (DiagnosticStatus.OK, 'ok: the drive and its twin agree')
+    level, message, _ = told(learned, 'gearbox_2.stiffness')
+    assert level == DiagnosticStatus.WARN
+    assert message == 'the drive is as in its quiet record, but the verdict is gearbox_2.stiffness'
+    twin = new_twin(sheet, tune=False)
+    assert states(twin, columns)[-1][1] == watch.OK
+    assert 'was not compared with the configuration' in told(twin)[1]
+    assert 'agree' not in told(twin)[1]
+    kept = Twin(learned.drive, parse_sheet(sheet), BRIEF, learned.judge.baseline,
+                outside=('motor_1/ammeter: 1 A rms, 9 times its noise',))
+    assert states(kept, columns)[-1][1] == watch.OUTSIDE
 
 
 def test_quiet_record_goes_through_a_file(learned: Twin) -> None:
