@@ -120,15 +120,27 @@ def record_drive(parameters: Mapping[str, Mapping[str, Any]], config: Sequence[s
     recorder = RunRecorder(
         out, {f'{unit}/{s.name}': s.unit for unit, own in OUTPUTS.items() for s in own},
         sheet, recorded_by=_NAME)
-    from antenna_drive.lockstep.namespaces import drive_namespace
-    from antenna_drive.lockstep.observer import Observer
-    from antenna_drive.lockstep.processes import DriveProcesses
-    from antenna_drive.lockstep.sampling import RunWatch
     from antenna_drive.recording.own_drive import check_rows, check_settings
     last = round(duration / step_s)
     parameters = {**parameters, TEST_SIGNAL: {**parameters.get(TEST_SIGNAL, {}), **{
         'run.step': step_s, 'run.pace': pace, 'run.duration': last * step_s,
         'run.observers': [_NAME]}}}
+    try:
+        _run(recorder, parameters, config, last, quiet, namespace)
+    finally:
+        recorder.close()
+    check_rows(out, last + 1)
+    check_settings(out, recorder.settings, parameters, config)
+    return last + 1
+
+
+def _run(recorder: RunRecorder, parameters: Mapping[str, Mapping[str, Any]],
+         config: Sequence[str], last: int, quiet: bool, namespace: str | None) -> None:
+    """Let a drive of our own make its steps, and give them to the recorder."""
+    from antenna_drive.lockstep.namespaces import drive_namespace
+    from antenna_drive.lockstep.observer import Observer
+    from antenna_drive.lockstep.processes import DriveProcesses
+    from antenna_drive.lockstep.sampling import RunWatch
 
     def step(number: int, time_s: float, samples: Any) -> None:
         if number <= last:
@@ -142,16 +154,10 @@ def record_drive(parameters: Mapping[str, Mapping[str, Any]], config: Sequence[s
         # what is in force comes by another way than the steps
         return recorder.knows_configuration or time.monotonic() > watch.deadline
 
-    try:
-        with drive_namespace(namespace, 'record') as space, Observer(
-                _NAME, step, on_begin=recorder.begin, on_change=recorder.told,
-                namespace=space) as observer, \
-                DriveProcesses(parameters, config=config, namespace=space) as processes, \
-                Progress(f'recording {space}', last, quiet=quiet) as progress:
-            watch = RunWatch(last, progress.update)
-            observer.spin(complete)
-    finally:
-        recorder.close()
-    check_rows(out, last + 1)
-    check_settings(out, recorder.settings, parameters, config)
-    return last + 1
+    with drive_namespace(namespace, 'record') as space, Observer(
+            _NAME, step, on_begin=recorder.begin, on_change=recorder.told,
+            namespace=space) as observer, \
+            DriveProcesses(parameters, config=config, namespace=space) as processes, \
+            Progress(f'recording {space}', last, quiet=quiet) as progress:
+        watch = RunWatch(last, progress.update)
+        observer.spin(complete)

@@ -14,7 +14,9 @@ from collections.abc import Collection, Mapping, Sequence
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
-from antenna_drive.lockstep.frame import all_finite, FrameLayout, HEADER, new_sender, NO_RUN, SENDER
+from antenna_drive.lockstep.frame import (
+    all_finite, FrameLayout, HEADER, new_sender, NO_RUN, SENDER,
+)
 from antenna_drive.lockstep.inbox import DEPTH, Frame, Inbox, Refusal
 import numpy as np
 

@@ -88,8 +88,8 @@ def test_a_count_of_billions_is_refused_at_once() -> None:
 
 def test_the_labels_name_every_number_with_its_unit() -> None:
     layout = FrameLayout([Signal('axis_rate', 'rad/s', ''), Signal('current', 'A', '')])
-    assert layout.label == ('run, step, step_s, sender, axis_rate [rad/s], d/dt axis_rate [rad/s^2], '
-                            'current [A], d/dt current [A/s]')
+    assert layout.label == ('run, step, step_s, sender, axis_rate [rad/s], '
+                            'd/dt axis_rate [rad/s^2], current [A], d/dt current [A/s]')
 
 
 @given(st.lists(st.floats(), max_size=8))

@@ -693,7 +693,8 @@ def step_as_far_as_possible(conductor: Conductor) -> int:
     for _ in range(SLACK + 50):
         for name in UNITS[1:]:
             if name in conductor.missing():
-                conductor.receive(name, (conductor.run, float(conductor.step), 1e-3, 7.0, *[0.5] * 4))
+                conductor.receive(
+                    name, (conductor.run, float(conductor.step), 1e-3, 7.0, *[0.5] * 4))
         conductor.go_on()
     return conductor.step
 

@@ -17,6 +17,7 @@ from typing import Any
 from antenna_drive.cli import main
 from antenna_drive.emulator.run import simulate
 from antenna_drive.parameters import load
+from antenna_drive.parameters.sets import Drive
 import numpy as np
 import pytest
 
@@ -64,7 +65,7 @@ class Recording:
         return OWN
 
 
-def _drive(circuit: str) -> object:
+def _drive(circuit: str) -> Drive:
     from antenna_drive.cli.settings import parse_settings
     from antenna_drive.emulator.units import overridden
     return overridden(load(circuit), parse_settings(SAW_TOOTH))

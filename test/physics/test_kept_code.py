@@ -63,7 +63,7 @@ class Program:
 
     def files(self) -> list[Path]:
         """Return the files that are kept of compiled code."""
-        return [path for path in self.cache.rglob('*.nb?')]
+        return list(self.cache.rglob('*.nb?'))
 
 
 @pytest.fixture
