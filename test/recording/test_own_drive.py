@@ -27,7 +27,8 @@ GIVEN: Mapping[str, Any] = {'test_signal': {'waveform': 'square', 'period': 2, '
 
 def told(config: tuple[str, ...] = ('old_circuit',)) -> dict[str, dict[str, Any]]:
     """Return what the nodes of a drive say as a run begins."""
-    own = {'test_signal': {'waveform': 'square', 'period': 2.0}, 'torque_share': {'bias_pot': 0.5}}
+    own: dict[str, Any] = {'test_signal': {'waveform': 'square', 'period': 2.0},
+                           'torque_share': {'bias_pot': 0.5}}
     return {unit: json.loads(json.dumps({
         name: value for name, (_, value) in build(
             unit, load(*config), own.get(unit, {})).settings().items()})) for unit in UNITS}
