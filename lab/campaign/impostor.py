@@ -95,7 +95,8 @@ class Garbage:
 
     def _other_length(self, layout: FrameLayout) -> bytes:
         size = 2 * len(layout.signals) + self._rng.choice([-2, -1, 1, 2, 1000])
-        message = Float64MultiArray(data=[self.run, float(self.step), 1e-3, *[0.1] * max(0, size)])
+        message = Float64MultiArray(data=[self.run, float(self.step), 1e-3, self._sender,
+                                          *[0.1] * max(0, size)])
         from rclpy.serialization import serialize_message
         return bytes(serialize_message(message))
 
