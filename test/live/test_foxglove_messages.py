@@ -29,7 +29,8 @@ def test_messages_have_the_last_the_least_and_the_greatest_sample() -> None:
         # the steps 0 to 200, of which the motor has not sent step 39
         kept = np.setdiff1d(np.arange(201), [39] if unit == UNIT else [])
         samples = run.samples[:, columns[unit]].reshape(201, -1)
-        header = np.column_stack([np.full(201, float(RUN)), np.arange(201), np.full(201, 1e-3)])
+        header = np.column_stack([
+            np.full(201, float(RUN)), np.arange(201), np.full(201, 1e-3), np.full(201, 7.0)])
         history.take(unit, np.column_stack([header, samples])[kept])
         column += len(signals)
     found = dict(messages(history.since(RUN, 0), OUTPUTS[UNIT], columns[UNIT]))
