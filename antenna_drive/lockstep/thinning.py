@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from antenna_drive.lockstep.frame import HEADER, LARGEST_RUN, NO_RUN
+from antenna_drive.lockstep.frame import HEADER, LARGEST_RUN, NO_RUN, SENDER
 from antenna_drive.physics.arrays import FloatArray
 import numpy as np
 
@@ -61,6 +61,7 @@ class Thinning:
         self._units = tuple(units)
         self._rate_hz = rate_hz
         self._incomplete: dict[tuple[int, int], dict[str, FloatArray]] = {}
+        self._senders: dict[tuple[str, int], float] = {}
         self._last = (0, -1)
 
     def take(self, unit: str, frames: FloatArray) -> None:
@@ -72,7 +73,8 @@ class Thinning:
         unit
             that sent them
         frames
-            rows of a `FrameLayout`; rows that are no frame of a run are left out
+            rows of a `FrameLayout`; rows that are no frame of a run are left out, and those of a
+            second node of the unit's name
 
         """
         frames = frames[np.isfinite(frames).all(axis=1)]
@@ -83,10 +85,13 @@ class Thinning:
         every = np.maximum(1.0, np.round(1.0 / (self._rate_hz * step_s)))
         for frame in frames[step % every == 0.0]:
             key = int(frame[0]), int(frame[1])
-            if key > self._last:
+            sender = self._senders.setdefault((unit, key[0]), float(frame[SENDER]))
+            if key > self._last and sender == frame[SENDER]:
                 self._incomplete.setdefault(key, {}).setdefault(unit, frame)
         for key in sorted(self._incomplete)[:-_MOST_INCOMPLETE]:
             del self._incomplete[key]
+        for known in list(self._senders)[:-_MOST_INCOMPLETE]:
+            del self._senders[known]
 
     def complete(self) -> list[Thinned]:
         """Return the steps that are complete now, each once and in order."""

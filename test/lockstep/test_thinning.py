@@ -56,6 +56,17 @@ def test_what_was_not_sent_is_left_out_and_another_run_begins_at_0() -> None:
     assert not thinning.complete()
 
 
+def test_a_second_node_of_one_name_is_left_out() -> None:
+    thinning = Thinning(UNITS, 1000.0)
+    thinning.take('plant', frames('plant', range(3)))
+    other = frames('motor_1', range(6))
+    other[:, 3], other[:, 4] = 8.0, -1.0
+    thinning.take('motor_1', np.concatenate([frames('motor_1', range(1)), other]))
+    assert [step.step for step in thinning.complete()] == [0]
+    thinning.take('motor_1', frames('motor_1', range(1, 3)))
+    assert [step.values['motor_1'].tolist() for step in thinning.complete()] == [[1.5], [2.5]]
+
+
 def test_what_never_becomes_complete_is_forgotten() -> None:
     thinning = Thinning(UNITS, 1000.0)
     for first in range(0, 20_000, 1000):

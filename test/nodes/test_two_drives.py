@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, ExitStack
 from pathlib import Path
 import random
+import re
+import signal
 import subprocess
 import sys
 import time
@@ -143,6 +145,23 @@ def test_a_live_page_beside_a_drive_names_the_way_to_join(
     assert said.count('\n') == 1
     assert 'namespace / of ' in said
     assert said.endswith('or show it with --join\n')
+
+
+@pytest.mark.usefixtures('fresh_domain')
+def test_a_recorder_of_two_drives_names_both_and_ends_with_1(tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        for circuit in CIRCUITS:
+            stack.enter_context(DriveProcesses(config=[circuit]))
+        recorder = subprocess.Popen(
+            [sys.executable, '-m', 'antenna_drive.nodes.recorder', '--ros-args', '-p',
+             f'out:={tmp_path / "run"}'], stderr=subprocess.PIPE, text=True)
+        assert recorder.stderr is not None
+        lines = iter(recorder.stderr.readline, '')
+        said = next(line for line in lines if 'two nodes are called ' in line)
+        recorder.send_signal(signal.SIGINT)
+        recorder.communicate()
+    assert re.search(r'processes \d+ and \d+; end one of them', said)
+    assert recorder.returncode == 1
 
 
 @contextmanager
