@@ -61,7 +61,7 @@ export class Diagram {
     this.samples = samples;
     this.units = new Map();
     for (const panel of panels)
-      for (const name of panel.names) this.units.set(name, [panel.unit.replace('article ', ''), panel.factor]);
+      for (const name of panel.names) this.units.set(name, [panel.unit, panel.factor]);
     this.holder = document.getElementById('diagram');
     this.narrow = matchMedia('(max-width: 40rem)');
     this.narrow.addEventListener('change', () => this.build());
