@@ -84,8 +84,8 @@ def test_a_value_that_is_refused_returns_to_the_old_one(page: Page, text: str) -
     assert text in reason_of(page, 'bias_pot')
     assert page.tell(f'document.activeElement === {field}'), 'as after Enter'
     page.until(f'{field}.value === {before!r}')
-    assert page.tell(f'document.querySelector(\'{BIAS_POT} input[type="range"]\').value'
-                     ) == pytest.approx(float(before), abs=1e-3)
+    slider = page.tell(f'Number(document.querySelector(\'{BIAS_POT} input[type="range"]\').value)')
+    assert slider == pytest.approx(float(before), abs=1e-3)
 
 
 def test_a_decimal_comma_is_right(page: Page) -> None:
