@@ -27,8 +27,8 @@ def span(page: Page) -> tuple[float, float]:
 
 def shown(page: Page, title: str) -> list[str]:
     """Return the values beside the names of a chart's curves."""
-    found: list[str] = page.tell(f'[...document.querySelectorAll(\'[data-title="{title}"] '
-                                 'span b\')].map(e => e.textContent)')
+    of = f'[data-title="{title}"] span b'
+    found: list[str] = page.tell(f'[...document.querySelectorAll({of!r})].map(e => e.textContent)')
     return found
 
 
@@ -137,7 +137,8 @@ def test_published_levels_are_named_where_no_curve_is(page: Page) -> None:
                      '.map(e => e.textContent)') == [
         'published, analysis 11.6, 7.20', 'published, field 11.4, 8.00'], 'Section V, Fig. 20'
     # above the canvas with the curves, and nothing is written into it
-    assert page.tell("""(() => { const chart = document.querySelector('[data-title="Torque bias"]');
+    assert page.tell("""(() => {
+        const chart = document.querySelector('[data-title="Torque bias"]');
         const box = name => chart.querySelector(name).getBoundingClientRect();
         return box('.head').bottom <= box('.u-over').top; })()""")
 

@@ -46,7 +46,7 @@ def test_a_killed_node_and_a_server_that_has_gone_look_stale(
         live.end()
         browser.until(f'{STATE} === "no connection" && {TROUBLE}.startsWith("no connection") '
                       f'&& {LOOKS_STALE}')
-        browser.tell('document.querySelector(\'[data-name="bias_pot"] input[type="text"]\').focus()')
+        browser.tell('document.querySelector(\'[data-name="bias_pot"] .number\').focus()')
         old = browser.tell('document.activeElement.value')
         browser.tell('document.activeElement.value = "0.3"; '
                      'document.activeElement.dispatchEvent(new Event("change"))')

@@ -7,6 +7,7 @@ import {dark, make} from './elements.js';
 const SHOWN = ['Axis rate', 'Motor current', 'Torque bias', 'Axis angle', 'Pointing error'];
 const STORE = 'antenna_drive.charts';
 const LEAST_S = 10;      // a window begins with this and grows, if it may be longer
+const coarse = matchMedia('(pointer: coarse)');
 const FINEST_S = 0.02;   // shortest span shown: two intervals
 
 export class Charts {
@@ -123,8 +124,9 @@ export class Charts {
     const [plot] = this.charts.map(chart => chart.plot);
     const text = plot && plot.cursor.left >= 0
       ? `values at ${plot.posToVal(plot.cursor.left, 'x').toFixed(3)} s`
-      : this.isOpen() ? 'wheel: zoom, drag: move, shift and drag: zoom into a span'
-        : 'pause to zoom and move';
+      : !this.isOpen() ? 'pause to zoom and move'
+        : coarse.matches ? 'drag: move, tap: values'
+          : 'wheel: zoom, drag: move, shift and drag: zoom into a span';
     if (this.at.textContent !== text) this.at.textContent = text;
   }
 }

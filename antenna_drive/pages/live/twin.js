@@ -39,7 +39,7 @@ class Card {
     Object.assign(this, {name, link, verdict: null, heard: 0, reports: 0});
     const card = this.card = make('section', holder, '', {class: 'twin', 'aria-label': `twin ${name}`});
     make('h2', card, name);
-    this.silent = make('p', card, '', {class: 'level-ERROR'});
+    this.silent = make('p', card, '', {class: 'silent level-ERROR'});
     this.state = make('p', card, '', {role: 'status'});
     this.gaps = make('table', card);
     this.about = make('p', card, '', {class: 'small'});
