@@ -20,7 +20,7 @@ from simgap.inputs.schema import mapping_of, ParameterError, quoted
 
 AT_MOTOR = ' at the motor'
 CIRCUITS = ('old', 'new')
-_TEXT = re.compile(r'([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)')
+_TEXT = re.compile(r'(?P<number>[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)(?![\d,.])\s*(?P<unit>.*)')
 
 _HENRY = {'mH': 1e-3, 'H': 1.0}
 _INERTIA = {'kg m^2': 1.0, 'kg cm^2': 1e-4, 'lb in s^2': 0.112985}
@@ -84,7 +84,7 @@ class Figure:
         if match is None:
             raise ParameterError(f'{self.key}: {quoted(said)} given, allowed is a number with a '
                                  f'decimal point and a unit, such as 1.5 {self.unit}')
-        number, unit = float(match[1]), match[2].strip()
+        number, unit = float(match['number']), match['unit'].strip()
         at_motor = self.either_shaft and unit.endswith(AT_MOTOR)
         unit = unit.removesuffix(AT_MOTOR) if at_motor else unit
         if unit and unit not in self.units:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import fields, MISSING
 from operator import attrgetter
+from pathlib import Path
 import textwrap
 from typing import Any
 
@@ -32,7 +33,8 @@ def configuration(sheet: Sheet) -> str:
     found = {(number.section, number.name): number for number in derived(sheet)}
     drive, real = reference(sheet.circuit), kappa(sheet)
     lines = [
-        f'# A drive from {sheet.source}, by antenna-drive configure. Each number has its source:',
+        f'# A drive from {Path(sheet.source).name}, by antenna-drive configure.',
+        '# Each number has its source:',
         '#   sheet    as given', '#   derived  follows from what was given',
         '#   assumed  a rule of thumb, no figure says it',
         '#   kept     as in the reference drive: look whether it fits yours',
