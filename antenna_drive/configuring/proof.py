@@ -12,12 +12,14 @@ from antenna_drive.configuring.derived import kappa
 from antenna_drive.configuring.sheet import Sheet
 from antenna_drive.emulator.run import Run, simulate
 from antenna_drive.parameters.sets import changed, Drive
+from antenna_drive.readings import of, TACHOMETER
 import numpy as np
 
 # A figure is given back if it is this close.
 _SHARE = 0.05
 _DURATION_S, _MEAN_OVER_S = 30.0, 20.0
 _STEP_AT_S = 1.0
+_MOTOR_RATE = of(TACHOMETER)[0].signal
 
 
 class Check(NamedTuple):
@@ -56,7 +58,7 @@ def checks(sheet: Sheet, drive: Drive) -> list[Check]:
     rate = sheet['friction.fast_rate']
     run = _at_rate(drive, rate, 6.0 + _STEP_AT_S)
     kept = run.time >= _STEP_AT_S
-    moved = step_response(run.time[kept] - _STEP_AT_S, run['motor_1/tach_rate'][kept])
+    moved = step_response(run.time[kept] - _STEP_AT_S, run[_MOTOR_RATE][kept])
     found.append(Check(f'overshoot of the motor rate, step of {math.degrees(rate):g} deg/s',
                        'percent', None, 100.0 * moved.overshoot))
     return found

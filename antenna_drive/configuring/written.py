@@ -38,9 +38,9 @@ def configuration(sheet: Sheet) -> str:
         '#   sheet    as given', '#   derived  follows from what was given',
         '#   assumed  a rule of thumb, no figure says it',
         '#   kept     as in the reference drive: look whether it fits yours',
-        f'# Units "A" are article amperes; one of this drive is {real:.6g} real amperes. Divide '
-        'what a',
-        f'# clamp meter shows by it; in a map for antenna-drive import: scale: {1.0 / real:.6g}',
+        f'# One article A of this drive is {real:.6g} real amperes. Divide what a clamp meter '
+        'shows by',
+        f'# it; in a map for antenna-drive import: scale: {1.0 / real:.6g}',
         'base: none']
     for section, kind in SECTIONS.items():
         body = [line for item in fields(kind) if 'entry' in item.metadata

@@ -123,7 +123,7 @@ def test_each_number_has_its_source(tmp_path: Path) -> None:
     sources = re.findall(r'source: "(\w+)', text)
     assert len(entries) == len(sources) > 45
     assert set(sources) == {'sheet', 'derived', 'assumed', 'kept', 'by'}
-    assert 'one of this drive is 3.96118 real amperes' in text
+    assert 'One article A of this drive is 3.96118 real amperes' in text
     for number in derived(sheet):
         assert f'\n  {number.name}: ' in text
     assert max(map(len, text.splitlines())) < 100

@@ -6,6 +6,8 @@ import {dark, make} from './elements.js';
 
 const SHOWN = ['Axis rate', 'Motor current', 'Torque bias', 'Axis angle', 'Pointing error'];
 const STORE = 'antenna_drive.charts';
+const REAL = 'Motor current, real';
+const RATIO = 'armature.physical_amperes_per_article_ampere';
 const LEAST_S = 10;      // a window begins with this and grows, if it may be longer
 const coarse = matchMedia('(pointer: coarse)');
 const FINEST_S = 0.02;   // shortest span shown: two intervals
@@ -33,6 +35,7 @@ export class Charts {
   takes() {
     return {
       changes: told => { this.changes = told.changes; },
+      parameters: told => this.offerRealAmperes(told),
       state: told => {
         this.state = told.state;
         if (!this.isOpen()) this.all();
@@ -60,6 +63,16 @@ export class Charts {
       });
     }
     this.rebuild();
+  }
+
+  // Article amperes are no real ones: the drive tells how many of these each is.
+  offerRealAmperes({unit, entries}) {
+    const ratio = entries.find(entry => entry.name === RATIO)?.value;
+    if (unit !== 'motor_1' || !ratio || !this.panels) return;
+    const panels = this.panels.filter(panel => panel.title !== REAL);
+    const place = panels.findIndex(panel => panel.names[0] === 'motor_1/current');
+    panels.splice(place + 1, 0, {...panels[place], title: REAL, unit: 'real A', factor: ratio});
+    this.begin(panels);
   }
 
   rebuild() {
