@@ -22,6 +22,7 @@ AT_MOTOR = ' at the motor'
 CIRCUITS = ('old', 'new')
 _TEXT = re.compile(r'(?P<number>[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)(?![\d,.])\s*(?P<unit>.*)')
 
+_AMPERE = {'real A': 1.0, 'A': 1.0}
 _HENRY = {'mH': 1e-3, 'H': 1.0}
 _INERTIA = {'kg m^2': 1.0, 'kg cm^2': 1e-4, 'lb in s^2': 0.112985}
 _RATE = {'deg/s': math.pi / 180, 'arcsec/s': math.pi / 648000, 'mrad/s': 1e-3, 'rad/s': 1.0}
@@ -92,10 +93,12 @@ class Figure:
                                  f'{", ".join(self.units)}')
         unit = unit or self.unit
         value = number * self.units[unit]
-        if not at_motor and not self.low <= value <= self.high:
+        # at the motor shaft a figure is that of the axis times or over a gear ratio or two
+        low, high = (min(self.low, 1e-9), 1e9) if at_motor else (self.low, self.high)
+        if not low <= value <= high:
             scale = self.units[unit]
             raise ParameterError(f'{self.key}: {quoted(said)} given, allowed is from '
-                                 f'{self.low / scale:g} to {self.high / scale:g} {unit}')
+                                 f'{low / scale:g} to {high / scale:g} {unit}')
         shown = '' if unit == '1' else f' {unit}'
         return Given(value, f'{number:g}{shown}{AT_MOTOR if at_motor else ""}', at_motor)
 
@@ -103,13 +106,12 @@ class Figure:
 FIGURES = (
     Figure('motor.torque_constant', _TORQUE, 1e-3, 1e3, 'torque per real ampere'),
     Figure('motor.back_emf', _PER_RATE, 1e-4, 1e3, 'back-EMF constant',
-           'that of a DC motor without losses: as large as the torque constant'),
+           'a number as large as the torque constant'),
     Figure('motor.resistance', {'ohm': 1.0}, 1e-3, 1e3, 'armature resistance, hot'),
     Figure('motor.inductance', _HENRY, 1e-5, 10.0, 'armature inductance'),
     Figure('motor.rotor_inertia', _INERTIA, 1e-6, 1e3,
            'rotor with brake and pinion, one motor'),
-    Figure('amplifier.greatest_current', {'A': 1.0}, 0.51, 504.0,
-           'current limit of one amplifier, in real amperes'),
+    Figure('amplifier.greatest_current', _AMPERE, 0.51, 504.0, 'current limit of one amplifier'),
     Figure('amplifier.greatest_voltage', {'V': 1.0}, 1.0, 1e4, 'greatest armature voltage'),
     Figure('amplifier.current_loop', {'Hz': 1.0}, 1.0, 1e5, 'bandwidth of the current loop'),
     Figure('amplifier.rate_loop', {'Hz': 1.0}, 0.05, 100.0, 'bandwidth of the rate loop'),
@@ -127,11 +129,11 @@ FIGURES = (
     Figure('axis.first_resonance', {'Hz': 1.0}, 0.05, 100.0,
            'lowest resonance with the rotors held'),
     Figure('friction.slow_rate', _RATE, 1e-9, 1.0, 'a slow steady rate of the axis'),
-    Figure('friction.slow_current', {'A': 1.0}, 1e-3, 1e4,
-           'current at that rate, both motors together, in real amperes'),
+    Figure('friction.slow_current', _AMPERE, 1e-3, 1e4,
+           'current at that rate, both motors together'),
     Figure('friction.fast_rate', _RATE, 1e-9, 1.0, 'a fast steady rate of the axis'),
-    Figure('friction.fast_current', {'A': 1.0}, 1e-3, 1e4,
-           'current at that rate, both motors together, in real amperes'),
+    Figure('friction.fast_current', _AMPERE, 1e-3, 1e4,
+           'current at that rate, both motors together'),
     Figure('friction.stiction_ratio', {'1': 1.0}, 1.0, 5.0, 'stiction over Coulomb friction',
            'that of the reference drive'),
     Figure('bias.share', {'percent': 0.01, '1': 1.0}, 1e-3, 0.9,
@@ -182,6 +184,7 @@ def read_sheet(path: Path) -> Sheet:
         section, _, name = key.partition('.')
         sections.setdefault(section, []).append(name)
     content = read_yaml(path)
+    content = {} if content is None else content
     try:
         flat = {f'{section}.{name}': said
                 for section, body in mapping_of('', content, sections).items()

@@ -145,6 +145,7 @@ def test_the_shaft_makes_no_difference(tmp_path: Path) -> None:
     ('8.0 lb in/A', '8,0 lb in/A', 'with a decimal point and a unit, such as 1.5 N m/A'),
     ('8.0 lb in/A', '8.0 lb ft/A', 'allowed units are N m/A, lb in/A, oz in/A'),
     ('8.0 lb in/A', '[8.0]', 'motor.torque_constant'),
+    ('1.0e+8 N m/rad', '-5 N m/rad at the motor', 'gear.stiffness: .* allowed is from 1e-09'),
     ('20 A', '20000 A', 'amplifier.greatest_current: .* allowed is from 0.51 to 504 A'),
     ('2.0 Hz', '2.9 Hz', 'resonate at 2.37 Hz with the rotors held, even if the structure is'),
     ('7.5 A', '5.5 A', 'friction that falls with the rate is that of creep'),

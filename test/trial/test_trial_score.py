@@ -157,7 +157,8 @@ def test_sizes_are_compared_in_the_verdicts_own_terms() -> None:
         # -10.74 V shifted by a tenth of itself
         sized('torque_share.fade_out_voltage', {'shift': -1.074}, 'change', '1', (0.12, 0.0, 0.2)),
         # 0.069 A tripled
-        sized('motors.coulomb_friction', {'factor': 3.0}, 'torque', 'A', (0.138, 0.1, 0.2)),
+        sized('motors.coulomb_friction', {'factor': 3.0}, 'torque', 'article A',
+              (0.138, 0.1, 0.2)),
         sized('axis.wind_steady', {'torque': -5e4}, 'torque', 'N m', (-6e4, -5.5e4, -6.5e4)),
         # not comparable: another law, another unit, another parameter
         sized('axis.viscous_friction', {'coefficient': 1e6}, 'torque_per_rate', 'N m s/rad',
