@@ -25,10 +25,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 import sys
+from typing import TYPE_CHECKING
 
 from simgap.command.output import replaced
 from simgap.command.programs import NEGATIVE, OK
 from simgap.errors import UserError
+
+if TYPE_CHECKING:
+    from antenna_drive.configuring.sheet import Sheet
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,14 +69,12 @@ def run(args: argparse.Namespace) -> int:
     return OK if args.no_run else _compare(args.out, sheet)
 
 
-def _compare(path: Path, sheet: object) -> int:
+def _compare(path: Path, sheet: Sheet) -> int:
     from antenna_drive.configuring.proof import checks
-    from antenna_drive.configuring.sheet import Sheet
     from antenna_drive.parameters import load
 
-    assert isinstance(sheet, Sheet)
     found = checks(sheet, load(path))
-    print(_LINE.format('', 'what the configured drive gives', 'sheet', 'obtained', ''))
+    print(_LINE.format('', 'what the configured drive gives', 'sheet', 'obtained', '').rstrip())
     for check in found:
         wanted = '' if check.wanted is None else f'{check.wanted:.4g}'
         print(_LINE.format('' if check.holds else 'DIFFERS', check.what, wanted,

@@ -208,6 +208,18 @@ def test_the_command_asks_writes_and_compares(
     assert numbers[0] == numbers[1]
 
 
+def test_a_drive_that_cannot_reach_its_rate_differs(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / 'sheet.yaml'
+    # 12000 times 0.8 deg/s with 0.9 V s/rad is 151 V
+    path.write_text(EXAMPLE.read_text().replace('300 V', '100 V'))
+    assert main(['configure', str(path), '--out', str(tmp_path / 'mine.yaml')]) == 1
+    said = capsys.readouterr()
+    assert [line for line in said.out.splitlines() if line.startswith('DIFFERS')] == [
+        line for line in said.out.splitlines() if 'current at 0.8 deg/s' in line]
+    assert 'the voltage too low' in said.err
+
+
 def test_nobody_answers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                         capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(sys, 'stdin', open('/dev/null'))
