@@ -235,3 +235,28 @@ def test_a_template_names_every_figure(
         assert f'  {figure.key.partition(".")[2]}:' in text and figure.what in text
     with pytest.raises(ParameterError, match='motor.torque_constant: is missing'):
         read(text, tmp_path)
+
+
+def test_the_page_shows_what_the_command_says(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    page = (EXAMPLE.parents[1] / 'docs' / 'your-drive.md').read_text(encoding='utf-8')
+    command, _, shown = page.partition('$ antenna-drive ')[2].partition('```')[0].partition('\n')
+    (tmp_path / 'examples').mkdir()
+    (tmp_path / 'examples' / EXAMPLE.name).write_bytes(EXAMPLE.read_bytes())
+    monkeypatch.chdir(tmp_path)
+    assert main(command.split()) == 0
+    said = capsys.readouterr().out
+    for line, wanted in zip(said.splitlines(), shown.splitlines(), strict=True):
+        numbers = [[float(word) for word in text.split() if re.fullmatch(r'[\d.]+', word)]
+                   for text in (line, wanted)]
+        assert numbers[0] == pytest.approx(numbers[1], rel=1e-2), wanted
+        words = [[word for word in text.split() if not re.fullmatch(r'[\d.]+', word)]
+                 for text in (line, wanted)]
+        assert words[0] == words[1]
+    written_there = (tmp_path / 'my_drive.yaml').read_text()
+    assert '  stiffness: {value: 0.694444, unit: N m/rad,' in page and (
+        '  stiffness: {value: 0.694444, unit: N m/rad,' in written_there)
+    scale = re.search(r'unit: A, scale: ([\d.]+)', page)
+    assert scale is not None
+    assert float(scale[1]) == pytest.approx(5.049 / 20.0, rel=1e-4)
