@@ -190,7 +190,7 @@ def test_a_twin_is_shown_with_its_verdict_and_its_next_test_is_played(
     page.until(f'{text}.includes("gap since 3 s") && {text}.includes("70 % after 45 s")')
     assert page.tell('document.querySelector("#twin .twin h2").textContent') == '/beside/watcher'
     assert page.tell('document.querySelector("#twin td").textContent') == (
-        '0.5 A instead of 0.01 A, mean +9.0 sigma')
+        '0.5 article A instead of 0.01 article A, mean +9.0 sigma')
     # a line for each answer, and its points: as high as it is probable
     assert page.tell('document.querySelectorAll("#twin polyline").length') == 4
     first, second = page.tell('[...document.querySelector("#twin polyline").points]'
