@@ -3,13 +3,12 @@
 """
 Make a configuration of your own drive from its data sheets and test report.
 
-Without a file it asks, one figure after the other, and keeps the answers beside the
+Without a sheet it asks, one figure after the other, and keeps the answers beside the
 configuration. With a filled sheet it asks nothing:
 
-  antenna-drive configure --out my_drive.yaml                 questions
-  antenna-drive configure --template > sheet.yaml             a sheet to fill
-  antenna-drive configure sheet.yaml --out my_drive.yaml      from the filled sheet
-  antenna-drive run --config my_drive.yaml --duration 5       use it like any configuration
+  antenna-drive configure --template > empty_sheet.yaml          a sheet to fill
+  antenna-drive configure data_sheet.yaml --out my_drive.yaml    from a filled sheet
+  antenna-drive run --config my_drive.yaml --duration 5 --out run.csv
 
 Currents of the sheet are real amperes, as a clamp meter shows them. The configuration is in
 article amperes, which it names: its first lines say how many real ones each is. Every number in
