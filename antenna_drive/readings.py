@@ -119,9 +119,9 @@ def _counted(true: Any, bits: float) -> Errors:
 
 
 AMMETER = Sensor(_noisy, (
-    not_negative('current_noise_A', 0.01, 'A', 'noise of each current'),
-    not_negative('current_step_A', 0.01, 'A', 'resolution of each current')), 0.003, 1e3,
-    zero=not_negative('current_zero_A', 0.02, 'A', 'zero of each recorded current'))
+    not_negative('current_noise_A', 0.01, 'article A', 'noise of each current'),
+    not_negative('current_step_A', 0.01, 'article A', 'resolution of each current')), 0.003, 1e3,
+    zero=not_negative('current_zero_A', 0.02, 'article A', 'zero of each recorded current'))
 TACHOMETER = Sensor(_noisier_with_rate, (
     not_negative('tach_noise_rad_s', 0.0035, 'rad/s', 'noise of each tachometer'),
     not_negative('tach_noise_relative', 0.0015, '1', 'noise per rate', 1.0),
@@ -135,9 +135,9 @@ VOLTMETER = Sensor(_noisy, (
     zero=not_negative('bias_zero_V', 0.03, 'V', 'zero of the recorded bias voltage'))
 
 READINGS = (
-    Reading('current_1', 'motor_1/ammeter', 'current_1_A', 'A', 'ammeter 1', AMMETER,
+    Reading('current_1', 'motor_1/ammeter', 'current_1_A', 'article A', 'ammeter 1', AMMETER,
             gain='motor_1.ammeter.gain', instead='motor_1/current'),
-    Reading('current_2', 'motor_2/ammeter', 'current_2_A', 'A', 'ammeter 2', AMMETER,
+    Reading('current_2', 'motor_2/ammeter', 'current_2_A', 'article A', 'ammeter 2', AMMETER,
             gain='motor_2.ammeter.gain', instead='motor_2/current'),
     Reading('tach_1', 'motor_1/tach_rate', 'tach_rate_1_rad_s', 'rad/s', 'tach 1', TACHOMETER),
     Reading('tach_2', 'motor_2/tach_rate', 'tach_rate_2_rad_s', 'rad/s', 'tach 2', TACHOMETER),

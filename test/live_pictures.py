@@ -66,7 +66,8 @@ def main(folder: Path) -> None:
             page.look(width, height, dark)
             page.tell(f'document.getElementById("tab-{tab}").click()')
             arrived = page.tell('antennaDrive.samples.arrived')
-            page.until(f'antennaDrive.samples.arrived > {arrived + 10}')
+            page.until(f'antennaDrive.samples.arrived > {arrived + 10} '
+                       '&& !document.querySelector(".twin.stale, body.stale")')
             page.picture(folder / name)
         twin.close()
     claim.release()

@@ -54,8 +54,9 @@ class StandInTwin:
                 ('state', 'gap'), ('tuning', 'tuned to the quiet record'),
                 ('watched', 'motor_2/ammeter'), ('false alarms per day', '1'),
                 ('blocks judged', '40'),
-                ('gap motor_2/ammeter', 'motor_2/ammeter: 0.5 A instead of 0.01 A, '
-                                        'mean +9.0 sigma, since stamp 12.000 s')]))
+                ('gap motor_2/ammeter', 'motor_2/ammeter: 0.5 article A instead of '
+                                        '0.01 article A, mean +9.0 sigma, since stamp '
+                                        '12.000 s')]))
 
     def say(self, verdict: dict[str, Any]) -> None:
         """Tell a verdict."""

@@ -254,8 +254,9 @@ def place_of_friction(results: Results, published: Mapping[str, float]) -> _Judg
     own, on_axis = drive.motor_1.motor.coulomb_torque, drive.plant.axis.coulomb_torque
     total = own + 0.5 * on_axis
     found = []
-    for words, at_motor in ((f'{own:.3g} A at each motor, {on_axis:.3g} A at the axis', own),
-                            (f'{total:.3g} A at each motor, none at the axis', total)):
+    for words, at_motor in ((f'{own:.3g} article A at each motor, '
+                             f'{on_axis:.3g} article A at the axis', own),
+                            (f'{total:.3g} article A at each motor, none at the axis', total)):
         changes = {f'motor_{m}.motor.coulomb_torque': at_motor for m in (1, 2)}
         run = simulate(changed(drive, {**changes, 'plant.axis.coulomb_torque':
                                        2.0 * (total - at_motor)}), experiment.duration)

@@ -211,11 +211,11 @@ def article_measures(drive: Drive) -> dict[str, Measure]:
     figures: list[Measure] = [
         Readout('T1.tach_rate', 'deg/s', 'T1', 'plateau',
                 {name: degrees * weight for name, weight in tachs.items()}, plateau),
-        *(Readout(f'T1.current_{m}', 'A', 'T1', 'plateau', {f'motor_{m}/current': 1.0}, plateau)
-          for m in (1, 2)),
+        *(Readout(f'T1.current_{m}', 'article A', 'T1', 'plateau',
+                  {f'motor_{m}/current': 1.0}, plateau) for m in (1, 2)),
         Readout('T2a.bias', 'percent', 'T2', 'mean', bias, whole_periods),
-        *(Readout(f'T2a.current_{m}', 'A', 'T2', 'mean', {f'motor_{m}/current': 1.0},
-                  whole_periods) for m in (1, 2)),
+        *(Readout(f'T2a.current_{m}', 'article A', 'T2', 'mean',
+                  {f'motor_{m}/current': 1.0}, whole_periods) for m in (1, 2)),
         Readout('T2b.tach', 'percent', 'T2', 'deviation',
                 {**tachs, 'test_signal/rate_command': -ratio}, calm, 'T1', 100.0),
         Readout('T2b.encoder', 'percent', 'T2', 'deviation',

@@ -60,17 +60,17 @@ def profile_measures() -> dict[str, Measure]:
     figures: list[tuple[str, str, Callable[[TorqueShare], float], str]] = [
         ('g_2', '1', _dc_gain, OLD_CIRCUIT),
         ('g_2_new', '1', _dc_gain, NEW_CIRCUIT),
-        ('flat_new', 'A', partial(_flat, gain=NEW_GAIN), NEW_CIRCUIT),
-        ('zero_new', 'A', partial(_zero, gain=NEW_GAIN), NEW_CIRCUIT),
+        ('flat_new', 'article A', partial(_flat, gain=NEW_GAIN), NEW_CIRCUIT),
+        ('zero_new', 'article A', partial(_zero, gain=NEW_GAIN), NEW_CIRCUIT),
     ]
     for fade in (-7.0, -9.0, -11.0):
-        figures += [(f'flat_{-fade:g}', 'A', partial(_flat, fade_out=fade), OLD_CIRCUIT),
-                    (f'zero_{-fade:g}', 'A', partial(_zero, fade_out=fade), OLD_CIRCUIT)]
+        figures += [(f'flat_{-fade:g}', 'article A', partial(_flat, fade_out=fade), OLD_CIRCUIT),
+                    (f'zero_{-fade:g}', 'article A', partial(_zero, fade_out=fade), OLD_CIRCUIT)]
     figures += [(f'height_{pot:g}', 'V', partial(_height, pot=pot), OLD_CIRCUIT)
                 for pot in (0.3, 0.5, 0.7)]
-    figures += [(f'slope_{-gain:g}', 'V/A', partial(_slope, gain=gain), OLD_CIRCUIT)
+    figures += [(f'slope_{-gain:g}', 'V/article A', partial(_slope, gain=gain), OLD_CIRCUIT)
                 for gain in (-2.24, -3.2, -6.4)]
-    figures += [(f'width_{gain:g}', 'A', partial(_zero, gain=gain), OLD_CIRCUIT)
+    figures += [(f'width_{gain:g}', 'article A', partial(_zero, gain=gain), OLD_CIRCUIT)
                 for gain in (2.1, 2.6, 3.1)]
     return {f'T5.{name}': ModelFigure(f'T5.{name}', unit, partial(_of_circuit, figure), circuit)
             for name, unit, figure, circuit in figures}

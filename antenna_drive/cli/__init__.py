@@ -22,6 +22,8 @@ COMMANDS = {
     'live': Command('live', 'open a page to see and turn a running drive'),
     'compile': Command('compile_', 'compile the physics ahead of the first run'),
     'run': Command('run', 'run the drive in one process and write its signals'),
+    'configure': Command('configure', 'make a configuration of your own drive from its data '
+                                      'sheets'),
     'article': Command('article', "repeat the article's experiments and compare the figures"),
     'accuracy': Command('accuracy', 'measure how far a macro-step is from the converged run'),
     'calibrate': Command('calibrate', 'fit parameters to the published figures'),

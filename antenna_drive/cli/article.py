@@ -125,7 +125,7 @@ def _text(found: list[Row], disagreements: list[Contradiction]) -> str:
     return '\n'.join(lines)
 
 
-_LINE = '{:<6}{:<22}{:>10}  {:<32}{:>10}  {:<8}{}'
+_LINE = '{:<6}{:<22}{:>10}  {:<32}{:>10}  {:<12}{}'
 
 
 def _published(row: Row) -> str:

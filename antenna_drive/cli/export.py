@@ -10,7 +10,10 @@ changes; `antenna-drive import` reads all three back.
 
   antenna-drive export run/ run.csv
   antenna-drive export run/ field.csv --field --from 5 --to 25
-  antenna-drive export run/ currents.csv --signals 'motor_*/current'
+  antenna-drive export run/ currents.csv --signals 'motor_*/current' --real-amperes
+
+Currents are in article amperes, one of which is several real ones; --real-amperes adds a column
+such as 'motor_1/real_current [real A]' for each.
 """
 
 from __future__ import annotations
@@ -19,8 +22,10 @@ import argparse
 from pathlib import Path
 
 from antenna_drive.cli.reading import add_recording_options, read
+from antenna_drive.recording.amperes import with_real_amperes
 from antenna_drive.recording.csv_format import write_csv
 from antenna_drive.recording.panels import chosen
+from simgap.errors import UserError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,12 +37,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="write the field test's columns, and no other signal")
     parser.add_argument('--signals', nargs='+', metavar='NAME',
                         help="the signals to write, such as plant/encoder or 'motor_*/current'")
+    parser.add_argument('--real-amperes', action='store_true',
+                        help='write each current in real amperes as well, as a clamp meter shows '
+                             'it')
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the file and what goes beside it."""
+    if args.real_amperes and args.field:
+        raise UserError('--real-amperes: does not go with --field, whose columns are fixed')
     recording = read(args)
     names = chosen(recording, args.signals) if args.signals else None
+    if args.real_amperes:
+        recording, names = with_real_amperes(recording, names or recording.names), None
     for path in write_csv(recording, args.out, field=args.field, names=names):
         print(path)
     return 0

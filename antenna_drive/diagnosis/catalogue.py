@@ -107,7 +107,7 @@ def _friction_effects(into: _Catalogue, component: str, motors: tuple[str, ...])
              simpler='coulomb_friction')
     into.add(component, 'coulomb_friction', 'bearings or brake rub harder or less than assumed',
              'current offset that changes sign with the direction',
-             _one('torque', 'A', -0.069, 3.0, 0.01, add(*at('motor.coulomb_torque')),
+             _one('torque', 'article A', -0.069, 3.0, 0.01, add(*at('motor.coulomb_torque')),
                   healthy=2e-3))
     into.add(component, 'friction_asymmetry', 'a seal or brush rubs more in one direction',
              'current level differs between the directions',
@@ -153,8 +153,8 @@ def _motor_effects(into: _Catalogue, component: str, motors: tuple[str, ...]) ->
              'no answer to small rate errors or demands, hunting at low rates',
              _one('half_width', 'V', 0.0, 0.5, 1e-3, add(*at('amplifier.dead_zone')), healthy=1e-3,
                   form='in front of amplifier 1'),
-             _one('crossover', 'A', 0.0, 2.0, 5e-3, add(*at('amplifier.crossover')), healthy=0.01,
-                  form='crossover of amplifier 2'))
+             _one('crossover', 'article A', 0.0, 2.0, 5e-3, add(*at('amplifier.crossover')),
+                  healthy=0.01, form='crossover of amplifier 2'))
     into.add(component, 'current_limit', 'limiter set lower or higher than assumed',
              'current clipped at another level while it saturates',
              _one('change', '1', -0.9, 0.5, 5e-3, scale(*at('motor.current_limit'))))
@@ -289,7 +289,7 @@ def _sensor_effects(into: _Catalogue, encoder_digit: float) -> None:
                  _one('change', '1', -0.5, 0.5, 1e-3,
                       RecorderError('gain', current, (NAMED[current].gain,))))
         into.add(current, 'offset', 'drift of the ammeter', 'reading shifted',
-                 _one('offset', 'A', -1.0, 1.0, 1e-3,
+                 _one('offset', 'article A', -1.0, 1.0, 1e-3,
                       RecorderError('zero', current, (f'{motor}.ammeter.offset',)), healthy=0.02))
     into.add('encoder', 'quantisation', 'bits of the encoder are lost', 'steps in the angle',
              _quantisation(encoder_digit))

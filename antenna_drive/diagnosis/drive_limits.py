@@ -55,10 +55,10 @@ class DriveLimits:
     rate_deg_s: float = _limit('deg/s', 'rate of the axis')
     acceleration_deg_s2: float = _limit('deg/s^2', 'acceleration of the axis')
     travel_deg: float = _limit('deg', 'from the lowest to the highest elevation of a test')
-    current_A: float = _limit('A', 'current of each motor, article amperes')
+    current_A: float = _limit('article A', 'current of each motor, article amperes')
     voltage_V: float = _limit('V', 'voltage of each armature')
     axis_torque_N_m: float = _limit('N m', 'torque of both gearboxes at the axis')
-    hot_current_A: float = _limit('A', 'current above which the time is limited')
+    hot_current_A: float = _limit('article A', 'current above which the time is limited')
     hot_s: float = _limit('s', 'time of each motor above hot_current_A')
 
     @classmethod

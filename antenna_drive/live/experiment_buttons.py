@@ -15,6 +15,7 @@ from antenna_drive.article.measures import article_measures
 from antenna_drive.article.published import Claim, CLAIMS
 from antenna_drive.emulator.units import build
 from antenna_drive.emulator.wiring import UNITS
+from antenna_drive.live.obtained import claims_of
 from antenna_drive.parameters import load
 from antenna_drive.parameters.changes import check_changes
 from antenna_drive.parameters.loading import check_waveform
@@ -80,17 +81,28 @@ def listed() -> list[dict[str, Any]]:
             for name, experiment in experiments().items()]
 
 
+# The claims' figures in words.
+_WORDS = {
+    'tach_rate': 'motor rate between reversals', 'current_1': 'current of motor 1',
+    'current_2': 'current of motor 2', 'bias': 'torque bias, of the greatest torque',
+    'tach': 'unrest of the motor rate, against T1',
+    'encoder': 'unrest of the axis rate, against T1', 'high': 'greatest bias voltage',
+    'high_share': 'greatest bias voltage, of 13 V', 'low': 'least bias voltage',
+    'low_share': 'least bias voltage, of 13 V', 'time_at_zero': 'share of the time without bias',
+    'final': 'bias in the end, of the greatest torque', 'overshoot': 'overshoot of the bias',
+    'settling': 'settling time of the bias',
+}
+
+
 def claims(name: str) -> list[dict[str, str]]:
     """Return what the article says of an experiment, in words."""
     found = []
-    for claim in CLAIMS:
-        test, _, figure = claim.measure.partition('.')
-        if test.rstrip('ab' if name == 'T2' else '') != name:
-            continue
+    for claim in claims_of(name):
         says, unit = claim.says, _units()[claim.measure]
         if isinstance(says, Mapping):
             says = f'{says["analysis"]:g} {unit} (analysis), {says["field"]:g} {unit} (field)'
-        found.append({'what': figure.replace('_', ' '), 'note': claim.note,
+        found.append({'measure': claim.measure, 'unit': unit,
+                      'what': _WORDS[claim.measure.partition('.')[2]], 'note': claim.note,
                       'says': says if isinstance(says, str) else f'{says:g} {unit}'})
     return found
 

@@ -157,6 +157,10 @@ class DriveLink:
         space, _, name = full.rpartition('/')
         return name if space == self.namespace and name in OUTPUTS else None
 
+    def forget_reports(self) -> None:
+        """Forget what nodes said that have been ended."""
+        self._reports = {}
+
     def nodes(self) -> dict[str, Any]:
         """Return what each node said last of itself, and how long ago [s]."""
         now = time.monotonic()

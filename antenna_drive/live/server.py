@@ -41,6 +41,7 @@ _KINDS = {'.html': 'text/html; charset=utf-8', '.js': 'text/javascript; charset=
 _FILES: dict[str, Path] = {
     '/': FOLDER / 'live' / 'index.html',
     '/uPlot.js': SHARED / 'uplot' / 'uPlot.iife.min.js',
+    '/gestures.js': SHARED / 'gestures.js',
     '/uPlot.css': SHARED / 'uplot' / 'uPlot.min.css',
     **{f'/{path.name}': path for path in sorted((FOLDER / 'live').glob('*.*'))
        if path.suffix in ('.js', '.css')},

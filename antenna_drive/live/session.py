@@ -15,6 +15,7 @@ from antenna_drive.live.board import Board
 from antenna_drive.live.experiment_buttons import listed, plan, preview
 from antenna_drive.live.link import DriveLink
 from antenna_drive.live.loading import recordings_in, thinned
+from antenna_drive.live.obtained import Obtained
 from antenna_drive.live.own_processes import off_the_loop, OwnDrive, RecorderProcess
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.panels import PANELS
@@ -54,6 +55,7 @@ class Session:
         self.link, self.board = link, board
         self._recorder, self._own = recorder, own
         self._restarting = asyncio.Lock()
+        self._obtained = Obtained()
         self._tables: set[str] = set()
         self._acts: dict[str, Callable[[Mapping[str, Any]], Awaitable[Any]]] = {
             'set': self._set, 'run': self._run, 'experiment': self._experiment,
@@ -71,8 +73,17 @@ class Session:
         self._tell_recorder()
         board.post('drive', {'trouble': '', 'ready': False})
 
-    def _tell_experiment(self, name: str | None) -> None:
+    def _tell_experiment(self, name: str | None, before: int = 0) -> None:
+        self._playing = name
+        self._obtained.begin(before)
         self.board.post('experiment', {'name': name})
+        self.board.post('obtained', {'name': name, 'run': 0, 'figures': {}})
+
+    async def _look_at_experiment(self) -> None:
+        name, history = self._playing, self.link.history
+        figures = await off_the_loop(self._obtained.look, name, history) if name else None
+        if figures is not None and name == self._playing:
+            self.board.post('obtained', {'name': name, 'run': history.run, 'figures': figures})
 
     def _tell_recorder(self) -> None:
         recorder = self._recorder
@@ -101,6 +112,8 @@ class Session:
             self.board.post('drive', {
                 'trouble': trouble, 'ready': ready and len(self._tables) == len(OUTPUTS),
                 'lost': self.link.history.lost})
+            self.board.post('nodes', {'nodes': self.link.nodes()})
+            await self._look_at_experiment()
             if was_recording and not self._recorder.running:
                 await off_the_loop(self._recorder.stop)  # it has ended by itself
             if was_recording or self._recorder.running:
@@ -148,7 +161,7 @@ class Session:
         name = _text(message, 'name')
         if name not in experiments():
             raise UserError(f'{name}: no such experiment')
-        own = self._own
+        own, before = self._own, self.link.history.run
         found = plan(name, self.link.settings, own.config if own else ())
         if found.constants and own is None:
             unit, keys = next(iter(found.constants.items()))
@@ -159,6 +172,7 @@ class Session:
             if found.constants and own is not None:
                 self._tables.clear()
                 await off_the_loop(own.stop)
+                self.link.forget_reports()
                 own.start(name)
                 said = 'the drive is started again with the constants of this experiment'
             else:
@@ -166,7 +180,7 @@ class Session:
                     await self._set({'unit': unit, 'values': values})
                 await self._run({'service': 'reset'})
                 said = 'a new run has begun'
-        self._tell_experiment(name)
+        self._tell_experiment(name, before)
         return said
 
     async def _preview(self, message: Mapping[str, Any]) -> Any:

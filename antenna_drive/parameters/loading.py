@@ -132,7 +132,8 @@ def _value(key: str, entry: Entry, item: Any) -> Value:
     mapping_of(key, item, _ENTRY_KEYS)
     if 'value' not in item:
         raise ParameterError(f'{key}: value is missing, allowed is {entry.allowed()}')
-    if 'unit' in item and item['unit'] != entry.unit:
+    # a file may still say A where article amperes are meant
+    if 'unit' in item and item['unit'] not in (entry.unit, entry.unit.replace('article A', 'A')):
         raise ParameterError(f'{key}: unit {quoted(item["unit"])} given, allowed is '
                              f'{entry.unit!r}')
     return _narrowed(key, entry, item).check(key, item['value'])

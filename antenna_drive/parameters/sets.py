@@ -43,7 +43,7 @@ class RateCommand:
 class Amplifier:
     """Amplifiers 1 and 2 of Fig. 6."""
 
-    rate_gain: float = given('A/V', 1e-3, 1e3, 'proportional gain of amplifier 1 [k_r]')
+    rate_gain: float = given('article A/V', 1e-3, 1e3, 'proportional gain of amplifier 1 [k_r]')
     integral_time: float = given('s', 1e-3, 100.0, 'integral time of amplifier 1 [T_2]')
     lag: float = given('s', 1e-4, 10.0, 'lag behind amplifier 1 [T_a]')
     current_feedback_gain: float = given(
@@ -53,7 +53,7 @@ class Amplifier:
         '1', 0.0, 10.0, 'share of the counter torque that reaches amplifier 1 [s_F]')
     offset: float = effect(0.0, 'V', -1.0, 1.0, 'offset at the input of amplifier 1')
     crossover: float = effect(
-        0.0, 'A', 0.0, 10.0, 'demand that the crossover of amplifier 2 swallows')
+        0.0, 'article A', 0.0, 10.0, 'demand that the crossover of amplifier 2 swallows')
     forward_gain_share: float = effect(
         1.0, '1', 0.1, 10.0, 'gain of amplifier 2 as a share of R + G_a')
     dead_zone: float = effect(
@@ -82,12 +82,12 @@ class Armature:
 class Motor:
     """The motor's mechanics, Fig. 7."""
 
-    torque_constant: float = given('N m/A', 1e-3, 1e3, 'torque per article ampere [k_m]')
+    torque_constant: float = given('N m/article A', 1e-3, 1e3, 'torque per article ampere [k_m]')
     friction_torque_per_ampere: float = given(
-        'N m/A', 1e-3, 1e3, 'what one article ampere of friction counts as a torque')
-    current_limit: float = given('A', 1e-2, 1e3, 'greatest current [i_max]')
+        'N m/article A', 1e-3, 1e3, 'what one article ampere of friction counts as a torque')
+    current_limit: float = given('article A', 1e-2, 1e3, 'greatest current [i_max]')
     rotor_inertia: float = given('kg m^2', 1e-6, 1e3, 'rotor inertia [J_m]')
-    coulomb_torque: float = given('A', 0.0, 100.0, 'Coulomb friction of the motor [T_c]')
+    coulomb_torque: float = given('article A', 0.0, 100.0, 'Coulomb friction of the motor [T_c]')
     stiction_ratio: float = given('1', 1.0, 5.0, 'stiction over Coulomb friction, Eq. (4)')
     velocity_threshold: float = given(
         'rad/s', 0.0, 1.0, 'rate below which friction can stop the rotor [v_t]')
@@ -167,7 +167,7 @@ class Ammeter:
     """The reading of the motor current; no loop sees its errors."""
 
     gain: float = effect(1.0, '1', 0.1, 10.0, 'reading per current')
-    offset: float = effect(0.0, 'A', -10.0, 10.0, 'reading at no current')
+    offset: float = effect(0.0, 'article A', -10.0, 10.0, 'reading at no current')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -206,9 +206,9 @@ class Axis:
         '1', -100.0, 100.0, 'cross-elevation error per bend of each mode',
         lengths=(1, MODES_LIMIT))})
     coulomb_torque: float = given(
-        'A', 0.0, 1e3, 'Coulomb friction, as current of both motors together')
+        'article A', 0.0, 1e3, 'Coulomb friction, as current of both motors together')
     friction_torque_per_ampere: float = given(
-        'N m/A', 1e-3, 1e3, 'what one article ampere of friction counts as a motor torque')
+        'N m/article A', 1e-3, 1e3, 'what one article ampere of friction counts as a motor torque')
     stiction_ratio: float = given('1', 1.0, 5.0, 'stiction over Coulomb friction, Eq. (4)')
     velocity_threshold: float = given(
         'rad/s', 0.0, 1e-3, 'rate below which friction can stop the axis [v_t]')
@@ -280,7 +280,7 @@ class TorqueShare:
     bias_pot: float = given('1', 0.0, 1.0, 'bias pot, scales the bias voltage [k_p]', live=True)
     fade_out_voltage: float = given(
         'V', -50.0, 0.0, 'voltage that widens the flat part of the bias [f_o]', live=True)
-    current_to_voltage: float = given('V/A', 1e-3, 100.0, 'volts per current [c_i]')
+    current_to_voltage: float = given('V/article A', 1e-3, 100.0, 'volts per current [c_i]')
     saturation_low: float = given('V', -50.0, 50.0, 'lower limit of Eq. (10)')
     saturation_high: float = given('V', -50.0, 50.0, 'upper limit of Eq. (10)')
     k_2: float = given('1/s', -100.0, 0.0, 'gain of transfer function 2')
@@ -303,7 +303,7 @@ class Filter1:
     gain: float = given('1/s', 0.0, 1e4, "gain [k']", live=True)
     pole: float = given('1/s', 0.0, 1e3, 'pole [p]', live=True)
     difference_gain: float = given(
-        'V/A', 1e-3, 1e3, 'volts per difference of the currents [k_f]')
+        'V/article A', 1e-3, 1e3, 'volts per difference of the currents [k_f]')
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -34,11 +34,11 @@ STATE = rows('voltage', 'integral', 'demand', 'current', 'angle', 'rate', 'presl
 MODE = rows('slip', 'side', 'winding')
 INPUT = rows('rate_command', 'counter_torque', 'axis_angle', 'axis_rate')
 OUTPUTS = (
-    Signal('current', 'A', 'motor current, article amperes'),
+    Signal('current', 'article A', 'motor current, article amperes'),
     Signal('gear_torque', 'N m', 'gearbox torque at the motor shaft, positive drives the axis'),
     Signal('missed_impulse', 'N m s', 'impulse of the gear torque that its extrapolation missed'),
     Signal('tach_rate', 'rad/s', 'tachometer reading', exchanged=False),
-    Signal('ammeter', 'A', 'ammeter reading, article amperes', exchanged=False),
+    Signal('ammeter', 'article A', 'ammeter reading, article amperes', exchanged=False),
 )
 OUTPUT = output_rows(OUTPUTS)
 

@@ -14,7 +14,9 @@ from simgap.logs import column_map
 from simgap.logs.column_map import ImportMap, KnownSignals
 from simgap.logs.mapped import read_mapped
 
-DRIVE = KnownSignals('the drive', {name: unit_of(name) for name in signal_names()}, FIELD_COLUMNS)
+# What a column's unit has to be convertible to: a map's scale makes article amperes of real ones.
+DRIVE = KnownSignals('the drive', {name: unit_of(name).removeprefix('article ')
+                                   for name in signal_names()}, FIELD_COLUMNS)
 
 
 def load_map(path: str | Path) -> ImportMap:

@@ -16,11 +16,11 @@ from typing import NamedTuple
 from antenna_drive.readings import (
     AMMETER, ENCODER, of, RATE_COMMAND, Sensor, TACHOMETER, VOLTMETER,
 )
+from antenna_drive.recording.amperes import ARTICLE
 from antenna_drive.recording.recording import Recording
 from simgap.logs.channel import RecordingError
 
 _DEGREES = 180.0 / math.pi
-_CURRENT = 'article A'
 
 
 class Panel(NamedTuple):
@@ -38,8 +38,8 @@ def _read_by(sensor: Sensor) -> tuple[str, ...]:
 
 PANELS = (
     Panel('Axis rate', 'deg/s', _DEGREES, (RATE_COMMAND, 'plant/axis_rate')),
-    Panel('Motor current', _CURRENT, 1.0, ('motor_1/current', 'motor_2/current')),
-    Panel('Ammeter', _CURRENT, 1.0, _read_by(AMMETER)),
+    Panel('Motor current', ARTICLE, 1.0, ('motor_1/current', 'motor_2/current')),
+    Panel('Ammeter', ARTICLE, 1.0, _read_by(AMMETER)),
     Panel('Motor rate', 'deg/s', _DEGREES, (*_read_by(TACHOMETER), 'plant/pinion_rate')),
     Panel('Torque bias', 'V', 1.0, (*_read_by(VOLTMETER), 'torque_share/counter_torque')),
     Panel('Gear torque', 'N m', 1.0, ('motor_1/gear_torque', 'motor_2/gear_torque')),
@@ -115,15 +115,3 @@ def _idle(recording: Recording, name: str) -> bool:
         if name == ammeter.signal:
             return recording.channels.get(ammeter.instead) == recording[name]
     return signal == 'missed_impulse'
-
-
-def real_amperes(recording: Recording) -> float | None:
-    """Return how many real amperes one article ampere is, None if the recording tells nothing."""
-    for motor in ('motor_1', 'motor_2'):
-        try:
-            ratio = recording.configuration[motor]['armature.physical_amperes_per_article_ampere']
-        except (KeyError, TypeError):
-            continue
-        if isinstance(ratio, float):
-            return ratio
-    return None

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
-from antenna_drive.recording.panels import panels_of, real_amperes
+from antenna_drive.recording.amperes import real_amperes
+from antenna_drive.recording.panels import panels_of
 from antenna_drive.recording.recording import Recording
 from simgap.logs.channel import RecordingError
 from simgap.report.curves import COLOURS

@@ -43,6 +43,13 @@ def unit_of(name: str) -> str:
     return ''
 
 
+def _named(name: str, channel: Channel) -> Channel:
+    """Return a current of the drive in article amperes, where only A was written."""
+    if channel.unit == 'A' and unit_of(name) == 'article A':
+        return Channel('article A', channel.time_ns, channel.values)
+    return channel
+
+
 class Change(NamedTuple):
     """Tuning parameters that changed while the drive ran: they acted from `step` on."""
 
@@ -95,7 +102,7 @@ class Recording:
     >>> recording = Recording.from_arrays(
     ...     [0.0, 0.5, 1.0], {'motor_1/current': [0.0, 1.0, 4.0]})
     >>> recording['motor_1/current'].unit
-    'A'
+    'article A'
     >>> recording.resample(4.0).align().values[:, 0].tolist()
     [0.0, 0.5, 1.0, 2.5, 4.0]
 
@@ -113,7 +120,8 @@ class Recording:
         """Check and freeze everything."""
         for name in self.channels:
             check_name(name)
-        object.__setattr__(self, 'channels', MappingProxyType(dict(self.channels)))
+        object.__setattr__(self, 'channels', MappingProxyType(
+            {name: _named(name, channel) for name, channel in self.channels.items()}))
         try:
             object.__setattr__(self, 'configuration', freeze(dict(self.configuration)))
             object.__setattr__(self, 'notes', freeze(dict(self.notes)))

@@ -77,7 +77,7 @@
                                              points: { size: 4, fill: curve.colour } }))],
       cursor: { y: false, points: { show: false }, sync: { key: group.name },
                 drag: { x: false, y: false, setScale: false },
-                bind: { dblclick: () => () => group.show(...group.whole) } },
+                bind: { dblclick: () => () => group.all() } },
       hooks: { setCursor: [tell] },
     }, uPlot.join(curves.map(curve => [curve.times, curve.values])), element);
     plot.ctx.canvas.setAttribute('role', 'img');
@@ -94,7 +94,7 @@
       });
     }
 
-    listen(plot, group);
+    listenTo(plot, group, () => { active = group; });
     window.addEventListener('resize',
       () => plot.setSize({ width: element.clientWidth, height }));
     for (const medium of ['(prefers-color-scheme: dark)', 'print']) {
@@ -114,67 +114,25 @@
 
   function makeGroup(name, given) {
     if (name) make('h3', holder, name);
-    const group = { name: name || 'all', view: [0, 1] };
+    const group = { name: name || 'all', span: [0, 1] };
     const panels = given.map((panel, i) => makePanel(panel, group, i === given.length - 1));
     const times = panels.flatMap(panel => panel.curves).map(curve => curve.times);
     let first = Math.min(...times.map(t => t[0]));
     let last = Math.max(...times.map(t => t[t.length - 1]));
     if (!(last > first)) { first -= 0.5; last += 0.5; }
-    group.whole = [first, last];
+    group.all = () => group.show(first, last);
     group.show = (from, to) => {
       const span = Math.min(Math.max(to - from, FINEST), last - first);
       const start = Math.min(Math.max(from, first), last - span);
-      group.view = [start, start + span];
+      group.span = [start, start + span];
       for (const { plot } of panels) plot.setScale('x', { min: start, max: start + span });
-      [root.dataset.from, root.dataset.to] = group.view;
+      [root.dataset.from, root.dataset.to] = group.span;
     };
-    group.zoom = (factor, t) =>
-      group.show(t - (t - group.view[0]) * factor, t + (group.view[1] - t) * factor);
-    group.show(first, last);
+    group.all();
     return group;
   }
 
   let active = null;   // the group that the keys act on
-  function listen(plot, group) {
-    let grip = null, marked = false;
-    const share = event => {
-      const box = plot.over.getBoundingClientRect();
-      return Math.min(Math.max((event.clientX - box.left) / box.width, 0), 1);
-    };
-    const timeAt = x => group.view[0] + x * (group.view[1] - group.view[0]);
-    const mark = (from, to) => plot.setSelect({
-      left: Math.min(from, to) * plot.over.clientWidth, top: 0,
-      width: Math.abs(to - from) * plot.over.clientWidth, height: plot.over.clientHeight }, false);
-    plot.over.addEventListener('wheel', event => {
-      event.preventDefault();
-      group.zoom(Math.exp(0.0015 * event.deltaY), timeAt(share(event)));
-    }, { passive: false });
-    plot.over.addEventListener('pointerdown', event => {
-      plot.over.setPointerCapture(event.pointerId);
-      [grip, marked, active] = [share(event), event.shiftKey, group];
-    });
-    plot.over.addEventListener('pointermove', event => {
-      if (grip === null) return;
-      const x = share(event);
-      if (marked) { mark(grip, x); return; }
-      const moved = timeAt(grip) - timeAt(x);
-      grip = x;
-      group.show(group.view[0] + moved, group.view[1] + moved);
-    });
-    plot.over.addEventListener('pointerup', event => {
-      const ends = [grip, share(event)].map(timeAt).sort((a, b) => a - b);
-      const wanted = marked && grip !== null && ends[1] > ends[0];
-      release();
-      if (wanted) group.show(...ends);
-    });
-    // a finger that scrolls the page lets go of the curve
-    plot.over.addEventListener('pointercancel', release);
-    function release() {
-      [grip, marked] = [null, false];
-      mark(0, 0);
-    }
-  }
-
   const data = JSON.parse(document.getElementById('data').textContent).panels;
   const names = [...new Set(data.map(panel => panel.group))];
   const groups = names.map(name => makeGroup(name, data.filter(panel => panel.group === name)));
@@ -187,14 +145,7 @@
   }
 
   holder.addEventListener('keydown', event => {
-    const [from, to] = active.view, middle = (from + to) / 2, step = 0.2 * (to - from);
-    const actions = {
-      '+': () => active.zoom(0.5, middle), '-': () => active.zoom(2, middle),
-      0: () => active.show(...active.whole),
-      ArrowLeft: () => active.show(from - step, to - step),
-      ArrowRight: () => active.show(from + step, to + step),
-    };
-    if (actions[event.key]) { event.preventDefault(); actions[event.key](); }
+    if (keyOn(active, event.key)) event.preventDefault();
   });
   root.dataset.state = 'drawn';
 })();

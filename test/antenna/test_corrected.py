@@ -104,7 +104,7 @@ def test_what_the_recorder_does_is_kept_beside_the_file(
              'start:square.motor_1': 0.4, 'clock:triangle': 0.002}
     made = correct(load(), machine.records, hypothesis(machine, point))
     assert [(item['name'], item['unit']) for item in made.recorder] == [
-        ('clock', 's'), ('zero:current_1', 'A')]
+        ('clock', 's'), ('zero:current_1', 'article A')]
     assert made.recorder[1]['value'] == pytest.approx(0.02)
     assert made.unwritten == ('start of each test',)
     drive, recording = loaded(made, tmp_path), tests['square']
@@ -197,7 +197,7 @@ def test_predict_compares_two_configurations(
     out = tmp_path / 'predicted.csv'
     assert main([*words, '--against', 'reference', '--out', str(out)]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].split()[:3] == ['current_1', '0.01', 'A'] and '% less' in lines[0]
+    assert lines[0].split()[:4] == ['current_1', '0.01', 'article', 'A'] and '% less' in lines[0]
     assert out.read_text().startswith(
         'time_s,rate_command_rad_s,current_1_A,tach_rate_1_rad_s\n')
     read = read_csv(out)

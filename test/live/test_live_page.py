@@ -9,50 +9,18 @@ from pathlib import Path
 from typing import Any
 
 from antenna_drive.recording.files import read_recording
-from chromium import EXECUTABLE, Page
+from chromium import Page
 import pytest
 
 pytest.importorskip('rclpy', reason='rclpy is not installed: no drive to look at')
-pytest.importorskip('tornado', reason='tornado is not installed: no page')
 
-from live_command import LiveCommand  # noqa: E402, I100
-from stand_in_twin import NEXT_TEST, StandInTwin, VERDICT  # noqa: E402
+from stand_in_twin import NEXT_TEST, StandInTwin, VERDICT  # noqa: E402, I100
 
-pytestmark = pytest.mark.skipif(EXECUTABLE is None, reason='there is no Chromium '
-                                                           '(apt-get install chromium)')
 # Eq. (9): the greatest bias voltage is this times the bias pot [V].
 FULL_BIAS_V = 13.0
 SAMPLES = 'antennaDrive.samples'
 STATE = 'document.getElementById("state").textContent'
 BIAS_POT = '[data-name="bias_pot"]'
-
-
-@pytest.fixture(scope='module')
-def live(module_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[LiveCommand]:
-    """Return the command with a drive of its own, which all tests of this file share."""
-    with LiveCommand(tmp_path_factory.mktemp('live'), module_domain) as command:
-        yield command
-
-
-@pytest.fixture(scope='module')
-def opened(live: LiveCommand, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
-    """Return the page with its first curves."""
-    with Page(tmp_path_factory.mktemp('profile')) as browser:
-        browser.open(live.url)
-        browser.until(f'{SAMPLES}.time > 0.2 && {STATE} === "playing"')
-        browser.until(f'document.querySelector(\'{BIAS_POT} input[type="range"]\')')
-        yield browser
-
-
-@pytest.fixture
-def page(opened: Page, live: LiveCommand) -> Iterator[Page]:
-    """Return the page, wide and on its first tab; in the end nobody has complained."""
-    opened.look(1400, 900)
-    opened.click('#tab-tune')
-    opened.tell('document.activeElement.blur()')
-    yield opened
-    assert opened.complaints == []
-    assert all(url.startswith((live.url, 'data:')) for url in opened.requests)
 
 
 def last_change(page: Page) -> Any:
@@ -96,14 +64,51 @@ def test_a_slider_that_is_dragged_turns_the_drive(page: Page) -> None:
     assert page.until(greatest) == pytest.approx(FULL_BIAS_V * pot, rel=1e-6)
 
 
-def test_a_value_that_the_node_refuses_is_shown_with_its_reason(page: Page) -> None:
-    field = f'document.querySelector(\'{BIAS_POT} input[type="number"]\')'
-    before = page.tell(f'{field}.value')
-    page.tell(f'{field}.value = "2"; {field}.dispatchEvent(new Event("change"))')
-    reason = page.until(f'document.querySelector("{BIAS_POT.replace(chr(34), chr(39))} '
-                        '.refused").textContent')
-    assert 'bias_pot' in reason and '2' in reason
+def typed(page: Page, name: str, text: str) -> str:
+    """Type a text into a parameter's field and press Enter; return the field as an expression."""
+    field = f'document.querySelector(\'[data-name="{name}"] input[type="text"]\')'
+    page.tell(f'{field}.focus(); {field}.value = {text!r}; '
+              f'{field}.dispatchEvent(new Event("input")); '
+              f'{field}.dispatchEvent(new Event("change"))')
+    return field
+
+
+def reason_of(page: Page, name: str) -> Any:
+    return page.until(f'document.querySelector(\'[data-name="{name}"] .refused\').textContent')
+
+
+@pytest.mark.parametrize('text', ['2', '1,250', '', 'much', '1.2.3'])
+def test_a_value_that_is_refused_returns_to_the_old_one(page: Page, text: str) -> None:
+    before = page.tell(f'document.querySelector(\'{BIAS_POT} input[type="text"]\').value')
+    field = typed(page, 'bias_pot', text)
+    assert text in reason_of(page, 'bias_pot')
+    assert page.tell(f'document.activeElement === {field}'), 'as after Enter'
     page.until(f'{field}.value === {before!r}')
+    slider = page.tell(f'Number(document.querySelector(\'{BIAS_POT} input[type="range"]\').value)')
+    assert slider == pytest.approx(float(before), abs=1e-3)
+
+
+def test_a_decimal_comma_is_right(page: Page) -> None:
+    field = typed(page, 'bias_pot', '0,625')
+    page.until('antennaDrive.charts.changes.at(-1)?.changes.bias_pot === 0.625')
+    page.until(f'{field}.value === "0.625"')
+    assert page.tell('[...document.querySelectorAll("#tune .refused")]'
+                     '.every(line => line.textContent === "")')
+
+
+def test_what_is_typed_is_never_another_number(page: Page) -> None:
+    page.tell('import("/typed.js").then(module => { window.typed = module; })')
+    page.until('window.typed')
+    for text, value in (('0,5', 0.5), (',5', 0.5), ('-1,5e-3', -0.0015), ('0,125', 0.125),
+                        ('12,5', 12.5), ('1e3', 1000), ('+.5', 0.5), ('7', 7)):
+        assert page.tell(f'typed.readNumber({text!r})') == {'value': value}, text
+    for text in ('1,250', '1.234,5', '1,234.5', '0x10', '1 000', '5,', 'Infinity', 'nan', ' '):
+        assert 'value' not in page.tell(f'typed.readNumber({text!r})'), text
+    assert 'value' not in page.tell('typed.readNumber("1,5", true)'), 'no whole number'
+    for text in ('0.5, 1', '0.5 1', '0.5; 1', '0.5 ;1,'):
+        assert page.tell(f'typed.readNumbers({text!r})') == {'values': [0.5, 1]}, text
+    for text in ('0,5', '0,5 1', '1,2,3', '1, b'):
+        assert 'values' not in page.tell(f'typed.readNumbers({text!r})'), text
 
 
 def test_the_keyboard_pauses_steps_and_goes_on(page: Page) -> None:
@@ -185,7 +190,7 @@ def test_a_twin_is_shown_with_its_verdict_and_its_next_test_is_played(
     page.until(f'{text}.includes("gap since 3 s") && {text}.includes("70 % after 45 s")')
     assert page.tell('document.querySelector("#twin .twin h2").textContent') == '/beside/watcher'
     assert page.tell('document.querySelector("#twin td").textContent') == (
-        '0.5 A instead of 0.01 A, mean +9.0 sigma')
+        '0.5 article A instead of 0.01 article A, mean +9.0 sigma')
     # a line for each answer, and its points: as high as it is probable
     assert page.tell('document.querySelectorAll("#twin polyline").length') == 4
     first, second = page.tell('[...document.querySelector("#twin polyline").points]'
@@ -213,7 +218,8 @@ def test_nothing_is_cut_off(page: Page, width: int, dark: bool) -> None:
         page.tell(f'document.getElementById("tab-{tab}").click()')
         page.until(f'!document.getElementById("{tab}").hidden')
         assert page.until('document.documentElement.scrollWidth') <= width
-        cut = page.tell(f"""[...document.querySelectorAll('header button, header *, #{tab} *')]
+        cut = page.tell(f"""[...document.querySelectorAll(
+            'header button, header *, #chips *, .looked *, .head *, #{tab} *')]
             .filter(e => e.getClientRects().length && !e.closest('datalist'))
             .filter(e => {{ const b = e.getBoundingClientRect();
                             return b.left < -1 || b.right > innerWidth + 1; }})

@@ -90,10 +90,10 @@ def test_published_levels_are_those_of_the_article() -> None:
     assert rates == pytest.approx([math.radians(193.0), -math.radians(193.0)]), 'Section IV'
     assert {item['name'] for item in listed()} == set(experiments())
     assert all(item['claims'] for item in listed())
-    said = {(item['name'], claim['what']): claim['says']
-            for item in listed() for claim in item['claims']}
-    assert said['T3b', 'low'] == '7.2 V (analysis), 8 V (field)', 'Fig. 20'
-    assert said['T1', 'tach rate'] == '193 deg/s', 'Section IV'
+    said = {claim['measure']: claim['says'] for item in listed() for claim in item['claims']}
+    assert said['T3b.low'] == '7.2 V (analysis), 8 V (field)', 'Fig. 20'
+    assert said['T3b.time_at_zero'] == 'never', 'Fig. 20'
+    assert said['T1.tach_rate'] == '193 deg/s', 'Section IV'
 
 
 def test_a_preview_is_what_the_drive_plays() -> None:

@@ -139,7 +139,7 @@ def test_bags_of_others_are_read(tmp_path: Path) -> None:
     recording = read_bag(tmp_path / 'run')
     assert recording.names == ('motor_1/current', 'lonely')
     assert recording['motor_1/current'].values.tolist() == [1.5, -2.5]
-    assert recording['motor_1/current'].unit == 'A'
+    assert recording['motor_1/current'].unit == 'article A'
     assert recording['lonely'].unit == ''
     assert recording.notes['skipped_topics'] == ('/chatter',)
 

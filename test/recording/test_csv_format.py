@@ -42,7 +42,7 @@ def test_the_field_columns_are_the_drives_signals(tmp_path: Path) -> None:
     assert recording['torque_share/bias_voltage'].values.tolist() == [7.0, 0.009]
     assert recording['torque_share/bias_voltage'].time_ns.tolist() == [0, 20_000_000]
     assert [recording[name].unit for name in FIELD_COLUMNS.values()] == [
-        'rad/s', 'A', 'A', 'rad/s', 'rad/s', 'rad', 'V']
+        'rad/s', 'article A', 'article A', 'rad/s', 'rad/s', 'rad', 'V']
 
 
 def test_columns_may_be_missing_and_in_any_order(tmp_path: Path) -> None:

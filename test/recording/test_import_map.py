@@ -59,7 +59,7 @@ def test_units_signs_scales_offsets_and_clocks(tmp_path: Path) -> None:
     assert recording[ENCODER].values == pytest.approx([math.pi / 2, -math.pi])
     assert recording['weather/wind'].values.tolist() == [3.5]
     assert [recording[n].unit for n in (COMMAND, CURRENT, TACH, ENCODER)] == [
-        'rad/s', 'A', 'rad/s', 'rad']
+        'rad/s', 'article A', 'rad/s', 'rad']
     assert recording.sheet.start == 'rest'
     assert recording.notes['import_map']['signals'][CURRENT]['unit'] == 'mA'
 

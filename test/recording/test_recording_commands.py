@@ -54,7 +54,7 @@ def test_a_part_of_a_bag_in_the_columns_of_a_field_test(bag: Path) -> None:
 def test_only_some_signals(bag: Path) -> None:
     assert main(['export', 'run', 'some.csv', '--signals', 'motor_*/ammeter']) == 0
     header = (bag.parent / 'some.csv').read_text().splitlines()[0]
-    assert header == 'time_s,motor_1/ammeter [A],motor_2/ammeter [A]'
+    assert header == 'time_s,motor_1/ammeter [article A],motor_2/ammeter [article A]'
 
 
 def test_a_csv_of_others_comes_in_through_a_map(bag: Path,

@@ -212,7 +212,7 @@ def test_alignment_states_its_method_and_the_widest_gap() -> None:
     assert aligned.longest_gap_s == pytest.approx((1.4, 0.1))
     assert 'straight line' in aligned.method
     assert COMMAND in aligned.method
-    assert aligned.units == ('A', 'rad/s')
+    assert aligned.units == ('article A', 'rad/s')
     assert recording.align(onto=[0.25]).values == pytest.approx(np.array([[1.0, 2.5]]))
 
 
@@ -250,6 +250,6 @@ def test_a_recording_shows_itself_in_two_lines() -> None:
         assert '0 to 19.999 s' in text and 'live changes: 500' in text
         assert 'test_signal/rate_command, ' in text
     assert repr(recording['motor_1/current']) == (
-        'Channel [A]: 20000 samples from 0 to 19.999 s, -1 to 1')
+        'Channel [article A]: 20000 samples from 0 to 19.999 s, -1 to 1')
     assert repr(Recording({})) == 'Recording: 0 signals, 0 samples\n  '
     assert repr(Channel('', np.empty(0, np.int64), np.empty(0))) == 'Channel: no sample'

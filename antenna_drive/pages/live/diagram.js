@@ -61,7 +61,7 @@ export class Diagram {
     this.samples = samples;
     this.units = new Map();
     for (const panel of panels)
-      for (const name of panel.names) this.units.set(name, [panel.unit.replace('article ', ''), panel.factor]);
+      for (const name of panel.names) this.units.set(name, [panel.unit, panel.factor]);
     this.holder = document.getElementById('diagram');
     this.narrow = matchMedia('(max-width: 40rem)');
     this.narrow.addEventListener('change', () => this.build());
@@ -83,19 +83,20 @@ export class Diagram {
       const [label, [name]] = BLOCKS[key];
       add('rect', {x, y, width, height: HEIGHT});
       add('text', {x: x + width / 2, y: y + 19}, label);
-      const text = add('text', {x: x + width / 2, y: y + 41, class: 'value'}, '–');
-      text.setAttribute('data-signal', name);
-      return [name, text];
+      const text = add('text', {x: x + width / 2, y: y + 41, class: 'value', 'data-signal': name});
+      const number = draw('tspan', text, '–');
+      draw('tspan', text, ` ${this.units.get(name)[0]}`, {class: 'unit'});
+      return [name, number];
     });
     this.holder.replaceChildren(svg);
+    this.draw();
   }
 
   draw() {
     const {samples} = this;
-    for (const [name, text] of this.texts) {
-      const [unit, factor] = this.units.get(name);
-      const shown = `${digits(samples.last(name) * factor)} ${unit}`;
-      if (text.textContent !== shown) text.textContent = shown;
+    for (const [name, number] of this.texts) {
+      const shown = digits(samples.last(name) * this.units.get(name)[1]);
+      if (number.textContent !== shown) number.textContent = shown;
     }
     for (const [name, path] of this.flows) {
       const size = Math.abs(samples.last(name));

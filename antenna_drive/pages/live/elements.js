@@ -29,9 +29,9 @@ export const colour = n => (dark.matches ? ON_DARK : ON_LIGHT)[n % ON_LIGHT.leng
 export function digits(value, most = 4) {
   if (!Number.isFinite(value)) return '–';
   const size = Math.abs(value);
-  if (size !== 0 && (size >= 1e6 || size < 1e-4)) return value.toExponential(2);
-  const after = size === 0 ? most - 2
-    : Math.max(0, Math.min(6, most - 1 - Math.floor(Math.log10(size))));
+  if (size === 0) return '0';
+  if ((size >= 1e6 || size < 1e-4)) return value.toExponential(2);
+  const after = Math.max(0, Math.min(6, most - 1 - Math.floor(Math.log10(size))));
   const text = value.toFixed(after);
   return Number(text) === 0 ? text.replace('-', '') : text;
 }

@@ -1,13 +1,14 @@
 // One parameter: a slider and a field, a switch, a choice or a list. A change is sent at once; while
-// one is on its way only the newest value waits.
+// one is on its way only the newest value waits. What is refused returns to the value in force.
 import {make, plain} from './elements.js';
+import {readNumber, readNumbers} from './typed.js';
 
 let count = 0;
 
 export class Knob {
   // `send` takes SI values by name and returns a promise of {ok, reason}.
   constructor(parent, entry, send, label = '') {
-    Object.assign(this, {entry, send, busy: false, waiting: null, value: entry.value});
+    Object.assign(this, {entry, send, busy: false, waiting: null, value: entry.value, typing: false});
     const id = `knob-${++count}`;
     this.element = make('div', parent, '', {class: 'knob', 'data-name': entry.name});
     const name = make('div', this.element, '', {class: 'name'});
@@ -24,8 +25,10 @@ export class Knob {
 
   makeNumber(id) {
     const {entry} = this;
-    this.field = make('input', this.entryElement, '', {
-      id, type: 'number', step: 'any', title: `allowed is ${entry.allowed}`});
+    this.field = this.makeField({id, class: 'number', inputmode: 'decimal'}, text => {
+      const {value, reason} = readNumber(text, entry.whole);
+      return {value: value / entry.factor, reason};
+    });
     make('span', this.entryElement, entry.unit === '1' ? '' : entry.unit, {class: 'unit'});
     this.slider = make('input', this.element, '', {
       type: 'range', 'aria-label': `${entry.name} slider`});
@@ -33,7 +36,6 @@ export class Knob {
     this.ends = [make('span', ends), make('span', ends)];
     this.reach(entry.from, entry.to);
     this.slider.addEventListener('input', () => this.ask(Number(this.slider.value) / entry.factor, true));
-    this.field.addEventListener('change', () => this.ask(Number(this.field.value) / entry.factor));
   }
 
   reach(from, to) {
@@ -65,11 +67,34 @@ export class Knob {
 
   makeText(id) {
     const {entry} = this;
-    this.text = make('input', this.entryElement, '', {
-      id, type: 'text', title: `allowed is ${entry.allowed}`});
+    this.text = this.makeField({id}, text => {
+      if (entry.kind === 'text') return {value: text};
+      const {values, reason} = readNumbers(text);
+      return {value: values?.map(one => one / entry.factor), reason};
+    });
     if (entry.unit && entry.unit !== '1') make('span', this.entryElement, entry.unit, {class: 'unit'});
-    this.text.addEventListener('change', () => this.ask(entry.kind === 'text' ? this.text.value
-      : this.text.value.split(/[\s,;]+/).filter(Boolean).map(one => Number(one) / entry.factor)));
+  }
+
+  // A field to type into; `read` returns {value} or {reason} for a text.
+  makeField(attributes, read) {
+    const field = make('input', this.entryElement, '', {
+      ...attributes, type: 'text', autocomplete: 'off', spellcheck: 'false',
+      title: `allowed is ${this.entry.allowed}`});
+    const ended = () => { this.typing = false; };
+    field.addEventListener('input', () => { this.typing = true; });
+    field.addEventListener('change', () => {
+      ended();
+      const {value, reason} = read(field.value);
+      if (reason) this.refuse(reason);
+      else this.ask(value);
+    });
+    field.addEventListener('blur', ended);
+    return field;
+  }
+
+  refuse(reason) {
+    this.refused.textContent = reason;
+    this.show(this.entry.value);
   }
 
   // Sends a value, or keeps it until the one before is answered.
@@ -83,9 +108,10 @@ export class Knob {
     this.busy = true;
     const told = await this.send({[this.entry.name]: value});
     this.busy = false;
-    this.refused.textContent = told.ok ? '' : told.reason;
-    if (!told.ok) this.show(this.entry.value);
-    else this.entry.value = value;
+    if (told.ok) {
+      this.refused.textContent = '';
+      this.entry.value = value;
+    } else this.refuse(told.reason);
     if (this.waiting) {
       const {value: next} = this.waiting;
       this.waiting = null;
@@ -102,9 +128,11 @@ export class Knob {
   show(value) {
     const {entry, field, slider} = this;
     this.value = value;
+    this.element.classList.toggle('draft', 'inForce' in entry
+      && JSON.stringify(value) !== JSON.stringify(entry.inForce));
     if (field) {
       const shown = value * entry.factor;
-      if (document.activeElement !== field) field.value = plain(shown);
+      if (!this.typing) field.value = plain(shown);
       if (shown < this.from || shown > this.to)
         this.reach(Math.min(this.from, shown) / entry.factor, Math.max(this.to, shown) / entry.factor);
       if (slider.value !== String(shown)) slider.value = shown;
@@ -113,7 +141,7 @@ export class Knob {
       for (const [choice, button] of this.buttons)
         button.setAttribute('aria-pressed', String(choice === value));
     } else if (this.select) this.select.value = value;
-    else if (document.activeElement !== this.text)
+    else if (!this.typing)
       this.text.value = Array.isArray(value) ? value.map(one => plain(one * entry.factor)).join(', ')
         : String(value);
   }

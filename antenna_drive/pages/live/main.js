@@ -3,6 +3,8 @@ import {Link} from './link.js';
 import {Samples} from './samples.js';
 import {Charts} from './charts.js';
 import {Diagram} from './diagram.js';
+import {About} from './about.js';
+import {Freshness} from './freshness.js';
 import {Run} from './run.js';
 import {Tune} from './tune.js';
 import {Signal} from './signal.js';
@@ -15,9 +17,11 @@ import {makeTabs} from './tabs.js';
 const link = new Link();
 const samples = new Samples();
 const charts = new Charts(samples);
-const run = new Run(link, samples);
-const parts = [run, new Tune(link), new Signal(link), new Article(link, charts),
-               new Tapes(link, charts, samples), new Nodes(), new Twin(link)];
+const freshness = new Freshness(samples);
+const run = new Run(link, samples, freshness);
+const parts = [freshness, run, new About(), charts, new Tune(link), new Signal(link),
+               new Article(link, charts), new Tapes(link, charts, samples), new Nodes(freshness),
+               new Twin(link)];
 let diagram = null;
 
 makeTabs(document.querySelector('.tabs'));
@@ -27,7 +31,6 @@ link.on('hello', told => {
   charts.begin(told.panels);
   diagram = new Diagram(samples, told.panels);
 });
-link.on('changes', told => charts.mark(told.changes));
 for (const part of parts)
   for (const [kind, take] of Object.entries(part.takes()))
     link.on(kind, take);
@@ -46,4 +49,4 @@ requestAnimationFrame(draw);
 link.open();
 
 // for tests and for the curious
-window.antennaDrive = {link, samples, charts, run};
+window.antennaDrive = {link, samples, charts, run, freshness};

@@ -1,11 +1,10 @@
 // Run control and recording: the buttons at the top, and their keys.
 import {say} from './elements.js';
-
-const LOST_MS = 3000;
+import {readNumber} from './typed.js';
 
 export class Run {
-  constructor(link, samples) {
-    Object.assign(this, {link, samples, state: 'waiting', at: 0, connected: false, trouble: ''});
+  constructor(link, samples, freshness) {
+    Object.assign(this, {link, samples, freshness, state: 'waiting', at: 0, connected: false});
     const get = id => document.getElementById(id);
     this.pill = get('state');
     this.clock = get('clock');
@@ -18,8 +17,7 @@ export class Run {
     this.stepButton.addEventListener('click', () => this.step());
     get('reset').addEventListener('click', () => this.reset());
     this.record.addEventListener('click', () => this.toggleRecord());
-    this.pace.addEventListener('change', () => this.link.order({
-      do: 'set', unit: 'test_signal', values: {'run.pace': Number(this.pace.value)}}));
+    this.pace.addEventListener('change', () => this.askPace(Number(this.pace.value)));
     addEventListener('keydown', event => this.key(event));
     setInterval(() => this.show(), 100);
   }
@@ -28,7 +26,7 @@ export class Run {
     return {
       state: told => { [this.state, this.at] = [told.state, told.step]; this.show(); },
       open: is => { this.connected = is; this.show(); },
-      drive: told => { [this.ready, this.lost] = [told.ready, told.lost || 0]; this.setTrouble(told.trouble); },
+      drive: told => { this.ready = told.ready; },
       own: told => { if (told.unit === 'test_signal') this.setPace(told.values['run.pace']); },
       parameters: told => {
         const pace = told.entries.find(entry => entry.name === 'run.pace');
@@ -38,27 +36,31 @@ export class Run {
     };
   }
 
+  async askPace(pace) {
+    const told = await this.link.order({do: 'set', unit: 'test_signal', values: {'run.pace': pace}});
+    this.setPace(told.ok ? pace : this.inForce);
+  }
+
   setPace(pace) {
     if (pace === undefined) return;
+    this.inForce = pace;
     const text = String(pace);
     if (![...this.pace.options].some(option => option.value === text))
       this.pace.add(new Option(text, text));
     this.pace.value = text;
   }
 
-  setTrouble(text) {
-    const line = document.getElementById('trouble');
-    line.textContent = text;
-    line.hidden = !text;
+  // State for people, and the colour that it has.
+  said() {
+    const {samples, freshness: {missing}} = this;
+    if (!this.connected) return ['lost', missing ? 'no connection' : 'connecting'];
+    if (missing === 'start' || (!this.ready && !samples.arrived)) return ['waiting', 'starting'];
+    if (missing) return ['lost', missing === 'steps' ? 'no steps come' : 'stale'];
+    return [this.state, this.state];
   }
 
   show() {
-    const {samples} = this, now = performance.now();
-    if (samples.arrived !== this.seen) [this.seen, this.seenAt] = [samples.arrived, now];
-    let state = this.state, text = state;
-    if (!this.connected) [state, text] = ['lost', 'no connection'];
-    else if (!this.ready && !samples.arrived) [state, text] = ['waiting', 'starting'];
-    else if (state === 'playing' && now - this.seenAt > LOST_MS) [state, text] = ['lost', 'no steps come'];
+    const {samples} = this, [state, text] = this.said();
     if (this.pill.textContent !== text) this.pill.textContent = text;
     this.pill.dataset.state = state;
     const clock = `${(samples.time || 0).toFixed(samples.time >= 1000 ? 1 : 3)} s`;
@@ -73,8 +75,10 @@ export class Run {
   }
 
   step() {
-    if (this.state === 'paused')
-      this.link.order({do: 'run', service: 'step', steps: Math.round(Number(this.steps.value))});
+    if (this.state !== 'paused') return;
+    const {value, reason} = readNumber(this.steps.value, true);
+    if (reason) say(`Step: ${reason}`);
+    else this.link.order({do: 'run', service: 'step', steps: value});
   }
 
   reset() { this.link.order({do: 'run', service: 'reset'}); }

@@ -25,6 +25,7 @@ export class Samples {
     this.run = run;
     this.newest = -1;
     this.oldest = 0;
+    this.first = null;      // interval with the first value that came
     this.interval = 0.01;
     this.time = 0;
     this.step = 1e-3;
@@ -48,6 +49,7 @@ export class Samples {
       const place = (first + n) % KEPT * signals;
       this.lows.set(numbers.subarray(n * signals, (n + 1) * signals), place);
       this.highs.set(numbers.subarray(size + n * signals, size + (n + 1) * signals), place);
+      if (this.first === null && !Number.isNaN(this.lows[place])) this.first = first + n;
     }
     this.now.set(numbers.subarray(2 * size));
     this.newest = Math.max(this.newest, first + intervals - 1);
@@ -64,6 +66,11 @@ export class Samples {
     const news = this.news;
     this.news = false;
     return news;
+  }
+
+  // Time of the first value that is still known [s].
+  begun() {
+    return Math.max(this.first ?? 0, this.oldest) * this.interval;
   }
 
   last(name) {

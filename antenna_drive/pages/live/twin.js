@@ -1,8 +1,8 @@
 // The twins: whether drive and twin agree, the verdict as it grows, and the next test.
 import {colour, dark, levelClass, make, say} from './elements.js';
+import {ago, REPORT_S} from './freshness.js';
 import {lines} from './verdict_chart.js';
 
-const SILENT_MS = 3500;
 const SHOWN = 6;
 
 export class Twin {
@@ -37,10 +37,10 @@ export class Twin {
 class Card {
   constructor(holder, name, link) {
     Object.assign(this, {name, link, verdict: null, heard: 0, reports: 0});
-    const card = make('section', holder, '', {class: 'twin', 'aria-label': `twin ${name}`});
+    const card = this.card = make('section', holder, '', {class: 'twin', 'aria-label': `twin ${name}`});
     make('h2', card, name);
+    this.silent = make('p', card, '', {class: 'silent level-ERROR'});
     this.state = make('p', card, '', {role: 'status'});
-    this.silent = make('p', card, '', {class: 'level-ERROR'});
     this.gaps = make('table', card);
     this.about = make('p', card, '', {class: 'small'});
     make('h2', card, 'Verdict');
@@ -91,8 +91,9 @@ class Card {
   }
 
   age() {
-    const seconds = Math.round((performance.now() - this.heard) / 1000);
-    this.silent.textContent = seconds * 1000 > SILENT_MS ? `nothing heard for ${seconds} s` : '';
+    const seconds = (performance.now() - this.heard) / 1000, late = seconds > REPORT_S;
+    this.silent.textContent = late ? `no report for ${ago(seconds)}; what follows is the last` : '';
+    this.card.classList.toggle('stale', late);
   }
 
   paint() {

@@ -1,0 +1,253 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Every number of a configuration from a sheet, each with its source.
+
+The greatest current of the drive is that of the reference drive in article amperes. So one article
+ampere is another number of real ones, and the torque-share circuit keeps its shape against the
+drive's greatest torque.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import math
+from typing import NamedTuple
+
+from antenna_drive.configuring.resonance import mode_scale, rigid_frequency
+from antenna_drive.configuring.sheet import FIGURES, Sheet
+from antenna_drive.parameters import load
+from antenna_drive.parameters.sets import Drive
+import numpy as np
+from scipy.optimize import brentq
+from simgap.inputs.schema import ParameterError
+
+_TWO_MOTORS = 2.0
+# Bandwidths: corner of the integral below, and of the lag above, the bandwidth of the rate loop.
+_INTEGRAL_BELOW, _LAG_ABOVE = 4.0, 10.0
+
+
+class Number(NamedTuple):
+    """One entry of a configuration: its section and name, its value [SI], and where it is from."""
+
+    section: str
+    name: str
+    value: float | tuple[float, ...]
+    source: str
+
+
+def reference(circuit: str) -> Drive:
+    """Return the reference drive with the old or the new circuit."""
+    return load(f'{circuit}_circuit')
+
+
+def kappa(sheet: Sheet) -> float:
+    """Return how many real amperes one article ampere of this drive is."""
+    limit = reference(sheet.circuit).motor_1.motor.current_limit
+    return sheet['amplifier.greatest_current'] / limit
+
+
+def derived(sheet: Sheet) -> Iterator[Number]:
+    """
+    Yield every number that follows from a sheet; what is not yielded stays that of the reference.
+
+    Raises
+    ------
+    ParameterError : the figures contradict one another; the message says which and the remedy
+
+    """
+    drive = reference(sheet.circuit)
+    yield from _motor(sheet, drive)
+    yield from _gearbox(sheet, drive)
+    yield from _axis(sheet, drive)
+    yield from _friction(sheet, drive)
+    yield from _loops(sheet, drive)
+
+
+def _shown(sheet: Sheet, *keys: str) -> str:
+    return ', '.join(f'{key} = {sheet.figures[key].written}' for key in keys)
+
+
+def _motor(sheet: Sheet, drive: Drive) -> Iterator[Number]:
+    real, limit = kappa(sheet), drive.motor_1.motor.current_limit
+    constant = sheet['motor.torque_constant'] * real
+    per_ampere = (f'derived: {_shown(sheet, "motor.torque_constant")} times {real:.4g} real '
+                  'amperes')
+    yield Number('armature', 'physical_amperes_per_article_ampere', real,
+                 f'derived: {_shown(sheet, "amplifier.greatest_current")} over {limit:g} article '
+                 'amperes')
+    yield Number('motor', 'current_limit', limit,
+                 'by definition: the greatest current is that of the reference drive in article '
+                 'amperes')
+    yield Number('motor', 'torque_constant', constant, per_ampere)
+    for section in ('motor', 'axis'):
+        yield Number(section, 'friction_torque_per_ampere', constant, per_ampere)
+    for name, key in (('resistance', 'motor.resistance'), ('inductance', 'motor.inductance'),
+                      ('voltage_limit', 'amplifier.greatest_voltage')):
+        yield Number('armature', name, sheet[key], f'sheet: {_shown(sheet, key)}')
+    emf = sheet.get('motor.back_emf')
+    yield Number('armature', 'back_emf_constant',
+                 sheet['motor.torque_constant'] if emf is None else emf,
+                 'assumed: as large as the torque constant' if emf is None
+                 else f'sheet: {_shown(sheet, "motor.back_emf")}')
+    yield Number('motor', 'rotor_inertia', sheet['motor.rotor_inertia'],
+                 f'sheet: {_shown(sheet, "motor.rotor_inertia")}')
+
+
+def _stiffness(sheet: Sheet) -> float:
+    """Return the stiffness of one gearbox at the motor shaft [N m/rad]."""
+    given, ratio = sheet.figures['gear.stiffness'], sheet['gear.ratio']
+    return given.value if given.at_motor else given.value / ratio**2
+
+
+def _gearbox(sheet: Sheet, drive: Drive) -> Iterator[Number]:
+    ratio, stiffness = sheet['gear.ratio'], _stiffness(sheet)
+    backlash = sheet.figures['gear.backlash']
+    motor, gearbox = drive.motor_1.motor, drive.motor_1.gearbox
+    damping = gearbox.contact_damping / (
+        2.0 * math.sqrt(gearbox.stiffness * motor.rotor_inertia))
+    squared = '' if sheet.figures['gear.stiffness'].at_motor else ' over gear.ratio squared'
+    times = '' if backlash.at_motor else ' times gear.ratio'
+    yield Number('axis', 'gear_ratio', ratio, f'sheet: {_shown(sheet, "gear.ratio")}')
+    yield Number('gearbox', 'stiffness', stiffness,
+                 f'derived: {_shown(sheet, "gear.stiffness")}{squared}')
+    yield Number('gearbox', 'half_gap',
+                 0.5 * backlash.value * (1.0 if backlash.at_motor else ratio),
+                 f'derived: half of {_shown(sheet, "gear.backlash")}{times}')
+    yield Number('gearbox', 'contact_damping',
+                 2.0 * damping * math.sqrt(stiffness * sheet['motor.rotor_inertia']),
+                 f'assumed: damping ratio {damping:.3g} of rotor and gearbox, as in the reference')
+
+
+def _axis(sheet: Sheet, drive: Drive) -> Iterator[Number]:
+    axis, ratio = drive.plant.axis, sheet['gear.ratio']
+    whole = axis.inertia_hub + sum(axis.mode_inertias)
+    share = sheet['axis.inertia'] / whole
+    hub, inertias = share * axis.inertia_hub, share * np.asarray(axis.mode_inertias)
+    frequencies = np.asarray(axis.mode_frequencies)
+    stiffness = _TWO_MOTORS * _stiffness(sheet) * ratio**2
+    try:
+        scale = mode_scale(hub, inertias, frequencies, stiffness, sheet['axis.first_resonance'])
+    except ValueError:
+        rigid = rigid_frequency(sheet['axis.inertia'], stiffness)
+        raise ParameterError(
+            f'{sheet.source}: axis.first_resonance: '
+            f'{sheet.figures["axis.first_resonance"].written} given, but '
+            f'{_shown(sheet, "axis.inertia", "gear.stiffness")} resonate at {rigid:.3g} Hz with '
+            'the rotors held, even if the structure is rigid; one of the three is wrong') from None
+    yield Number('axis', 'inertia_hub', hub,
+                 f'derived: {_shown(sheet, "axis.inertia")}, hub and modes as in the reference')
+    yield Number('axis', 'mode_inertias', tuple(inertias), 'derived: as the hub')
+    yield Number('axis', 'mode_frequencies', tuple(scale * frequencies),
+                 f'derived: {scale:.4g} times those of the reference give '
+                 f'{_shown(sheet, "axis.first_resonance")}')
+
+
+def _friction(sheet: Sheet, drive: Drive) -> Iterator[Number]:
+    """Yield Coulomb and viscous friction from the currents at two rates."""
+    real, rates = kappa(sheet), (sheet['friction.slow_rate'], sheet['friction.fast_rate'])
+    currents = sheet['friction.slow_current'], sheet['friction.fast_current']
+    if rates[1] <= rates[0]:
+        raise ParameterError(f'{sheet.source}: friction.fast_rate: '
+                             f'{sheet.figures["friction.fast_rate"].written} given, allowed is a '
+                             'rate above friction.slow_rate')
+    slope = (currents[1] - currents[0]) / (rates[1] - rates[0])
+    level = currents[0] - slope * rates[0]
+    if slope < 0.0 or level <= 0.0:
+        raise ParameterError(
+            f'{sheet.source}: friction.fast_current: '
+            f'{sheet.figures["friction.fast_current"].written} given, allowed is between '
+            f'friction.slow_current and {rates[1] / rates[0]:.3g} times it: friction that falls '
+            'with the rate is that of creep, give two faster rates')
+    motor, axis = drive.motor_1.motor, drive.plant.axis
+    both = axis.coulomb_torque + _TWO_MOTORS * motor.coulomb_torque
+    two = _shown(sheet, 'friction.slow_current', 'friction.fast_current')
+    for section, part in (('axis', axis), ('motor', motor)):
+        share = part.coulomb_torque / both  # type: ignore[attr-defined]
+        yield Number(section, 'coulomb_torque', share * level / real,
+                     f'derived: {two} are {level:.4g} real A at rate zero; '
+                     f'{100 * share:.3g} percent of it, as in the reference')
+        ratio = sheet.get('friction.stiction_ratio')
+        if ratio is not None:
+            yield Number(section, 'stiction_ratio', ratio,
+                         f'sheet: {_shown(sheet, "friction.stiction_ratio")}')
+    yield Number('axis', 'viscous_friction',
+                 slope * sheet['motor.torque_constant'] * sheet['gear.ratio'],
+                 f'derived: slope of {two} over the rates, times torque constant and gear.ratio; '
+                 'all of it at the axis')
+
+
+def _loops(sheet: Sheet, drive: Drive) -> Iterator[Number]:
+    """Yield the gains of amplifiers and Filter 1 from bandwidths."""
+    ratio, tachometer = sheet['gear.ratio'], sheet['amplifier.tachometer']
+    wanted = 2.0 * math.pi * sheet['amplifier.rate_loop']
+    inertia = sheet['motor.rotor_inertia'] + sheet['axis.inertia'] / (_TWO_MOTORS * ratio**2)
+    constant = sheet['motor.torque_constant'] * kappa(sheet)
+    gain = wanted * inertia / (tachometer * constant)
+    yield Number('amplifier', 'tach_gain', tachometer,
+                 f'sheet: {_shown(sheet, "amplifier.tachometer")}')
+    k_s = drive.motor_1.rate_command.k_s
+    yield Number('rate_command', 'k_1', tachometer * ratio / k_s,
+                 f'derived: the tachometer times gear.ratio over k_s = {k_s:g}')
+    yield Number('amplifier', 'rate_gain', gain,
+                 f'derived: {_shown(sheet, "amplifier.rate_loop")} with {inertia:.4g} kg m^2 at '
+                 'each motor shaft')
+    found = {'amplifier.integral_time': _INTEGRAL_BELOW / wanted,
+             'amplifier.lag': 1.0 / (_LAG_ABOVE * wanted)}
+    for figure in FIGURES:
+        if figure.key in found:
+            own = sheet.get(figure.key)
+            found[figure.key] = found[figure.key] if own is None else own
+            yield Number('amplifier', figure.key.partition('.')[2], found[figure.key],
+                         f'assumed: {figure.optional}' if own is None
+                         else f'sheet: {_shown(sheet, figure.key)}')
+    current = 2.0 * math.pi * sheet['amplifier.current_loop'] * sheet['motor.inductance']
+    if current < sheet['motor.resistance']:
+        slowest = sheet['motor.resistance'] / (2.0 * math.pi * sheet['motor.inductance'])
+        raise ParameterError(
+            f'{sheet.source}: amplifier.current_loop: '
+            f'{sheet.figures["amplifier.current_loop"].written} given, but the armature alone has '
+            f'{slowest:.3g} Hz: give at least that')
+    yield Number('amplifier', 'current_feedback_gain', current - sheet['motor.resistance'],
+                 f'derived: {_shown(sheet, "amplifier.current_loop")} times motor.inductance, '
+                 'less motor.resistance')
+    circuit, limit = drive.torque_share.circuit, drive.motor_1.motor.current_limit
+    difference = circuit.bias_pot * circuit.saturation_high / (sheet['bias.share'] * limit)
+    yield Number('filter_1', 'difference_gain', difference,
+                 f'derived: {_shown(sheet, "bias.share")} of {limit:g} article A for '
+                 f'{circuit.bias_pot:g} times {circuit.saturation_high:g} V')
+    yield _bias_gain(sheet, drive, gain, difference, found, current)
+
+
+def _bias_gain(sheet: Sheet, drive: Drive, gain: float, difference: float,
+               found: dict[str, float], current: float) -> Number:
+    amplifier, armature = drive.motor_1.amplifier, drive.motor_1.armature
+    before = _Loop(2.0 * amplifier.bias_command_gain * amplifier.rate_gain
+                   * drive.torque_share.filter_1.difference_gain, amplifier.integral_time,
+                   amplifier.lag, armature.inductance / (
+                       armature.resistance + amplifier.current_feedback_gain), drive)
+    crossing = float(brentq(lambda omega: before.size(omega) - 1.0, 1e-3, 1e5))
+    after = before._replace(
+        gain=2.0 * gain * difference, integral_time=found['amplifier.integral_time'],
+        lag=found['amplifier.lag'], current_lag=sheet['motor.inductance'] / current)
+    return Number('amplifier', 'bias_command_gain', 1.0 / after.size(crossing),
+                  f'derived: the loop through Filter 1 crosses over at {crossing:.3g} rad/s with '
+                  'held rotors, as in the reference')
+
+
+class _Loop(NamedTuple):
+    """The loop through Filter 1 with held rotors: gain, integral time, lags [s], Filter 1."""
+
+    gain: float
+    integral_time: float
+    lag: float
+    current_lag: float
+    drive: Drive
+
+    def size(self, omega: float) -> float:
+        """Return how much the loop amplifies at a frequency [rad/s]."""
+        s = 1j * omega
+        filter_1 = self.drive.torque_share.filter_1
+        return abs(self.gain * (1.0 + 1.0 / (s * self.integral_time))
+                   * filter_1.gain / (s + filter_1.pole)
+                   / (1.0 + s * self.lag) / (1.0 + s * self.current_lag))
