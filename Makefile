@@ -1,7 +1,9 @@
-# A virtual environment of its own: one with the ROS 2 wheels, or one for each sourced ROS 2.
+# A virtual environment of its own: one with the ROS 2 wheels, one for each release that ROS names
+# (make test ROS=kilted), or one for each sourced ROS 2.
 export PYTHON ?= python3
-ROS := $(shell [ -n "$$ROS_DISTRO" ] && $(PYTHON) -c 'import rclpy' 2>/dev/null && echo -$$ROS_DISTRO)
-VENV := .venv$(ROS)
+export ROS ?=
+SOURCED := $(shell [ -n "$$ROS_DISTRO" ] && $(PYTHON) -c 'import rclpy' 2>/dev/null && echo -$$ROS_DISTRO)
+VENV := .venv$(if $(ROS),-wheels-$(ROS),$(SOURCED))
 READY := $(VENV)/ready
 PY := $(VENV)/bin/python
 PYTEST_ARGS ?=
@@ -15,7 +17,7 @@ help:
 	@echo 'make demo    set everything up, then run the saw-tooth test on the old and the new'
 	@echo '             circuit in five ROS 2 processes; results in out/demo'
 	@echo 'make test    the whole suite with the linters and mypy; PYTEST_ARGS="-k backlash"'
-	@echo '             runs a part'
+	@echo '             runs a part, ROS=kilted the wheels of that ROS 2 release'
 	@echo 'make trials  what make test leaves out because it takes minutes'
 	@echo 'make campaign  look for faults for some hours; resumable; results in out/campaign.'
 	@echo '             CAMPAIGN_ARGS="--dose medium" takes half an hour, --short ten minutes'
@@ -30,7 +32,7 @@ help:
 
 set-up: $(READY)
 
-$(READY): setup.py setup.cfg pyproject.toml scripts/set-up
+$(READY): setup.py setup.cfg pyproject.toml antenna_drive/ros_releases.py scripts/set-up
 	scripts/set-up $(VENV)
 	@touch $@
 

@@ -3,6 +3,7 @@
 """Build and install antenna_drive: with pip, with or without ROS 2, or with colcon."""
 
 from pathlib import Path
+import runpy
 import sys
 
 from setuptools import find_packages, setup
@@ -12,12 +13,9 @@ PACKAGE = 'antenna_drive'
 # Executables whose module has another name; any other module of nodes/ with a main has its own.
 NAMES = {'signal_generator': 'test_signal'}
 
-# ROS 2 Kilted as wheels: CPython 3.10 to 3.14 on x86-64 Linux, and nowhere else. The wheels of
-# one release fit each other alone (ros-rclpy pins its own to the patch), so each is held to
-# Kilted's series; elsewhere the extra is empty and the nodes say what is missing.
-KILTED = ('ros-rclpy[fastrtps] ~= 9.1', 'ros-std-msgs ~= 5.5', 'ros-std-srvs ~= 5.5',
-          'ros-rosgraph-msgs ~= 2.3', 'ros-diagnostic-msgs ~= 5.5', 'ros-sensor-msgs ~= 5.5')
-WHEELS_EXIST = "sys_platform == 'linux' and platform_machine == 'x86_64'"
+# The table of ROS 2 releases, each of which is an extra. It cannot be imported: what the package
+# needs is not installed yet.
+ROS = runpy.run_path(str(Path(PACKAGE, 'ros_releases.py')))
 
 
 # The engine is a distribution of its own, simgap/pyproject.toml. A wheel cannot name a folder as a
@@ -107,7 +105,7 @@ setup(
         'threadpoolctl >= 3.0',
     ],
     extras_require={
-        'ros': [f'{wheel} ; {WHEELS_EXIST}' for wheel in KILTED],
+        **ROS['extras'](),
         'plot': ['matplotlib >= 3.6'],
         'calibrate': ['cma >= 3.2'],
         'parquet': ['pyarrow >= 10'],
@@ -152,7 +150,7 @@ setup(
         'bench': [
             'control >= 0.10',
             'pathsim >= 0.27',
-            f'drake >= 1.51 ; {WHEELS_EXIST}',
+            f'drake >= 1.51 ; {ROS["WHEELS_EXIST"]}',
             'dask[distributed] >= 2024.1',
         ],
         'colcon': ['colcon-core >= 0.15', 'colcon-ros', 'colcon-common-extensions'],

@@ -9,7 +9,7 @@ message is sent and received.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 import importlib
 from importlib import metadata
@@ -26,6 +26,7 @@ from typing import Any
 
 from antenna_drive import __version__
 from antenna_drive.remedies import ROS_REMEDY
+from antenna_drive.ros_releases import release_of, wheels
 import simgap
 from simgap.command.remedies import REMEDIES
 from simgap.errors import one_line
@@ -78,41 +79,57 @@ def _machine() -> Iterator[Finding]:
 def _libraries(part: str, *modules: str) -> Callable[[], Iterator[Finding]]:
     def check() -> Iterator[Finding]:
         for module in modules:
-            yield _library(part, module)
+            yield _library(part, module, _bounds())
     return check
 
 
-def _library(part: str, module: str) -> Finding:
-    """Import a library and compare its version with what this package asks for."""
+def _library(part: str, module: str, bounds: Mapping[str, str]) -> Finding:
+    """Import a library, look for its files, compare its version with what `bounds` ask for."""
+    names = sorted(set(metadata.packages_distributions().get(module, ())))
+    if gone := [name for name in names if _lacks_files(name)]:
+        return Finding(part, module, BROKEN,
+                       f'files of {", ".join(gone)} are gone, as after an upgrade in place',
+                       f'pip install --force-reinstall --no-deps {" ".join(gone)}')
     try:
         importlib.import_module(module)
     except ModuleNotFoundError as error:
         name = (error.name or '').partition('.')[0]
-        if name == module.partition('.')[0]:
-            return Finding(part, module, MISSING, 'not installed',
-                           REMEDIES.get(name, f'pip install {name}'))
-        return Finding(part, module, BROKEN, one_line(error), REMEDIES.get(name, ''))
+        if name == module:
+            return Finding(part, module, MISSING, 'not installed', REMEDIES.get(
+                name, f"in a checkout: pip install -e '.[{part}]'"))
+        return Finding(part, module, BROKEN, one_line(error),
+                       REMEDIES.get(name, f'pip install {name}'))
     except Exception as error:  # whatever a library that does not fit raises
         return Finding(part, module, BROKEN, one_line(f'{type(error).__name__}: {error}'),
                        'install it again in this environment')
-    distribution = {'yaml': 'PyYAML', 'jinja2': 'Jinja2'}.get(module, module)
-    try:
-        version = metadata.version(distribution)
-    except metadata.PackageNotFoundError:
+    name = next((name for name in names if name.lower() in bounds), ''.join(names[:1]))
+    if not name:
         return Finding(part, module, OK, 'found')
-    wanted = _bounds().get(distribution.lower(), '')
+    version, wanted = metadata.version(name), bounds.get(name.lower(), '')
     if not _within(version, wanted):
         return Finding(part, module, BROKEN, f'{version}, wanted {wanted}',
-                       f"pip install '{distribution}{wanted}'")
+                       f"pip install '{name}{wanted}'")
     return Finding(part, module, OK, version)
+
+
+def _lacks_files(name: str) -> bool:
+    """Tell whether code that pip has installed with a distribution is no longer there."""
+    distribution = metadata.distribution(name)
+    if distribution.read_text('RECORD') is None:  # not of pip
+        return False
+    return any(path.suffix == '.py' or '.so' in path.suffixes
+               for path in distribution.files or () if not Path(path.locate()).exists())
 
 
 def _bounds() -> Mapping[str, str]:
     """Return the versions that this package asks for, by distribution."""
     try:
-        required = metadata.requires('antenna_drive') or []
+        return _read_bounds(metadata.requires('antenna_drive') or ())
     except metadata.PackageNotFoundError:  # run from its sources
         return {}
+
+
+def _read_bounds(required: Iterable[str]) -> dict[str, str]:
     found: dict[str, str] = {}
     for text in required:
         if match := _REQUIREMENT.match(text):
@@ -136,8 +153,7 @@ def _numbers(version: str) -> tuple[int, ...]:
 
 
 def _physics() -> Iterator[Finding]:
-    yield from (_library('physics', module) for module in ('numpy', 'scipy', 'numba', 'yaml',
-                                                           'threadpoolctl'))
+    yield from _libraries('physics', 'numpy', 'scipy', 'numba', 'yaml', 'threadpoolctl')()
     from antenna_drive.emulator.run import simulate
     from antenna_drive.parameters import load
     began = time.monotonic()
@@ -157,7 +173,8 @@ def _physics() -> Iterator[Finding]:
 
 
 def _ros() -> Iterator[Finding]:
-    found = [_library('nodes', module) for module in (
+    release, known = _release()
+    found = [_library('nodes', module, known) for module in (
         'rclpy', 'std_msgs', 'std_srvs', 'rosgraph_msgs', 'diagnostic_msgs', 'sensor_msgs')]
     for finding in found:
         if finding.what == 'rclpy' and finding.state == BROKEN:
@@ -165,10 +182,8 @@ def _ros() -> Iterator[Finding]:
         yield finding
     if any(finding.state != OK for finding in found):
         return
-    distribution = os.environ.get('ROS_DISTRO', 'none sourced: the wheels of this environment')
     from rclpy.utilities import get_rmw_implementation_identifier
-    yield Finding('nodes', 'ROS 2', OK,
-                  f'{distribution}, {get_rmw_implementation_identifier()}')
+    yield Finding('nodes', 'ROS 2', OK, f'{release}, {get_rmw_implementation_identifier()}')
     yield _loopback()
     yield _discovery()
     yield from _ros2_run()
@@ -176,6 +191,19 @@ def _ros() -> Iterator[Finding]:
     if free is not None and free < 64.0:
         yield Finding('nodes', 'shared memory', NOTE, f'{free:.0f} MB free in /dev/shm',
                       'make room: without it messages go through the network stack')
+
+
+def _release() -> tuple[str, Mapping[str, str]]:
+    """Return which ROS 2 is used, and what its wheels are held to where it is of wheels."""
+    if distribution := os.environ.get('ROS_DISTRO'):
+        return f'{distribution}, sourced', {}
+    try:
+        release = release_of(metadata.version('ros-rclpy'))
+    except metadata.PackageNotFoundError:
+        return 'none sourced', {}
+    if release is None:
+        return 'wheels of a release that was not tried', {}
+    return f'wheels of {release}', _read_bounds(wheels(release))
 
 
 def _loopback() -> Finding:
@@ -252,21 +280,32 @@ def _files() -> Iterator[Finding]:
             yield Finding('files', what, OK, f'{folder}, {free:.0f} GB free')
 
 
-# Parts in the order in which they are told; those of NEEDED are no choice.
+# Parts in the order in which they are told; those of NEEDED are no choice, and those of CHECKOUT,
+# for who changes or measures the package, are examined when they are named.
 PARTS: dict[str, Callable[[], Iterator[Finding]]] = {
     'machine': _machine,
     'files': _files,
     'physics': _physics,
-    'pages': _libraries('pages', 'jinja2'),
     'nodes': _ros,
-    'recording': _libraries('recording', 'mcap'),
-    'plot': _libraries('plot', 'matplotlib'),
-    'calibrate': _libraries('calibrate', 'cma'),
-    'cluster': _libraries('cluster', 'distributed'),
-    'completion': _libraries('completion', 'shtab'),
-    'mujoco': _libraries('mujoco', 'mujoco'),
-    'fmu': _libraries('fmu', 'fmpy'),
+    **{part: _libraries(part, *modules) for part, modules in {
+        'pages': ('jinja2',),
+        'recording': ('mcap',),
+        'plot': ('matplotlib',),
+        'live': ('tornado',),
+        'foxglove': ('foxglove',),
+        'parquet': ('pyarrow',),
+        'calibrate': ('cma',),
+        'cluster': ('distributed',),
+        'completion': ('shtab',),
+        'mujoco': ('mujoco',),
+        'fmu': ('fmpy',),
+        'test': ('pytest', 'pytest_timeout', 'xdist', 'hypothesis', 'mypy', 'rosbags', 'flake8',
+                 'vermin'),
+        'bench': ('control', 'pathsim', 'pydrake'),
+        'colcon': ('colcon_core', 'colcon_ros'),
+    }.items()},
 }
+CHECKOUT = ('test', 'bench', 'colcon')
 NEEDED = ('machine', 'files', 'physics', 'pages')
 
 

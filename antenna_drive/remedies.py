@@ -4,11 +4,11 @@
 
 from __future__ import annotations
 
+from antenna_drive.ros_releases import wheels
 from simgap.command.remedies import REMEDIES
 
-ROS_REMEDY = ("source a ROS 2 installation, or on x86-64 Linux: pip install 'ros-rclpy[fastrtps]' "
-              'ros-std-msgs ros-std-srvs ros-rosgraph-msgs ros-diagnostic-msgs '
-              'ros-sensor-msgs')
+ROS_REMEDY = ('source a ROS 2 installation, or on x86-64 Linux: pip install '
+              + ' '.join(f"'{wheel}'" for wheel in wheels()))
 REMEDIES.update(dict.fromkeys((
     'rclpy', 'rcl_interfaces', 'std_msgs', 'std_srvs', 'rosgraph_msgs', 'diagnostic_msgs',
     'sensor_msgs'), ROS_REMEDY))
@@ -20,4 +20,5 @@ REMEDIES.update({
     'shtab': 'pip install shtab',
     'tornado': 'pip install tornado',
     'foxglove': 'pip install foxglove-sdk',
+    'pyarrow': 'pip install pyarrow',
 })

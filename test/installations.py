@@ -9,10 +9,12 @@ from dataclasses import dataclass
 import importlib.util
 import os
 from pathlib import Path
+import runpy
 import shutil
 import subprocess
 import sys
 import sysconfig
+from typing import Any
 
 import pytest
 
@@ -47,6 +49,16 @@ def outside_environment() -> dict[str, str]:
     return {**os.environ, 'PYTHONPATH': os.pathsep.join(
         entry for entry in os.environ.get('PYTHONPATH', '').split(os.pathsep)
         if entry and Path(entry).resolve() != ROOT)}
+
+
+def declared(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """Return what setup.py says of this package."""
+    found: dict[str, Any] = {}
+    monkeypatch.chdir(ROOT)
+    monkeypatch.setattr(sys, 'argv', ['setup.py'])
+    monkeypatch.setattr('setuptools.setup', lambda **said: found.update(said))
+    runpy.run_path('setup.py')
+    return found
 
 
 def copy_source(target: Path) -> Path:

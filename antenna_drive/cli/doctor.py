@@ -20,7 +20,9 @@ from __future__ import annotations
 import argparse
 import sys
 
-from antenna_drive.health import as_data, BROKEN, examine, Finding, MISSING, NEEDED, OK, PARTS
+from antenna_drive.health import (
+    as_data, BROKEN, CHECKOUT, examine, Finding, MISSING, NEEDED, OK, PARTS,
+)
 from simgap.command.output import add_json_option, give
 from simgap.command.programs import NEGATIVE, NOT_INSTALLED, OK as DONE
 from simgap.errors import UserError
@@ -29,7 +31,8 @@ from simgap.errors import UserError
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     parser.add_argument('parts', nargs='*', metavar='PART',
-                        help=f'what to examine: {", ".join(PARTS)} (default: all)')
+                        help=f'what to examine: {", ".join(PARTS)} (default: all '
+                             f'but {", ".join(CHECKOUT)})')
     add_json_option(parser)
 
 
@@ -38,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     for part in arguments.parts:
         if part not in PARTS:
             raise UserError(f'{part}: no such part; there are {", ".join(PARTS)}')
-    wanted = arguments.parts or list(PARTS)
+    wanted = arguments.parts or [part for part in PARTS if part not in CHECKOUT]
     needed = set(arguments.parts or NEEDED)
     findings: list[Finding] = []
     for part in wanted:

@@ -44,7 +44,7 @@ READ_QOS = QoSProfile(
 )
 
 
-class NotForExecutors(CallbackGroup):
+class NotForExecutors(CallbackGroup):  # type: ignore[misc]
     """The group of the subscriptions that no executor may serve."""
 
     def can_execute(self, entity: Any) -> bool:

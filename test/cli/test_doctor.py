@@ -13,6 +13,8 @@ from typing import Any
 from antenna_drive import health
 from antenna_drive.cli import main
 from antenna_drive.health import _within
+from antenna_drive.ros_releases import RELEASES
+from installations import declared
 import pytest
 
 Capture = pytest.CaptureFixture[str]
@@ -61,6 +63,46 @@ def test_an_older_version_than_asked_for_is_a_fault(
     [item] = findings(capsys)
     assert item['found'].endswith('wanted >=99.0')
     assert item['remedy'] == "pip install 'Jinja2>=99.0'"
+
+
+def test_what_an_upgrade_in_place_took_away_is_told(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    """Two distributions share a folder; removing the older whole one took files of the core."""
+    (tmp_path / 'shared_arm').mkdir()
+    (tmp_path / 'shared_arm' / '__init__.py').write_text('import shared_arm._core')
+    for name, files in {'shared-arm': '__init__.py', 'shared-arm-core': '_core.so.4'}.items():
+        info = tmp_path / f'{name.replace("-", "_")}-4.0.dist-info'
+        info.mkdir()
+        (info / 'METADATA').write_text(f'Metadata-Version: 2.1\nName: {name}\nVersion: 4.0\n')
+        (info / 'top_level.txt').write_text('shared_arm')
+        (info / 'RECORD').write_text(f'shared_arm/{files},,\n')
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setitem(health.PARTS, 'arm', health._libraries('arm', 'shared_arm'))
+    assert main(['doctor', 'arm', '--json', '-']) == 1
+    [item] = findings(capsys)
+    assert item['found'] == 'files of shared-arm-core are gone, as after an upgrade in place'
+    assert item['remedy'] == 'pip install --force-reinstall --no-deps shared-arm-core'
+    (tmp_path / 'shared_arm' / '_core.so.4').touch()
+    (tmp_path / 'shared_arm' / '_core.py').touch()
+    assert main(['doctor', 'arm', '--json', '-']) == 0
+    assert [item['found'] for item in findings(capsys)] == ['4.0']
+
+
+def test_wheels_of_two_releases_do_not_pass_for_one(
+        monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    pytest.importorskip('rclpy', reason='rclpy is not installed')
+    monkeypatch.setattr(health, '_release', lambda: ('wheels of another', {
+        'ros-std-msgs': '>=99', 'std_msgs': '>=99'}))
+    assert main(['doctor', 'nodes', '--json', '-']) == 1
+    found = {item['what']: item for item in findings(capsys)}
+    assert found['std_msgs']['found'].endswith('wanted >=99')
+    assert 'a message' not in found, 'no part of such a mixture is tried'
+
+
+def test_every_extra_is_a_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of ROS 2 releases are one part, and a part is an extra or no choice."""
+    assert set(declared(monkeypatch)['extras_require']) - {'ros', *RELEASES} == {
+        *health.PARTS} - {*health.NEEDED, 'nodes'}
 
 
 @pytest.mark.parametrize(('version', 'bounds', 'fits'), [

@@ -8,6 +8,7 @@ import os
 from pathlib import Path
 import subprocess
 
+from antenna_drive.ros_releases import RELEASES
 from installations import NODES, ROOT
 import pytest
 
@@ -38,7 +39,8 @@ def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv('PYTHON', str(programs / 'python'))
     monkeypatch.setenv('PATH', f'{programs}:{os.environ["PATH"]}')
     monkeypatch.setenv('LOG', str(tmp_path / 'log'))
-    monkeypatch.delenv('ROS_DISTRO', raising=False)
+    for name in ('ROS_DISTRO', 'ROS'):
+        monkeypatch.delenv(name, raising=False)
     return programs
 
 
@@ -84,6 +86,25 @@ def test_sourced_ros_of_another_python(machine: Path) -> None:
     """A sourced ROS 2 that this Python cannot load is not counted on."""
     become(machine, 'Linux x86_64')
     assert '.[ros,' in set_up(machine, **ROS, **NO_ROS)[2]
+
+
+@pytest.mark.parametrize('release', RELEASES)
+def test_wheels_of_a_release(machine: Path, release: str) -> None:
+    """Whoever names a release gets its wheels and no others."""
+    become(machine, 'Linux x86_64')
+    code, said, did = set_up(machine, **NO_ROS, ROS=release)
+    assert code == 0 and f'.[{release},plot,' in did and 'ros,' not in did.replace(release, '')
+
+
+@pytest.mark.parametrize('variables, remedy', [
+    ({'ROS': 'foxy', **NO_ROS}, f'there are {" ".join(RELEASES)}'),
+    ({'ROS': 'jazz', **NO_ROS}, f'there are {" ".join(RELEASES)}'),
+    ({'ROS': 'jazzy', **ROS}, 'a shell without')])
+def test_wheels_that_cannot_be_had(machine: Path, variables: dict[str, str], remedy: str) -> None:
+    """A release that is none, or wheels beside a sourced ROS 2, are refused in one line."""
+    code, said, did = set_up(machine, **variables)
+    assert code == 1 and did == ''
+    assert said.count('\n') == 1 and remedy in said and f'ROS={variables["ROS"]}' in said
 
 
 @pytest.mark.parametrize('name', ['Darwin arm64', 'Linux aarch64'])

@@ -16,7 +16,7 @@ from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray
 
 
-class Pointing(Node):
+class Pointing(Node):  # type: ignore[misc]
     """Answers the encoder's angle [rad] with [rate command [rad/s], external torque [N m]]."""
 
     def __init__(self) -> None:
