@@ -28,6 +28,8 @@ from antenna_drive.lockstep.report import Report
 from antenna_drive.lockstep.ros_link import FrameLink
 from antenna_drive.lockstep.run_services import RunServices, StateReader
 from antenna_drive.lockstep.serving import Serving
+from antenna_drive.lockstep.sim_time import SimTime
+from antenna_drive.lockstep.starting import say_ready
 from numba.core.errors import NumbaError
 from rclpy.node import Node
 from simgap.errors import one_line
@@ -222,10 +224,13 @@ class DriveNode:
     def spin(self) -> None:
         """Take part in runs until `stop` is called."""
         serving = Serving(self._node)
+        clock = self._pace and SimTime(
+            self._node, lambda: self._reached() * self._member.step_s)
         try:
             # What is there now stays: the collector need not look through all of it again.
             gc.freeze()
             self._hello()
+            say_ready(self._node, f'{", ".join(self._member.missing())} to begin a run')
             while not self._stop:
                 if self._exchange is not None and self._exchanged(self._exchange):
                     continue
@@ -237,6 +242,8 @@ class DriveNode:
         finally:
             self._report.ended()
             serving.close()
+            if clock:
+                clock.close()
             self._exchange = None
             self._link.await_delivery(_DELIVERY_S)
             if self._channel is not None:

@@ -12,6 +12,7 @@ from antenna_drive.lockstep.diagnostics import diagnostics
 from antenna_drive.lockstep.exchange import Exchange
 from antenna_drive.lockstep.frame import two_of_one_name
 from antenna_drive.lockstep.member import Member
+from antenna_drive.lockstep.namesakes import LEASE_S, namesake
 from antenna_drive.lockstep.pace import Pace
 from antenna_drive.lockstep.partner_link import PartnerLink
 from antenna_drive.lockstep.run_control import PAUSED, RunState
@@ -24,8 +25,6 @@ PERIOD_S = 1.0
 PATIENCE_S = 0.9
 CUT_OFF = ('; it cannot hear them: it did not run for a second or more, and Fast DDS gave its '
            'shared memory away. Start this node again')
-# Fast DDS takes a process for gone that it has not heard of for so long (the lease duration).
-LEASE_S = 20.0
 # A wait that begins so soon after a sleep may be its consequence.
 SOON_S = 5.0
 
@@ -56,7 +55,7 @@ class Report:
         self._refused_before = 0
         self._late_before = 0
         self._waiting_since: float | None = None
-        self._told: str | None = None  # why it may wait in vain, as the log has it; None: no word
+        self._told: str | None = None  # whom it waits for, as the log has it; None: no word
         self._fault_told = ''
         self._doubled_told: set[tuple[float, str]] = set()  # by run and peer
         self._next_s = 0.0
@@ -97,8 +96,8 @@ class Report:
             self._next_s = now  # people who watch /diagnostics hear of it at once too
 
     def _warn(self) -> None:
-        self._told = self._why()
-        self._node.get_logger().warning(self._waits_for())
+        self._told = self._waits_for()
+        self._node.get_logger().warning(self._told)
 
     def ended(self) -> None:
         """Say once for each run how its steps and its partner's answers came."""
@@ -151,7 +150,10 @@ class Report:
         """Say why the node may wait in vain, if there is a reason to think so."""
         if is_cut_off():
             return CUT_OFF
-        return forgotten(self._slept_s) if self._has_just_slept() else ''
+        if self._has_just_slept():
+            return forgotten(self._slept_s)
+        twice = namesake(self._node)
+        return f'; {twice}' if twice else ''
 
     def _awake(self, now: float) -> None:
         """Note that the node runs at `now` [s], and whether it did not for long."""
@@ -172,7 +174,7 @@ class Report:
         self._next_s = now + PERIOD_S
         if self._waiting_since is not None:
             self.waiting(now)  # the log never says less than the report
-            if self._told is not None and self._why() != self._told:
+            if self._told is not None and self._waits_for() != self._told:
                 self._warn()
         self._warn_of_doubles()
         level, message = self._judge(now)

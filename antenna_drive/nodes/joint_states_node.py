@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from threading import Event
+import time
 from typing import Any
 
 from antenna_drive.emulator.wiring import MOTORS, OUTPUTS, PLANT
@@ -16,6 +17,7 @@ from antenna_drive.lockstep.readings import CHANGES_QOS, READING_OVERRIDES, READ
 from antenna_drive.lockstep.ros_link import FrameLink
 from antenna_drive.lockstep.ros_parameters import Overrides
 from antenna_drive.lockstep.serving import Serving
+from antenna_drive.lockstep.starting import Absence
 from antenna_drive.lockstep.thinning import Thinned, Thinning
 from builtin_interfaces.msg import Time
 from rclpy.node import Node
@@ -83,8 +85,10 @@ def _publish(node: Node, rate_hz: float, joints: Sequence[str], stop: Event) -> 
 
     node.create_subscription(String, f'{PLANT}/changes', listen, CHANGES_QOS)
     serving = Serving(node)
+    absence = Absence(node, link.publishers)
     try:
         while not stop.wait(_PERIOD_S):
+            absence.look(time.monotonic())
             for unit in units:
                 frames = link.take_all(unit)
                 if frames is not None:

@@ -21,6 +21,7 @@ from antenna_drive.lockstep.frame import FrameLayout, new_sender, two_of_one_nam
 from antenna_drive.lockstep.readings import CHANGES_QOS
 from antenna_drive.lockstep.ros_link import FrameLink
 from antenna_drive.lockstep.serving import Serving
+from antenna_drive.lockstep.starting import Absence
 from antenna_drive.recording.bag_writer import SPLIT_S
 from antenna_drive.recording.recorder import RunRecorder
 from antenna_drive.recording.sheet import load_sheet
@@ -116,12 +117,14 @@ class _RecorderNode:
         """Record until told to stop; return the exit code."""
         serving = Serving(self._node)
         self._link.publish(self._own.hello(float(time.time_ns() // 1000), self._sender))
+        absence = Absence(self._node, self._link.publishers)
         try:
             while not self._stop:
                 came = self._link.wait(tuple(OUTPUTS), _LONGEST_WAIT_S)
                 self._gather(came)
                 if not came:
                     self._guarded(self._recorder.idle)
+                    absence.look(time.monotonic())
                 self._look()
             self._follower.finish()
             self._gather(OUTPUTS)

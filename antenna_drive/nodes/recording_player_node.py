@@ -10,6 +10,7 @@ import time
 
 from antenna_drive.lockstep.entry import ros_node, stopped_by_signals
 from antenna_drive.lockstep.ros_parameters import Overrides
+from antenna_drive.lockstep.starting import say_ready
 from antenna_drive.readings import RATE_COMMAND
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.recording import Recording
@@ -67,7 +68,7 @@ def _play(node: Node, recording: Recording, real: str, pace: float, stop: Event)
     names.sort(key=lambda name: name != RATE_COMMAND)
     single = [node.create_publisher(Float64, f'{real}/{name}', _QOS) for name in names]
     rows = node.create_publisher(Float64MultiArray, f'{real}/row', _QOS)
-    node.get_logger().info(f'{real}/row: time, ' + ', '.join(names))
+    say_ready(node, f'a reader of {real}/row: time, {", ".join(names)}')
     while not any(item.get_subscription_count() for item in (rows, *single)):
         if stop.wait(_LOOK_S):
             return

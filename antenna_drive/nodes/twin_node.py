@@ -22,6 +22,7 @@ from antenna_drive.lockstep.getting_ready import told_while_compiling
 from antenna_drive.lockstep.ros_parameters import Overrides
 from antenna_drive.lockstep.run_services import STATE_QOS
 from antenna_drive.lockstep.serving import Serving
+from antenna_drive.lockstep.starting import say_ready
 from antenna_drive.parameters.loading import load
 from antenna_drive.readings import RATE_COMMAND, SIGNALS
 from antenna_drive.recording.sheet import load_sheet, TestSheet
@@ -188,6 +189,7 @@ class _TwinNode:
         """Watch until told to stop; return the exit code."""
         serving = Serving(self._node)
         report_at = 0.0
+        say_ready(self._node, ', '.join(topic.name for topic in self._map.topics))
         try:
             while not self._stop.wait(_PERIOD_S):
                 self._take()
