@@ -47,6 +47,28 @@ def test_plotjuggler() -> None:
     assert str(selected.get('value')).split(';') == [t for _, topics in panels for t in topics]
 
 
+def test_plotjuggler_4() -> None:
+    """The panels and colours of version 3, with topic and field of each curve, and no source."""
+    old, new = (ElementTree.parse(config_dir() / name).getroot()
+                for name in ('plotjuggler.xml', 'plotjuggler.pj4.xml'))
+    assert new.attrib == {'pj4_version': '4', 'binding': 'generic'}
+    assert {element.tag for element in new} == {'tabbed_widget'}
+
+    def shown(root: ElementTree.Element) -> list[tuple[str, list[tuple[str, str]]]]:
+        return [(str(area.get('name')), [(
+            curve.get('name') or f'{curve.get("topic")}{curve.get("field")}',
+            str(curve.get('color'))) for curve in area.iter('curve')])
+            for area in root.iter('DockArea')]
+
+    assert shown(new) == shown(old)
+    for tag in ('Tab', 'DockArea', 'plot'):
+        names = [element.get('id') for element in new.iter(tag)]
+        assert names and None not in names and len(names) == len(set(names))
+    assert {curve.get('field') for curve in new.iter('curve')} == {'/data'}
+    assert [splitter.attrib for splitter in new.iter('DockSplitter')] == [
+        splitter.attrib for splitter in old.iter('DockSplitter')]
+
+
 def leaves(layout: Any) -> Iterator[str]:
     if isinstance(layout, str):
         yield layout
