@@ -18,6 +18,7 @@ import fcntl
 import hashlib
 import json
 import math
+import os
 from pathlib import Path
 import shutil
 import tempfile
@@ -176,7 +177,7 @@ def diagnose_fleet(machines: Sequence[FleetMachine], out: Path, options: FleetOp
         try:
             found = result()
         except TaskLost as error:
-            found = {FAILURE: str(error).encode()}
+            found = {FAILURE: os.fsencode(str(error))}
         rows[machine.name] = _keep(out / MACHINES / machine.name, machine, key, found)
         done(len(rows))
     return [rows[machine.name] for machine in machines]
@@ -219,7 +220,7 @@ def diagnosed(files: Mapping[str, bytes], recordings: Sequence[str],
         said = run_command([*words, '--jobs', str(options.threads), *options.diagnose],
                            options.limit_s, options.memory_MB)
         if not all((folder / path).exists() for path in wanted):
-            return {FAILURE: said.replace(f'{folder}/', '').encode()}
+            return {FAILURE: os.fsencode(said.replace(f'{folder}/', ''))}
         return {path: (folder / path).read_bytes() for path in wanted}
 
 
@@ -328,7 +329,7 @@ def _name(recording: Path) -> str:
 
 def _shipped(config: str) -> str:
     """Return where a configuration file lies for a diagnosis."""
-    return f'config/{hashlib.sha256(config.encode()).hexdigest()[:8]}/{Path(config).name}'
+    return f'config/{hashlib.sha256(os.fsencode(config)).hexdigest()[:8]}/{Path(config).name}'
 
 
 def _key(machine: FleetMachine, options: FleetOptions) -> str:
@@ -336,7 +337,7 @@ def _key(machine: FleetMachine, options: FleetOptions) -> str:
     digest = hashlib.sha256(repr((fingerprint(), options.config, options.diagnose,
                                   options.corrected)).encode())
     for path, content in sorted(_files(machine, options).items()):
-        digest.update(f'{path} {len(content)} '.encode())
+        digest.update(os.fsencode(f'{path} {len(content)} '))
         digest.update(content)
     return digest.hexdigest()
 
@@ -357,13 +358,14 @@ def _keep(folder: Path, machine: FleetMachine, key: str, found: Files) -> dict[s
             for name in (VERDICT, PAGE, CORRECTED):
                 (folder / name).unlink(missing_ok=True)
             _write(folder / FAILURE, found[FAILURE])
-            return _failed(machine, found[FAILURE].decode())
+            return _failed(machine, os.fsdecode(found[FAILURE]))
         verdict = {**json.loads(found.pop(VERDICT)), MADE_FROM: key}
         for name, content in found.items():
             _write(folder / name, content)
         (folder / FAILURE).unlink(missing_ok=True)
         _write(folder / VERDICT,
-               (json.dumps(verdict, indent=2, ensure_ascii=False) + '\n').encode())
+               (json.dumps(verdict, indent=2, ensure_ascii=False) + '\n').encode(
+                   errors='backslashreplace'))
     except OSError as error:
         raise UserError(f'{folder}: cannot be written, {error.strerror}') from error
     return row_of(machine, verdict)

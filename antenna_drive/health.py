@@ -29,7 +29,7 @@ from antenna_drive.remedies import ROS_REMEDY
 from antenna_drive.ros_releases import release_of, wheels
 import simgap
 from simgap.command.remedies import REMEDIES
-from simgap.errors import one_line
+from simgap.errors import one_line, UserError
 
 OK, MISSING, BROKEN, NOTE = 'ok', 'missing', 'broken', 'note'
 # How long a message may take to come back to its own process [s].
@@ -313,6 +313,8 @@ def examine(part: str) -> Iterator[Finding]:
     """Yield what is found of a part; a fault of the check itself is a finding, too."""
     try:
         yield from PARTS[part]()
+    except UserError as error:
+        yield Finding(part, 'check', BROKEN, str(error))
     except Exception as error:  # a part that breaks must not hide the others
         yield Finding(part, 'check', BROKEN, one_line(f'{type(error).__name__}: {error}'),
                       'report this line, with the output of antenna-drive doctor --json -')

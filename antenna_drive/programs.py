@@ -17,10 +17,14 @@ def run_program(name: str, description: str, args: Sequence[str] | None,
                 act: Callable[[list[str]], int]) -> int:
     """Run a program or print its help; return its exit code. The arguments exclude its name."""
     arguments = list(sys.argv[1:] if args is None else args)
-    if '-h' in arguments or '--help' in arguments:
-        print(description.strip())
-        return OK
-    return answered(name, lambda: act(arguments))
+
+    def run() -> int:
+        if '-h' in arguments or '--help' in arguments:
+            print(description.strip())
+            return OK
+        return act(arguments)
+
+    return answered(name, run)
 
 
 def end_with_parent() -> None:

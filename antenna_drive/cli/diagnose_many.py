@@ -30,6 +30,7 @@ import argparse
 import os
 from pathlib import Path
 import shlex
+from urllib.parse import quote
 
 from antenna_drive.cli.sharing import add_diagnosis_options, add_worker_options
 from simgap.command.output import (
@@ -80,6 +81,6 @@ def run(arguments: argparse.Namespace) -> int:
     with replaced(out / 'fleet.html') as stream:
         stream.write(render('fleet.html', title=f'Fleet {arguments.folder.resolve().name}',
                             lead=f'{len(rows)} machines', rows=rows, summary=found,
-                            share=share).encode())
+                            share=share, link=lambda path: quote(os.fsencode(path))).encode())
     give(found, arguments.json, f'{text(rows)}\n{out / "fleet.html"}')
     return NEGATIVE if found['failed'] else OK

@@ -226,8 +226,7 @@ def ros_node(name: str, arguments: Sequence[str], example: str,
     _init_ros(name, arguments, example)
     try:
         try:
-            node = Node(name, automatically_declare_parameters_from_overrides=undeclared,
-                        allow_undeclared_parameters=undeclared)
+            node = Node(name, allow_undeclared_parameters=undeclared)
         except (RuntimeError, InvalidParameterTypeException) as error:
             raise UserError(_first_line(error)) from error
         try:

@@ -109,7 +109,9 @@ class Overrides:
 
     def __init__(self, node: Node) -> None:
         """
-        Read the overrides of a node made with automatically_declare_parameters_from_...
+        Read the overrides of a node.
+
+        rclpy cannot declare an empty list, which has no type, so nothing is declared to be read.
 
         Raises
         ------
@@ -117,14 +119,13 @@ class Overrides:
 
         """
         self._values: dict[str, Any] = {}
-        for name, parameter in node.get_parameters_by_prefix('').items():
+        for name, parameter in node._parameter_overrides.items():
             if name.startswith('qos_overrides.') and '.'.join(name.split('.')[1:-2]).endswith(
                     _FIXED_QOS):
                 raise ParameterError(f'{name}: the lock-step needs the QoS of this topic as it '
                                      'is; those of signals, clock and external can be changed')
             if not name.startswith(_RCLPY_OWN):
-                self._values[name] = _plain(parameter.value)
-                node.undeclare_parameter(name)
+                self._values[name] = [] if parameter.value is None else _plain(parameter.value)
         self._asked: set[str] = set()
         self.own: dict[str, tuple[Entry, Value]] = {}
 

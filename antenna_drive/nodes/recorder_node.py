@@ -62,6 +62,14 @@ def run(arguments: Sequence[str]) -> int:
         return _RecorderNode(node).spin()
 
 
+def _text(node: Node, name: str, default: str) -> str:
+    """Return a parameter that is a text."""
+    given = node.declare_parameter(name, default, ParameterDescriptor(dynamic_typing=True)).value
+    if not isinstance(given, str):
+        raise UserError(f'{name}: {given!r} given, allowed is a text')
+    return given
+
+
 def _seconds(node: Node, name: str, default: float, description: str) -> float | None:
     """Return a parameter that is a time [s]; None for 0."""
     given: Any = node.declare_parameter(name, default, ParameterDescriptor(
@@ -78,8 +86,7 @@ class _RecorderNode:
         self._node = node
         self._log = node.get_logger()
         default = f'recording_{datetime.now():%Y-%m-%d_%H-%M-%S}'
-        out = str(node.declare_parameter('out', default).value)
-        sheet = str(node.declare_parameter('sheet', '').value or '')
+        out, sheet = _text(node, 'out', default), _text(node, 'sheet', '')
         sync_s = _seconds(node, 'sync', 0.0, 'after how long the disk is made to hold what was '
                           'written, 0: at the end of each storage file')
         split_s = _seconds(node, 'split', SPLIT_S, 'after how long the next storage file begins, '

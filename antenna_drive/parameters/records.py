@@ -6,9 +6,11 @@ from __future__ import annotations
 
 from dataclasses import fields
 from functools import cache
+import os
 from typing import Any, get_type_hints
 
 import numpy as np
+from simgap.errors import UserError
 from simgap.inputs.schema import Entry
 
 
@@ -18,8 +20,11 @@ def dtype_of(kind: type) -> np.dtype[Any]:
     Return the record type of a parameter set, with a record in it for each set within.
 
     Numbers become float64, choices and whole numbers int64, lists a fixed number of float64 with
-    their length in `<name>_count`.
+    their length in `<name>_count`. Raises UserError where nothing is compiled.
     """
+    if os.environ.get('NUMBA_DISABLE_JIT', '0').strip() not in ('', '0'):
+        raise UserError('NUMBA_DISABLE_JIT is set, and Python cannot read what the compiled '
+                        'physics reads: unset it')
     hints: dict[str, Any] = get_type_hints(kind)
     parts: list[tuple[Any, ...]] = []
     for item in fields(kind):

@@ -70,7 +70,7 @@ def draw(recording: Recording, stream: IO[bytes], form: str, *,
                     fontsize='small', frameon=False, borderaxespad=0.1)
     axes[-1].set_xlabel('time [s]')
     if title:
-        figure.suptitle(title)
+        figure.suptitle(title.encode(errors='backslashreplace').decode())
     figure.savefig(stream, format=form, dpi=120)
 
 

@@ -9,16 +9,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import difflib
 import importlib
-import os
 import sys
 from typing import Any, NamedTuple
 import warnings
 
 from simgap.command.interruption import interruptible
-from simgap.command.programs import answered, BAD_INPUT, expect_overflow, say
+from simgap.command.programs import answered, expect_overflow, say
 from simgap.errors import UserError
 
-INTERRUPTED, BROKEN_PIPE = 130, 141  # 128 + the signal's number, as shells do
+INTERRUPTED = 130  # 128 + the signal's number, as shells do
 
 EXIT_CODES = """\
 exit codes:
@@ -53,24 +52,12 @@ class Program:
         name = next((word for word in arguments if not word.startswith('-')), '')
         called = f'{self.name} {name}'.rstrip()
         try:
-            try:
-                with interruptible(lambda: say(called, 'interrupted', INTERRUPTED)):
-                    with warnings.catch_warnings():
-                        expect_overflow()
-                        return answered(called, lambda: self._run(name, arguments))
-            finally:
-                sys.stdout.flush()
-        except BrokenPipeError:
-            # The reader has gone. Python would complain again when it flushes at exit.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return BROKEN_PIPE
+            with (interruptible(lambda: say(called, 'interrupted', INTERRUPTED)),
+                  warnings.catch_warnings()):
+                expect_overflow()
+                return answered(called, lambda: self._run(name, arguments))
         except KeyboardInterrupt:
             return say(called, 'interrupted', INTERRUPTED)
-        except OSError as error:
-            if error.strerror is None:
-                raise
-            place = f'{error.filename}: ' if error.filename else ''
-            return say(called, f'{place}{error.strerror}', BAD_INPUT)
 
     def _run(self, name: str, arguments: list[str]) -> int:
         if name and name not in self.commands:

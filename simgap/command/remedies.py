@@ -4,6 +4,11 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+from traceback import walk_tb
+
+from simgap.errors import one_line
+
 # By module. A package that needs more adds to it when it is imported.
 REMEDIES = {
     'yaml': 'pip install PyYAML',
@@ -13,7 +18,12 @@ REMEDIES = {
 }
 
 
-def remedy(error: ModuleNotFoundError) -> str | None:
-    """Return in one line what is missing and how to get it; None if the program is at fault."""
+def remedy(error: ImportError) -> str | None:
+    """Return in one line what is missing, or does not load; None if the program is at fault."""
     missing = (error.name or '').partition('.')[0]
-    return f'needs {missing}: {REMEDIES[missing]}' if missing in REMEDIES else None
+    if isinstance(error, ModuleNotFoundError) and missing in REMEDIES and not find_spec(missing):
+        return f'needs {missing}: {REMEDIES[missing]}'
+    loading = {frame.f_globals.get('__name__', '').partition('.')[0]
+               for frame, _ in walk_tb(error.__traceback__)}
+    return next((f'{name} does not load, {one_line(error, 500)}'
+                 for name in REMEDIES if name in loading), None)

@@ -56,6 +56,14 @@ def test_help_needs_no_ros(node: str) -> None:
     ('motor_drive', ('-p', 'run.pace:=1.0'), 'run.pace'),
     ('motor_drive', ('-r', '__node:=motor_3'), 'motor_1, motor_2'),
     ('motor_drive', ('--params-file', 'no_such_file.yaml'), 'no_such_file.yaml'),
+    # a list without anything in it, which has no type in ROS 2
+    ('signal_generator', ('-p', 'frequencies:=[]'), 'frequencies'),
+    ('signal_generator', ('-p', 'run.pace:=[]'), 'run.pace'),
+    ('torque_share', ('-p', 'bias_pot:=[]'), 'bias_pot'),
+    ('torque_share', ('-p', 'config:=[1, 2]'), 'config: [1, 2] given'),
+    ('joint_states', ('-p', 'joints:=[]'), 'joints'),
+    ('recorder', ('-p', 'out:=[]'), 'out'), ('recorder', ('-p', 'out:=5'), 'out: 5 given'),
+    ('recorder', ('-p', 'sync:=[]'), 'sync'), ('twin', ('-p', 'alarms_per_day:=[]'), 'alarms_per'),
 ])
 @pytest.mark.usefixtures('fresh_domain')
 def test_wrong_input_is_one_line_and_exit_code_2(
@@ -88,6 +96,22 @@ def test_a_file_of_parameters_sets_constants_too(tmp_path: Path) -> None:
             assert watch.get('motor_1', 'armature.resistance', 'config') == [2.0, ['old_circuit']]
             watch.until(lambda: 'test_signal' in watch.value('motor_1', 'waiting for'),
                         'the report that it waits')
+    finally:
+        node.send_signal(signal.SIGTERM)
+        assert node.wait(60.0) == 0
+
+
+@pytest.mark.usefixtures('fresh_domain')
+def test_an_empty_list_of_configurations_is_none(tmp_path: Path) -> None:
+    pytest.importorskip('rclpy', reason='rclpy is not installed')
+    from drive_watch import Watch
+    file = tmp_path / 'mine.yaml'
+    file.write_text('/**:\n  ros__parameters:\n    config: []\n    bias_pot: 0.5\n')
+    node = subprocess.Popen([sys.executable, '-m', 'antenna_drive.nodes.torque_share',
+                             '--ros-args', '--params-file', str(file)])
+    try:
+        with Watch() as watch:
+            assert watch.get('torque_share', 'bias_pot', 'config') == [0.5, ['reference']]
     finally:
         node.send_signal(signal.SIGTERM)
         assert node.wait(60.0) == 0

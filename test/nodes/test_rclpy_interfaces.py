@@ -110,3 +110,18 @@ def test_what_is_not_public_is_there() -> None:
         *dir(rclpy_implementation.WaitSet)}
     assert 'publish_raw' in dir(rclpy_implementation.Publisher)
     assert 'take_message' in dir(rclpy_implementation.Subscription)
+
+
+@ros_installed
+def test_parameters_given_at_the_start_can_be_read_undeclared() -> None:
+    from rclpy.context import Context
+    from rclpy.node import Node
+    context = Context()
+    context.init(args=[])
+    node = Node('given', context=context, cli_args=['--ros-args', '-p', 'a:=[]', '-p', 'b:=1'])
+    try:
+        assert {name: parameter.value for name, parameter in node._parameter_overrides.items()
+                } == {'a': None, 'b': 1}
+    finally:
+        node.destroy_node()
+        context.try_shutdown()
