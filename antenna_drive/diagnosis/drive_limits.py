@@ -66,10 +66,9 @@ class DriveLimits:
         """Return the limits that follow from a configuration."""
         armature, motor = drive.motor_1.armature, drive.motor_1.motor
         ratio = drive.motor_1.gear_ratio
-        rate = armature.voltage_limit / armature.back_emf_constant / ratio
         torque = 2.0 * motor.current_limit * motor.torque_constant * ratio
         return cls(
-            rate_deg_s=_RATE * math.degrees(rate),
+            rate_deg_s=_RATE * math.degrees(drive.greatest_rate),
             # the modes follow the hub later
             acceleration_deg_s2=BEYOND * math.degrees(torque / drive.plant.axis.inertia_hub),
             travel_deg=_TRAVEL_DEG, current_A=BEYOND * motor.current_limit,

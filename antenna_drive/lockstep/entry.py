@@ -16,7 +16,7 @@ import os
 import signal
 import sys
 from threading import Event
-from types import FrameType
+from types import FrameType, MappingProxyType
 from typing import Any, TYPE_CHECKING
 
 from antenna_drive.programs import end_with_starter, run_program
@@ -34,13 +34,16 @@ if TYPE_CHECKING:
 SHEET = 'sheet'
 # A node that has been asked to end has ended after this [s], whatever holds it.
 _END_S = 3.0
+# Returns the greatest magnitude of a setting for the parameters of all units.
+LimitOf = Callable[[Any], float]
 # Makes the unit of a node: its name, the wiring, configuration files, what else was given by name.
 MakeUnit = Callable[[str, 'Wiring', Sequence[str], Mapping[str, Any]], 'Unit']
 
 
 def run_drive_unit(default_name: str, names: Sequence[str], args: Sequence[str] | None = None,
-                   fed_by_topic: Sequence[str] = (), description: str = '',
-                   wiring: str = '', read_sheet: ReadSheet | None = None) -> int:
+                   fed_by_topic: Mapping[str, LimitOf] = MappingProxyType({}),
+                   description: str = '', wiring: str = '',
+                   read_sheet: ReadSheet | None = None) -> int:
     """
     Run a unit of the wiring as a ROS 2 node; SIGINT or SIGTERM ends the process.
 
@@ -53,7 +56,8 @@ def run_drive_unit(default_name: str, names: Sequence[str], args: Sequence[str] 
     args
         command line without the program's name; None for the process's own
     fed_by_topic
-        settings that follow a Float64 topic `<node>/<setting>`
+        settings that follow a Float64 topic `<node>/<setting>`, and what returns the greatest
+        magnitude of each for the parameters of all units
     description
         what --help says first
     wiring
@@ -117,7 +121,7 @@ def run_unit(unit: Unit, args: Sequence[str] | None = None, wiring: str = '') ->
         unit.tune(changes)
         return unit
 
-    return _run(unit.name, make, args, (), type(unit).__doc__ or '', wiring)
+    return _run(unit.name, make, args, {}, type(unit).__doc__ or '', wiring)
 
 
 def run_partner(args: Sequence[str] | None = None, description: str = '') -> int:
@@ -147,11 +151,11 @@ def run_partner(args: Sequence[str] | None = None, description: str = '') -> int
                                 f'{", ".join(wired.signals)}')
         return PartnerUnit(name, wired.outputs[name], reads)
 
-    return _run('partner', make, args, (), description, '')
+    return _run('partner', make, args, {}, description, '')
 
 
 def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None,
-         fed_by_topic: Sequence[str], description: str, wiring: str,
+         fed_by_topic: Mapping[str, LimitOf], description: str, wiring: str,
          read_sheet: ReadSheet | None = None) -> int:
     ending = _Ending()
     end_with_starter()
@@ -259,7 +263,7 @@ def stopped_by_signals() -> Event:
     return stop
 
 
-def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], wiring: str,
+def _spin(node: Node, make: MakeUnit, fed_by_topic: Mapping[str, LimitOf], wiring: str,
           ending: _Ending, read_sheet: ReadSheet | None) -> None:
     from antenna_drive.emulator.wiring import find
     from antenna_drive.lockstep.getting_ready import told_while_compiling
@@ -277,7 +281,9 @@ def _spin(node: Node, make: MakeUnit, fed_by_topic: Sequence[str], wiring: str,
     overrides.names(SHEET, ())
     with told_while_compiling(node):
         unit = make(node.get_name(), wired, config, given)
-        drive_node = DriveNode(node, unit, overrides, config, fed_by_topic, wiring, wired.outputs,
+        limits = {setting: limit_of(wired.load(*config))
+                  for setting, limit_of in fed_by_topic.items()}
+        drive_node = DriveNode(node, unit, overrides, config, limits, wiring, wired.outputs,
                                read_sheet)
     ending.by(drive_node.stop)
     if not ending.asked:

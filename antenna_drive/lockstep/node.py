@@ -7,11 +7,13 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 import gc
 import time
+from types import MappingProxyType
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.lockstep import compiled_loop, node_parameters, ros_parameters
 from antenna_drive.lockstep.changes import CHANGES, write_record
+from antenna_drive.lockstep.commands import Commanded
 from antenna_drive.lockstep.compiled_unit import form_of
 from antenna_drive.lockstep.conductor import Conductor
 from antenna_drive.lockstep.exchange import compile_ahead, Exchange
@@ -21,7 +23,7 @@ from antenna_drive.lockstep.pace import Pace
 from antenna_drive.lockstep.partner import ANSWER, PartnerUnit
 from antenna_drive.lockstep.partner_link import Answer, PartnerLink
 from antenna_drive.lockstep.rcl_channel import RclChannel, Unusable
-from antenna_drive.lockstep.readings import ChangeRecord, READING_OVERRIDES, READING_QOS, Readings
+from antenna_drive.lockstep.readings import ChangeRecord, Readings
 from antenna_drive.lockstep.realtime import lock_memory, schedule_first_in_first_out
 from antenna_drive.lockstep.reception import Reception
 from antenna_drive.lockstep.report import Report
@@ -34,7 +36,6 @@ from numba.core.errors import NumbaError
 from rclpy.node import Node
 from simgap.errors import one_line
 from simgap.inputs.schema import Value
-from std_msgs.msg import Float64
 
 # No wait is longer than this [s]: signals and reports are served in between.
 _LONGEST_WAIT_S = 0.2
@@ -60,7 +61,8 @@ class DriveNode:
     _exchange: Exchange | None = None
 
     def __init__(self, node: Node, unit: Unit, overrides: ros_parameters.Overrides,
-                 config: Collection[str] = (), fed_by_topic: Collection[str] = (),
+                 config: Collection[str] = (),
+                 fed_by_topic: Mapping[str, float] = MappingProxyType({}),
                  wiring: str = '', outputs: Mapping[str, Sequence[Signal]] = OUTPUTS,
                  read_sheet: ReadSheet | None = None) -> None:
         """
@@ -78,7 +80,7 @@ class DriveNode:
             the configuration files the unit was made from
         fed_by_topic
             live settings that follow a Float64 topic `<node>/<setting>` instead of
-            being parameters
+            being parameters, and the greatest magnitude of each
         wiring, outputs
             what the wiring of the drive is called, and the signals of each of its units
         read_sheet
@@ -133,7 +135,7 @@ class DriveNode:
         return Conductor(self._unit, birth, step_s,
                          round(self._number('run.duration') / step_s) or None, outputs, observers)
 
-    def _offer(self, settings: ros_parameters.Settings, fed_by_topic: Collection[str],
+    def _offer(self, settings: ros_parameters.Settings, fed_by_topic: Mapping[str, float],
                read_sheet: ReadSheet | None) -> None:
         """Offer what the second thread serves: services, topics and changes of parameters."""
         node, member = self._node, self._member
@@ -144,8 +146,10 @@ class DriveNode:
             self._report.told_state = self._services.state
         else:
             self._report.told_state = StateReader(node, member.conductor).latest
-        for setting in fed_by_topic:
-            self._follow(setting)
+        self._report.commands = [
+            Commanded(node, setting, self._number(f'run.{setting}_limit') or limit,
+                      lambda changes: self.tuning.request(changes, wait=False))
+            for setting, limit in fed_by_topic.items()]
         ros_parameters.accept_changes(node, {
             name: entry for name, (entry, _) in {**settings, **self._own}.items()}, self._change)
         if isinstance(self._unit, PartnerUnit):
@@ -181,15 +185,6 @@ class DriveNode:
         """Return the step that the node is at, to any thread."""
         exchange = self._exchange
         return self._member.step if exchange is None else exchange.step
-
-    def _follow(self, setting: str) -> None:
-        def follow(message: Float64) -> None:
-            if self.tuning.request({setting: message.data}, wait=False):
-                self._report.refused_values += 1
-
-        self._node.create_subscription(
-            Float64, f'{self._node.get_name()}/{setting}', follow, READING_QOS,
-            qos_overriding_options=READING_OVERRIDES)
 
     def _change(self, changes: dict[str, Value]) -> str:
         # in the thread of the parameter services

@@ -49,6 +49,8 @@ _CONDUCTOR: Settings = {
     'run.lead': (Entry('s', 0.0, 1.0, 'how long before it is due a step may be made'), LEAD_S),
     'run.duration': (Entry('s', 0.0, 1e9, 'simulated time after which the run ends, 0: never'),
                      0.0),
+    'run.external_limit': (Entry('rad/s', 0.0, 1e9, 'greatest rate command that is taken from the '
+                                 'topic external, 0: what the configuration can reach'), 0.0),
     'run.steps': (Entry('1', 1, 1_000_000, 'how many macro-steps the service step makes',
                         live=True, whole=True), 1),
 }

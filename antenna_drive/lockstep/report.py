@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from antenna_drive.lockstep.commands import Commanded
 from antenna_drive.lockstep.conductor import Conductor
 from antenna_drive.lockstep.delays import PERCENTILES
 from antenna_drive.lockstep.diagnostics import diagnostics
@@ -64,7 +65,7 @@ class Report:
         self._woke_s = 0.0
         self._ended_run = 0.0
         self.last_change = ''
-        self.refused_values = 0
+        self.commands: list[Commanded] = []
         self.exchange: Exchange | None = None
         self.partner: PartnerLink | None = None
         # what the conductor says of its run; in the conductor itself, what it is
@@ -230,7 +231,7 @@ class Report:
         values.append(('refused frames', str(sum(refused.values()))))
         values += [(f'refused: {peer}, {reason.value}', str(count))
                    for (peer, reason), count in sorted(refused.items())]
-        values.append(('refused values', str(self.refused_values)))
+        values.append(('refused values', str(sum(item.refused for item in self.commands))))
         if self._pace is not None:
             values.append(('pace', repr(self._pace.factor)))
             values.append(('late steps', str(self._pace.late_steps)))

@@ -6,7 +6,8 @@ The test signals, and the owner of the run: its macro-step, pace and end, as a R
 With sheet:=next.yaml it plays the waveform of a test sheet, from the beginning of the run; a
 parameter that is given beside it counts more.
 
-With waveform:=external the command follows the Float64 topic test_signal/external [rad/s].
+With waveform:=external the command follows the Float64 topic test_signal/external [rad/s]. A rate
+that the drive cannot reach is refused, unless run.external_limit [rad/s] allows it.
 The services pause, resume, step, reset, play and state control the run, as in
   ros2 service call /test_signal/pause std_srvs/srv/Trigger
 """
@@ -14,9 +15,10 @@ The services pause, resume, step, reset, play and state control the run, as in
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+import math
 from pathlib import Path
 import sys
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from antenna_drive.lockstep.entry import run_drive_unit
 
@@ -26,8 +28,14 @@ if TYPE_CHECKING:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return its exit code."""
-    return run_drive_unit('test_signal', ('test_signal',), args, fed_by_topic=('external',),
+    return run_drive_unit('test_signal', ('test_signal',), args, {'external': _greatest_rate},
                           description=__doc__, read_sheet=_read_sheet)
+
+
+def _greatest_rate(parameters: Any) -> float:
+    """Return the rate that the drive can reach [rad/s]; another wiring may command an angle."""
+    from antenna_drive.parameters.sets import Drive
+    return parameters.greatest_rate if type(parameters) is Drive else math.inf
 
 
 def _read_sheet(path: str) -> Mapping[str, Value]:

@@ -324,6 +324,12 @@ class Drive:
     torque_share: Share
     plant: Plant
 
+    @property
+    def greatest_rate(self) -> float:
+        """Return the rate of the axis at which the back-EMF is all of the voltage [rad/s]."""
+        armature = self.motor_1.armature
+        return armature.voltage_limit / armature.back_emf_constant / self.motor_1.gear_ratio
+
 
 def entries(kind: type) -> Iterator[tuple[str, Entry]]:
     """Yield name and entry of each parameter that a set holds itself, not in sets within it."""
