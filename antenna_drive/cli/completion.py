@@ -4,6 +4,7 @@
 Print the completion of this command for a shell: TAB then completes commands, options and files.
 
 For example:
+  mkdir -p ~/.local/share/bash-completion/completions ~/.zfunc
   antenna-drive completion bash > ~/.local/share/bash-completion/completions/antenna-drive
   antenna-drive completion zsh > ~/.zfunc/_antenna-drive     # with ~/.zfunc in fpath
 """

@@ -13,7 +13,7 @@ and recordings. The drive never waits for the page. Ctrl-C ends the page and wha
   antenna-drive live --config my_drive.yaml --set test_signal.waveform=zero
   antenna-drive live --join                      a drive that runs already
   antenna-drive live --join --namespace /east    ... in a namespace
-  antenna-drive live --host 192.168.1.5          for other machines; the address has a token
+  antenna-drive live --host 0.0.0.0              for other machines; the address has a token
   antenna-drive live --foxglove                  the same signals and parameters for Foxglove
 
 The page is served to this machine only, unless --host names an address. Whoever has the address

@@ -3,10 +3,11 @@
 """
 Plays the rate command of a recording to a drive, in the place of test_signal.
 
-  ros2 run antenna_drive command_player RECORDING [--ros-args -p run.pace:=1.0]
+  ros2 run antenna_drive command_player run/
+  ros2 run antenna_drive command_player run.csv --ros-args -p run.pace:=0.5
 
-RECORDING is a bag (folder or .mcap) or a .csv. The node owns the run as test_signal does and has
-its run.* parameters; after the last sample the command stands still.
+The recording is a bag (folder or .mcap) or a .csv. The node owns the run as test_signal does and
+has its run.* parameters; after the last sample the command stands still.
 """
 
 from __future__ import annotations

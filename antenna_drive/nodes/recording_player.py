@@ -3,11 +3,12 @@
 """
 Plays a recording as topics, as a real drive would send them: to try the twin without a drive.
 
-  ros2 run antenna_drive recording_player RECORDING [--ros-args -p real:=/elevation -p pace:=1.0]
+  ros2 run antenna_drive recording_player run/
+  ros2 run antenna_drive recording_player run.csv --ros-args -p real:=/elevation -p pace:=1.0
 
-RECORDING is a bag (folder or .mcap) or a .csv. Each signal goes to <real>/<signal> (Float64), and
-each row to <real>/row (Float64MultiArray): the time in seconds, then the signals in the order that
-the log names. It begins when somebody listens, and ends with the recording.
+The recording is a bag (folder or .mcap) or a .csv. Each signal goes to <real>/<signal> (Float64),
+and each row to <real>/row (Float64MultiArray): the time in seconds, then the signals in the order
+that the log names. It begins when somebody listens, and ends with the recording.
 
 real   namespace of the topics, 'real' if not given
 pace   as a multiple of real time, 1.0 if not given. A twin needs the row's time at any other pace
