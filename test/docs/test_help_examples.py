@@ -38,15 +38,15 @@ _ABOUT = re.compile('   +| +#')
 MACHINE = 'from own.test_own_propose import model\nmachine = model()\n'
 PLAY = """\
 #!/bin/sh
-exec {python} -c '
+{python} -c '
 import sys
 import numpy as np
 rows = np.genfromtxt(sys.argv[1], delimiter=",", names=True, comments="#")
 time = rows["time_s"]
 angle = 0.8 * np.exp(-0.1 * time) * np.cos(2.0 * time)
 np.savetxt(sys.argv[2], np.column_stack([time, rows["turn"], angle, np.gradient(angle, time)]),
-           delimiter=",", header="# height: 0.8\\ntime_s,turn,angle,rate", comments="")
-' "$1" "$2"
+           delimiter=",", header="time_s,turn,angle,rate", comments="")
+' "$1" "$2" && echo 'constants: {{height: 0.8}}' > "${{2%.csv}}.yaml"
 """
 # Each ends when it is asked to, and says so many words before.
 SERVERS = {'antenna-drive live': 'http://', 'ros2 run': 'ready; waits for'}
@@ -160,7 +160,8 @@ def own_machine(folder: Path) -> None:
         angle = height * np.exp(-0.1 * log.time) * np.cos(2.0 * log.time)
         np.savetxt(folder / f'{name}.csv', np.column_stack(
             [log.time, log['turn'], angle, np.gradient(angle, log.time)]), delimiter=',',
-            header=f'# height: {height}\ntime_s,turn,angle,rate', comments='')
+            header='time_s,turn,angle,rate', comments='')
+        (folder / f'{name}.yaml').write_text(f'constants: {{height: {height}}}\n')
     (folder / 'map.yaml').write_text(
         'time: {column: time_s}\nsignals:\n' + ''.join(
             f'  {name}: {{column: {name}, unit: "{unit}"}}\n'
@@ -186,22 +187,31 @@ def environment(folder: Path) -> dict[str, str]:
             'PYTHONPATH': os.pathsep.join(map(str, (ROOT, ROOT / 'test')))}
 
 
+def before(number: int) -> str:
+    """Return what has to be pasted before an example: folders, or the verdict that it reads."""
+    word = EXAMPLES[number]
+    earlier = [*EXAMPLES[number - 1::-1], *EXAMPLES[number + 1:]]
+    if '~/' in word:
+        return next(item for item in earlier if item.startswith('mkdir'))
+    if re.search(r'(?<!--json )verdict\.json', word):
+        return next(item for item in earlier if '--json verdict.json' in item
+                    and item.split()[0] == word.split()[0] and 'yaml logs' not in item)
+    return ''
+
+
 def pasted() -> Iterator[object]:
-    """Yield the examples, each with what prepares it; what cannot be run here says why."""
-    before = ''
-    for word in EXAMPLES:
+    """Yield the examples, each with what goes before it; what cannot be run here says why."""
+    for number, word in enumerate(EXAMPLES):
         if word.startswith('mkdir'):
-            before = f'{word} && '
             continue
-        before = before if '~/' in word else ''
         reason = next((ELSEWHERE[part] for part in ELSEWHERE if part in word), '')
-        yield pytest.param(before + word, id=word, marks=[
+        yield pytest.param(' && '.join(filter(None, (before(number), word))), id=word, marks=[
             pytest.mark.skip(reason) if reason else
             pytest.mark.trial if word.startswith(TRIALS) else pytest.mark.slow])
 
 
 @pytest.mark.timeout(1200)
-@pytest.mark.parametrize('example', pasted())
+@pytest.mark.parametrize('example', [*pasted()])
 def test_it_runs(example: str, prepared: Path, tmp_path: Path, fresh_domain: int) -> None:
     folder = tmp_path / 'here'
     shutil.copytree(prepared, folder)
