@@ -63,7 +63,6 @@ def write_json(result: object, target: str | os.PathLike[str]) -> None:
         sys.stdout.write(text)
         return
     with replaced(Path(target)) as stream:
-        # the name of a file need not be UTF-8; in JSON what stands for it is an escape
         stream.write(text.encode(errors='backslashreplace'))
 
 

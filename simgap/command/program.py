@@ -14,10 +14,8 @@ from typing import Any, NamedTuple
 import warnings
 
 from simgap.command.interruption import interruptible
-from simgap.command.programs import answered, expect_overflow, say
+from simgap.command.programs import answered, expect_overflow, INTERRUPTED, say
 from simgap.errors import UserError
-
-INTERRUPTED = 130  # 128 + the signal's number, as shells do
 
 EXIT_CODES = """\
 exit codes:

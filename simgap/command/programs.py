@@ -14,7 +14,7 @@ from simgap.command.remedies import remedy
 from simgap.errors import UserError
 
 OK, NEGATIVE, BAD_INPUT, NOT_INSTALLED = 0, 1, 2, 3
-BROKEN_PIPE = 141  # 128 + the signal's number, as shells do
+INTERRUPTED, BROKEN_PIPE = 130, 141  # 128 + the signal's number, as shells do
 # In the environment of a process that is to end with its parent: the number of the parent.
 PARENT = 'SIMGAP_PARENT'
 
@@ -30,8 +30,7 @@ def answered(name: str, act: Callable[[], int]) -> int:
     except UserError as error:
         return say(name, str(error), error.status)
     except ImportError as error:
-        needed = remedy(error)
-        if needed is None:
+        if (needed := remedy(error)) is None:
             raise
         return say(name, needed, NOT_INSTALLED)
     except BrokenPipeError:
@@ -60,11 +59,6 @@ def say(name: str, message: str, status: int) -> int:
 
 
 def expect_overflow() -> None:
-    """
-    Silence the warnings of numbers that overflow or are undefined.
-
-    A search tries values with which a model diverges, and gives these up. The warnings tell the
-    user nothing.
-    """
+    """Silence the warnings of numbers with which a model diverges: a search gives these up."""
     warnings.filterwarnings('ignore', '(overflow|underflow|invalid value|divide by zero) '
                                       'encountered', RuntimeWarning)

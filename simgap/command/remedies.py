@@ -10,12 +10,8 @@ from traceback import walk_tb
 from simgap.errors import one_line
 
 # By module. A package that needs more adds to it when it is imported.
-REMEDIES = {
-    'yaml': 'pip install PyYAML',
-    'jinja2': 'pip install Jinja2',
-    'mujoco': 'pip install mujoco',
-    'fmpy': 'pip install fmpy',
-}
+REMEDIES = {module: f'pip install {name}' for module, name in {
+    'yaml': 'PyYAML', 'jinja2': 'Jinja2', 'mujoco': 'mujoco', 'fmpy': 'fmpy'}.items()}
 
 
 def remedy(error: ImportError) -> str | None:

@@ -28,7 +28,7 @@ def render(template: str, folder: Path = TEMPLATES, **contents: object) -> str:
     what it extends or includes may lie in this room's templates/. `contents` are plain data by
     name. Raises jinja2.UndefinedError if the template needs something that was not given.
     """
-    page: str = _environment(folder).get_template(template).render(contents)
+    page = _environment(folder).get_template(template).render(contents)
     return page.encode(errors='backslashreplace').decode()  # a file's name need not be UTF-8
 
 
