@@ -45,12 +45,9 @@ class FleetMachine:
     """
     One machine.
 
-    Attributes
-    ----------
     name : of its folder, or of the group of its recordings
     recordings : its recordings, CSV files and bags
     config : its own configuration; None if it has none
-
     """
 
     name: str
@@ -63,15 +60,12 @@ class FleetOptions:
     """
     What holds for every machine.
 
-    Attributes
-    ----------
     config : configurations of the model, files or names of sets
     diagnose : further options of `antenna-drive diagnose`
     threads : simulations at once in a diagnosis; they do not change a verdict
     limit_s : time limit of a diagnosis [s]
     memory_MB : what a diagnosis may ask for [MB]
     corrected : True if the corrected configuration is wanted
-
     """
 
     config: tuple[str, ...] = ()
@@ -90,17 +84,11 @@ def machines_of(folder: Path, out: Path | None = None) -> list[FleetMachine]:
     are grouped by their names up to the last underscore: north_a.csv and north_b.csv are of the
     machine north.
 
-    Parameters
-    ----------
-    folder
-        with the recordings
-    out
-        a folder that holds none, although it may lie there
+    folder : with the recordings
+    out : a folder that holds none, although it may lie there
 
-    Raises
-    ------
-    UserError : there is no such folder, it holds no recordings, or two machines have one name
-
+    Raises UserError: there is no such folder, it holds no recordings, or two machines have one
+    name.
     """
     if not folder.is_dir():
         raise UserError(f'{folder}: no such folder; a folder with recordings is needed')
@@ -142,23 +130,13 @@ def diagnose_fleet(machines: Sequence[FleetMachine], out: Path, options: FleetOp
     """
     Diagnose the machines that have no verdict yet, and return a row for each one.
 
-    Parameters
-    ----------
-    machines
-        from `machines_of`
-    out
-        folder for the verdicts; those found there are used again
-    options
-        of the diagnoses
-    workers
-        who diagnose
-    done
-        called with the number of machines that are done
+    machines : from `machines_of`
+    out : folder for the verdicts; those found there are used again
+    options : of the diagnoses
+    workers : who diagnose
+    done : called with the number of machines that are done
 
-    Raises
-    ------
-    UserError : something cannot be read or written
-
+    Raises UserError: something cannot be read or written.
     """
     rows: dict[str, dict[str, Any]] = {}
     wanted: list[tuple[FleetMachine, str]] = []

@@ -43,14 +43,11 @@ class Finding:
     """
     What was found of one thing.
 
-    Attributes
-    ----------
     part : of the package that needs it
     what : its name
     state : ok, missing, broken, or note for what is no fault but good to know
     found : version, place or error
     remedy : what to do; '' if nothing is to be done
-
     """
 
     part: str

@@ -40,12 +40,9 @@ class Errors(NamedTuple):
     """
     What a sensor does to a true value; numbers, or arrays of the shape of the true values.
 
-    Attributes
-    ----------
     scatter : standard deviation of its noise
     digit : to which it rounds; 0 for none
     deviation : standard deviation of noise and rounding together
-
     """
 
     scatter: Any
@@ -58,14 +55,11 @@ class Sensor:
     """
     A kind of sensor.
 
-    Attributes
-    ----------
     errors : returns the errors at true values, given `numbers`
     numbers : what a test sheet may say of it
     least, most : no residual counts as quieter, and no value beyond is a reading, in its unit
     zero : what a test sheet may say of the recorder's zero; None: two standard deviations of noise
     is_counter : it counts digits from an unknown angle; a residual at rest is a share of a digit
-
     """
 
     errors: Callable[..., Errors]
@@ -81,8 +75,6 @@ class Reading:
     """
     One reading.
 
-    Attributes
-    ----------
     name : short, as in a verdict
     signal : of the drive, 'unit/signal'
     column : of a CSV
@@ -91,7 +83,6 @@ class Reading:
     sensor : that reads it
     gain : number of the configuration that is the gain of its recorder; empty for none
     instead : signal that stands for it where it was not recorded
-
     """
 
     name: str

@@ -47,13 +47,8 @@ def distances(step_s: float, names: Iterable[str] | None = None) -> list[Distanc
     """
     Return the error of every signal of the experiments at a macro-step.
 
-    Parameters
-    ----------
-    step_s
-        macro-step [s]; must divide 4 ms
-    names
-        of the experiments; all of T1 to T4 if None
-
+    step_s : macro-step [s]; must divide 4 ms
+    names : of the experiments; all of T1 to T4 if None
     """
     found = []
     for name in names or experiments():

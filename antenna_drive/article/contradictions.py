@@ -46,12 +46,9 @@ class Interpretation:
     """
     One way to read a passage.
 
-    Attributes
-    ----------
     reading : in words
     gives : the figures that follow from it, with their units in their names
     fits : whether they agree with the published figures
-
     """
 
     reading: str
@@ -64,14 +61,11 @@ class Contradiction:
     """
     A passage that disagrees with another.
 
-    Attributes
-    ----------
     id : short name
     passages : the passages that disagree
     published : the figures that the readings are compared with
     readings : what each reading gives
     conclusion : which readings fit, and the figures that decide
-
     """
 
     id: str  # noqa: A003
@@ -310,13 +304,8 @@ def contradictions(results: Results, only: Iterable[str] = ()) -> list[Contradic
     """
     Run the readings of every contradiction.
 
-    Parameters
-    ----------
-    results
-        of the parameter set
-    only
-        short names; all if empty
-
+    results : of the parameter set
+    only : short names; all if empty
     """
     table = read_yaml(Path(__file__).with_suffix('.yaml'))
     entries = []

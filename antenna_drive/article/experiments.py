@@ -38,15 +38,12 @@ class DriveExperiment:
     """
     One experiment.
 
-    Attributes
-    ----------
     name : as in the article's table of results, 'T3a'
     duration : [s]
     circuit : set in config/ that overrides the configuration
     settings : further settings, by dotted name in `Drive`
-    bias_share : torque bias from a fixed source, as a share of the greatest current; None to
-        use the circuit
-
+    bias_share : torque bias from a fixed source, as a share of the greatest current; None to use
+        the circuit
     """
 
     name: str

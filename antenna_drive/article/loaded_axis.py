@@ -36,12 +36,9 @@ class LoadedAxis:
     """
     One cycle of the load, from one extreme to the other and back.
 
-    Attributes
-    ----------
     load : axial torque, percent of the greatest, shape (n,)
     torques : of the two motors, percent of the greatest, shape (n, 2)
     rising : True where the load rises, shape (n,)
-
     """
 
     load: FloatArray
@@ -76,15 +73,9 @@ def loaded(drive: Drive, circuit: str, share: float) -> LoadedAxis:
     """
     Simulate the drive while the load rises and falls.
 
-    Parameters
-    ----------
-    drive
-        with one of the circuits
-    circuit
-        the circuit's name
-    share
-        torque bias at no load, as a share of the greatest torque
-
+    drive : with one of the circuits
+    circuit : the circuit's name
+    share : torque bias at no load, as a share of the greatest torque
     """
     experiment = DriveExperiment(f'loaded axis {share:g}', 1.25 * PERIOD, circuit, {
         'torque_share.circuit.bias_pot': bias_pot(drive, share),
@@ -137,13 +128,8 @@ def fade_out(load: FloatArray, bias: FloatArray) -> tuple[float, float]:
     """
     Return the loads between which the bias fades from 90 to 10 percent of its value at no load.
 
-    Parameters
-    ----------
-    load
-        mean torque of the motors, percent of the greatest, shape (n,)
-    bias
-        difference of their torques, shape (n,)
-
+    load : mean torque of the motors, percent of the greatest, shape (n,)
+    bias : difference of their torques, shape (n,)
     """
     # the median in each percent of load: the currents swing when teeth meet or the axis breaks
     # away

@@ -38,15 +38,9 @@ class Results:
     """
     The runs of the experiments for one parameter set; each is simulated on first use.
 
-    Parameters
-    ----------
-    drives
-        the drive with each circuit, by the circuit's name in config/
-    known
-        the experiments, by name
-    run
-        runs an experiment on its drive; by default the emulator in one process
-
+    drives : the drive with each circuit, by the circuit's name in config/
+    known : the experiments, by name
+    run : runs an experiment on its drive; by default the emulator in one process
     """
 
     def __init__(self, drives: Mapping[str, Drive],
@@ -107,8 +101,6 @@ class Readout:
     """
     A figure taken from the run of one experiment.
 
-    Attributes
-    ----------
     name, unit : for people
     experiment : the run to read
     kind : how it is evaluated, a key of `readings.KINDS`
@@ -116,7 +108,6 @@ class Readout:
     arguments : further arguments of the evaluation
     compared_with : another experiment; the figure is then the relative change against it [1]
     scale : the figure is multiplied by it
-
     """
 
     name: str
@@ -149,12 +140,9 @@ class Trend:
     """
     The largest violation of a trend by figures in order; below zero the trend holds strictly.
 
-    Attributes
-    ----------
     name, unit : for people
     of : the figures in order
     kind : 'falls', or 'falls then rises'
-
     """
 
     name: str
@@ -172,12 +160,9 @@ class ModelFigure:
     """
     A figure that does not come from the run of an experiment.
 
-    Attributes
-    ----------
     name, unit : for people
     of : gives the figure of a drive
     circuit : name of the circuit that the drive has
-
     """
 
     name: str
@@ -194,11 +179,7 @@ def article_measures(drive: Drive) -> dict[str, Measure]:
     """
     Return every figure that the article publishes and a run or the model can give, by name.
 
-    Parameters
-    ----------
-    drive
-        for the gear ratio and the greatest current, by which figures are scaled
-
+    drive : for the gear ratio and the greatest current, by which figures are scaled
     """
     ratio, most = drive.plant.axis.gear_ratio, drive.motor_1.motor.current_limit
     degrees = 180.0 / math.pi

@@ -31,8 +31,6 @@ class Claim:
     """
     One published figure or trend.
 
-    Attributes
-    ----------
     measure : name of the figure that a parameter set gives for it
     says : the published figure in the measure's unit, or the article's words; a mapping with the
         keys field and analysis where the article gives both
@@ -41,7 +39,6 @@ class Claim:
     tolerance : in the measure's unit; zero for a trend or a bound
     basis : 'published', 'derived', 'fitted' or 'predicted'
     note : where it is in the article, and what was assumed
-
     """
 
     measure: str

@@ -27,15 +27,9 @@ def step_response(time: FloatArray, value: FloatArray, tail_s: float = 1.0) -> R
     """
     Read a step response that begins at time zero.
 
-    Parameters
-    ----------
-    time
-        [s], shape (n,)
-    value
-        shape (n,)
-    tail_s
-        length of the end of the run whose mean is the final value [s]
-
+    time : [s], shape (n,)
+    value : shape (n,)
+    tail_s : length of the end of the run whose mean is the final value [s]
     """
     final = float(value[time > time[-1] - tail_s].mean())
     outside = np.flatnonzero(np.abs(value - final) > SETTLING_BAND * abs(final))
@@ -56,15 +50,9 @@ def bias_range(time: FloatArray, voltage: FloatArray, after_s: float) -> BiasRan
     """
     Read the range of the bias voltage [V], shape (n,), after the start-up.
 
-    Parameters
-    ----------
-    time
-        [s], shape (n,)
-    voltage
-        [V], shape (n,)
-    after_s
-        samples before this time are ignored [s]
-
+    time : [s], shape (n,)
+    voltage : [V], shape (n,)
+    after_s : samples before this time are ignored [s]
     """
     kept = voltage[time >= after_s]
     return BiasRange(float(kept.min()), float(kept.max()), float(np.mean(kept <= 1e-9)))

@@ -17,8 +17,6 @@ class Row:
     """
     One published figure and the model's.
 
-    Attributes
-    ----------
     id : 'T4a.overshoot'
     published : the figure or the words; a mapping where the article gives field and analysis
     obtained : what the model gives
@@ -27,7 +25,6 @@ class Row:
     passed : whether the obtained figure is within the tolerance
     basis : 'published', 'derived', 'fitted' or 'predicted'; see published.py
     note : where it is in the article, and how it is evaluated
-
     """
 
     id: str  # noqa: A003
@@ -51,15 +48,9 @@ def rows(results: Results, experiments: Iterable[str] = (),
     """
     Compare every claim of the article with what a parameter set gives.
 
-    Parameters
-    ----------
-    results
-        of the parameter set
-    experiments
-        only rows of these, as 'T3a'; all if empty
-    progress
-        called with the number of rows done and their total
-
+    results : of the parameter set
+    experiments : only rows of these, as 'T3a'; all if empty
+    progress : called with the number of rows done and their total
     """
     wanted = tuple(experiments)
     claims = [claim for claim in CLAIMS

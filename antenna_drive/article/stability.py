@@ -31,19 +31,11 @@ def growth_rate(drive: Drive, gain: float, pole: float, step_s: float = MACRO_ST
     """
     Return the growth rate of a small disturbance of the steady torque bias [1/s].
 
-    Parameters
-    ----------
-    drive
-        with the old circuit
-    gain, pole
-        k' and p of Filter 1 [1/s]
-    step_s
-        macro-step [s]
-    settled_s
-        settling time at a stable gain before the disturbance [s]
-    watched_s
-        time over which the disturbance is observed [s]
-
+    drive : with the old circuit
+    gain, pole : k' and p of Filter 1 [1/s]
+    step_s : macro-step [s]
+    settled_s : settling time at a stable gain before the disturbance [s]
+    watched_s : time over which the disturbance is observed [s]
     """
     emulator = Emulator(filter_variant(_SETTLING_GAIN, pole).applied_to(drive), step_s)
     emulator.advance(round(settled_s / step_s))

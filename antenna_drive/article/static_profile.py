@@ -36,15 +36,9 @@ def as_in_the_text(share: TorqueShare, gain: float = TEXT_GAIN,
     """
     Return a circuit with the numbers of Eq. (14): one volt per ampere, bias pot 0.7.
 
-    Parameters
-    ----------
-    share
-        the circuit, for transfer function 2 and the saturation
-    gain
-        k_2 of Eq. (14); Table 1 calls it k_4 over k_2
-    fade_out_voltage
-        f_o [V]
-
+    share : the circuit, for transfer function 2 and the saturation
+    gain : k_2 of Eq. (14); Table 1 calls it k_4 over k_2
+    fade_out_voltage : f_o [V]
     """
     return changed(share, {'g_4': gain, 'fade_out_voltage': fade_out_voltage,
                            'current_to_voltage': 1.0, 'bias_pot': 0.7})
@@ -60,10 +54,7 @@ def corners(share: TorqueShare) -> Corners:
     """
     Return the corners of the profile, found numerically.
 
-    Raises
-    ------
-    ValueError : the profile has no corners; it is constant
-
+    Raises ValueError: the profile has no corners; it is constant.
     """
     record = record_of(share)[0]
     most = share.bias_pot * share.saturation_high

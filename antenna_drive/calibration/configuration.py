@@ -20,15 +20,9 @@ def configuration(problem: CalibrationProblem, shares: Sequence[float], start: s
     """
     Return a candidate as a configuration file that overrides the start of the fit.
 
-    Parameters
-    ----------
-    problem
-        the fit
-    shares
-        the candidate, as shares of the bounds
-    start
-        configuration that the fit started from; its other parameters are kept
-
+    problem : the fit
+    shares : the candidate, as shares of the bounds
+    start : configuration that the fit started from; its other parameters are kept
     """
     content: dict[str, Any] = {}
     if find(start) != find('reference'):

@@ -47,13 +47,10 @@ class Free:
     """
     One free parameter.
 
-    Attributes
-    ----------
     name : as in a configuration file, 'gearbox.stiffness', 'axis.mode_inertias[0]'
     low, high : bounds, in the parameter's unit
     log : True to search on a logarithmic scale
     unit : of the parameter
-
     """
 
     name: str
@@ -95,14 +92,11 @@ class Target:
     """
     The aim for one figure.
 
-    Attributes
-    ----------
     figure : its name
     kind : value, at_least or at_most
     number : the aim, in the figure's unit
     tolerance : the miss that costs as much as any other target's tolerance
     weight : factor on the cost
-
     """
 
     figure: str
@@ -140,13 +134,10 @@ class CalibrationProblem:
     """
     A fit: free parameters, targets, and the configuration for everything else.
 
-    Attributes
-    ----------
     free : the free parameters, tuple of Free
     targets : tuple of Target
     population : candidates in a generation
     spread : standard deviation of the first generation, as a share of the bounds
-
     """
 
     def __init__(self, free: Sequence[Free], targets: Sequence[Target], *,
@@ -216,13 +207,8 @@ class CalibrationProblem:
         """
         Simulate a candidate and return its cost and figures.
 
-        Parameters
-        ----------
-        shares
-            of the bounds, one for each free parameter
-        give_up_at
-            stop once the cost exceeds this; targets are evaluated in their order
-
+        shares : of the bounds, one for each free parameter
+        give_up_at : stop once the cost exceeds this; targets are evaluated in their order
         """
         results = self.results(shares)
         cost = 0.0
@@ -255,18 +241,11 @@ def read_problem(source: str | Path, start: Sequence[str] = ()) -> CalibrationPr
     """
     Read a target file; the module's docstring describes its form.
 
-    Parameters
-    ----------
-    source
-        path, or name of a file in config/
-    start
-        configuration files that give the start of the fit and all fixed parameters
+    source : path, or name of a file in config/
+    start : configuration files that give the start of the fit and all fixed parameters
 
-    Raises
-    ------
-    ParameterError : the file cannot be read or has an entry that is not allowed; one line
-        names file and entry
-
+    Raises ParameterError: the file cannot be read or has an entry that is not allowed; one line
+    names file and entry.
     """
     path = find(source)
     content = read_yaml(path)

@@ -44,11 +44,8 @@ class SearchResult:
     """
     The result of a search.
 
-    Attributes
-    ----------
     best : the best candidate
     candidates : all of them in order; the first is the start
-
     """
 
     best: FitCandidate
@@ -82,10 +79,7 @@ def read_log(path: Path) -> list[FitCandidate]:
     """
     Return the candidates of any search's log.
 
-    Raises
-    ------
-    UserError : the file cannot be read, or is not such a log
-
+    Raises UserError: the file cannot be read, or is not such a log.
     """
     return _read_log(path)[1]
 
@@ -117,28 +111,16 @@ def search(problem: CalibrationProblem, count: int, *, seed: int = 1, log: Path 
     """
     Search for the parameters of least cost.
 
-    Parameters
-    ----------
-    problem
-        the fit
-    count
-        candidates to try; the search ends with a whole generation
-    seed
-        the same seed gives the same search
-    log
-        file for the candidates; the search resumes from it if it exists
-    progress
-        called with the number of candidates so far and the best one
-    jobs
-        processes that evaluate the candidates of a generation
-    scheduler
-        address of a dask.distributed scheduler whose workers do that instead
+    problem : the fit
+    count : candidates to try; the search ends with a whole generation
+    seed : the same seed gives the same search
+    log : file for the candidates; the search resumes from it if it exists
+    progress : called with the number of candidates so far and the best one
+    jobs : processes that evaluate the candidates of a generation
+    scheduler : address of a dask.distributed scheduler whose workers do that instead
 
-    Raises
-    ------
-    UserError : the log belongs to another search, or cannot be read or written; the scheduler
-        has no workers
-
+    Raises UserError: the log belongs to another search, or cannot be read or written; the
+    scheduler has no workers.
     """
     known = [] if log is None else _begin_log(log, problem, seed)
     start = problem.start()

@@ -30,10 +30,7 @@ def parse_settings(settings: Sequence[str]) -> dict[str, dict[str, Any]]:
     """
     Return what was given, by unit and parameter name; values are YAML and not yet checked.
 
-    Raises
-    ------
-    UserError : a setting is not of the form UNIT.NAME=VALUE, or there is no such unit
-
+    Raises UserError: a setting is not of the form UNIT.NAME=VALUE, or there is no such unit.
     """
     found: dict[str, dict[str, Any]] = {}
     for text in settings:

@@ -51,10 +51,8 @@ def derived(sheet: Sheet) -> Iterator[Number]:
     """
     Yield every number that follows from a sheet; what is not yielded stays that of the reference.
 
-    Raises
-    ------
-    ParameterError : the figures contradict one another; the message says which and the remedy
-
+    Raises ParameterError: the figures contradict one another; the message says which and the
+    remedy.
     """
     drive = reference(sheet.circuit)
     yield from _motor(sheet, drive)

@@ -20,15 +20,9 @@ def locked_rotor_frequency(hub: float, inertias: FloatArray, frequencies: FloatA
     """
     Return the lowest resonance of hub and modes on gearboxes whose rotors are held [Hz].
 
-    Parameters
-    ----------
-    hub
-        its inertia [kg m^2]
-    inertias, frequencies
-        of each mode [kg m^2], with the hub held [Hz]
-    stiffness
-        of all gearboxes together, at the axis [N m/rad]
-
+    hub : its inertia [kg m^2]
+    inertias, frequencies : of each mode [kg m^2], with the hub held [Hz]
+    stiffness : of all gearboxes together, at the axis [N m/rad]
     """
     springs = inertias * (2.0 * math.pi * frequencies) ** 2
     matrix = np.diag(np.concatenate([[stiffness + springs.sum()], springs]))
@@ -48,10 +42,7 @@ def mode_scale(hub: float, inertias: FloatArray, frequencies: FloatArray, stiffn
     """
     Return by what to multiply the frequencies of the modes for a lowest resonance [Hz].
 
-    Raises
-    ------
-    ValueError : it is not below that of a rigid structure
-
+    Raises ValueError: it is not below that of a rigid structure.
     """
     if wanted >= 0.999 * rigid_frequency(hub + float(inertias.sum()), stiffness):
         raise ValueError('not below that of a rigid structure')

@@ -46,8 +46,6 @@ class Figure:
     """
     One figure that is asked for.
 
-    Attributes
-    ----------
     key : section and name in the file
     units : those that may be written and how much of the SI unit each is; the first one is meant
         where none is written
@@ -55,7 +53,6 @@ class Figure:
     what : what it is, for people
     optional : what is done where it is not given; '' if it has to be
     either_shaft : whether it may be said of the motor shaft in place of the axis
-
     """
 
     key: str
@@ -75,10 +72,7 @@ class Figure:
         """
         Return a figure that is a number, or a text of a number and a unit.
 
-        Raises
-        ------
-        ParameterError : it is neither, the unit is another, or it is not allowed
-
+        Raises ParameterError: it is neither, the unit is another, or it is not allowed.
         """
         text = str(said).strip() if isinstance(said, (int, float, str)) else ''
         match = None if isinstance(said, bool) else _TEXT.fullmatch(text)
@@ -147,12 +141,9 @@ class Sheet:
     """
     What is known of a drive.
 
-    Attributes
-    ----------
     figures : by key; those that are optional may be missing
     circuit : the torque-share circuit of the article's Table 1, 'old' or 'new'
     source : where it was read, for messages
-
     """
 
     figures: Mapping[str, Given]
@@ -173,11 +164,8 @@ def read_sheet(path: Path) -> Sheet:
     """
     Read a filled sheet.
 
-    Raises
-    ------
-    ParameterError : it is no sheet, or a figure is missing, misspelt or not allowed; the message
-        names file, key and remedy
-
+    Raises ParameterError: it is no sheet, or a figure is missing, misspelt or not allowed; the
+    message names file, key and remedy.
     """
     sections: dict[str, list[str]] = {}
     for key in (*(figure.key for figure in FIGURES), CIRCUIT):
@@ -211,17 +199,10 @@ def ask(answer: Callable[[str], str], say: Callable[[str], None]) -> Sheet:
     """
     Ask for each figure until it is allowed.
 
-    Parameters
-    ----------
-    answer
-        shows a question and returns what was typed; raises EOFError if nobody answers
-    say
-        shows a line
+    answer : shows a question and returns what was typed; raises EOFError if nobody answers
+    say : shows a line
 
-    Raises
-    ------
-    ParameterError : nobody answers any more
-
+    Raises ParameterError: nobody answers any more.
     """
     figures: dict[str, Given] = {}
     question = ''

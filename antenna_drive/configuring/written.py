@@ -25,10 +25,8 @@ def configuration(sheet: Sheet) -> str:
     """
     Return a whole configuration, which needs no other, as YAML.
 
-    Raises
-    ------
-    ParameterError : the figures contradict one another, or lead to a number that is not allowed
-
+    Raises ParameterError: the figures contradict one another, or lead to a number that is not
+    allowed.
     """
     found = {(number.section, number.name): number for number in derived(sheet)}
     drive, real = reference(sheet.circuit), kappa(sheet)

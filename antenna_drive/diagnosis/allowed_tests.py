@@ -36,19 +36,12 @@ class AntennaTests(TestSpace):
     """
     The tests that the drive may run.
 
-    Parameters
-    ----------
-    base
-        what a further test shares with those that were made; its waveform and start do not count
-    drive
-        the configuration
-    limits
-        of the drive
-    duration
-        of a test [s]
-    rate
-        at which it is simulated, samples per second [Hz]
-
+    base : what a further test shares with those that were made; its waveform and start do not
+        count
+    drive : the configuration
+    limits : of the drive
+    duration : of a test [s]
+    rate : at which it is simulated, samples per second [Hz]
     """
 
     families = tuple(FAMILIES)

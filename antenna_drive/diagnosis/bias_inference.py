@@ -178,13 +178,10 @@ class _Fit:
     """
     How well one circuit fits all recordings.
 
-    Attributes
-    ----------
     misfit : mean of what is off [V]
     scale : what the pot does over what the sheets say of it; 1 if they do not
     settings : of the pot, for each recording: that of its sheet, or one that fits
     starts : of the circuit, for each recording
-
     """
 
     misfit: float

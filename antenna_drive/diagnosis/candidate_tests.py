@@ -135,21 +135,12 @@ def drawn(family: str, base: TestSheet, limits: DriveLimits, full_bias: float, d
     """
     Draw a test of a family.
 
-    Parameters
-    ----------
-    family
-        one of `FAMILIES`
-    base
-        what a further test shares with those that were made
-    limits
-        of the drive
-    full_bias
-        greatest bias voltage that the torque-share circuit gives [V]
-    duration
-        of the test [s]
-    random
-        source of randomness
-
+    family : one of `FAMILIES`
+    base : what a further test shares with those that were made
+    limits : of the drive
+    full_bias : greatest bias voltage that the torque-share circuit gives [V]
+    duration : of the test [s]
+    random : source of randomness
     """
     draw = _Draw(limits, duration, random)
     sheet = replace(base, waveform=FAMILIES[family](draw))

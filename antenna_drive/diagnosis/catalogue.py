@@ -323,13 +323,8 @@ def catalogue(durations_s: Sequence[float] = (), encoder_digit: float = 0.0) -> 
     """
     Return the catalogue of the drive, by id.
 
-    Parameters
-    ----------
-    durations_s
-        of the tests, in each of which a gust has a course of its own [s]
-    encoder_digit
-        digit that the encoder's readings tell [rad]; 0 if they tell none
-
+    durations_s : of the tests, in each of which a gust has a course of its own [s]
+    encoder_digit : digit that the encoder's readings tell [rad]; 0 if they tell none
     """
     into = _Catalogue()
     for component, motors in MOTORS.items():

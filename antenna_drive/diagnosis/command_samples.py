@@ -46,13 +46,10 @@ class Jumps:
     """
     Where a command jumps.
 
-    Attributes
-    ----------
     interval : between which samples, by the number of the first of the two, shape (k,)
     time : of each jump, shape (k,) [s]
     left, right : first and second derivative of the command at the samples before and behind each
         jump, 0 where it is level there, shape (k, 2) [rad/s^2], [rad/s^3]
-
     """
 
     interval: NDArray[np.int64]
@@ -70,13 +67,8 @@ def jumps_of(time: FloatArray, value: FloatArray, uncertainty: FloatArray) -> Ju
     """
     Find where a command jumps.
 
-    Parameters
-    ----------
-    time, value
-        of its samples, shape (n,) [s], [rad/s]
-    uncertainty
-        from `uncertainty_of`
-
+    time, value : of its samples, shape (n,) [s], [rad/s]
+    uncertainty : from `uncertainty_of`
     """
     change = np.abs(np.diff(value))
     usual = np.median(change) + 1e-12
@@ -102,11 +94,7 @@ def holes_of(time: FloatArray, value: FloatArray, uncertainty: FloatArray, jumps
 
     An interval with a jump or a corner is none of them.
 
-    Parameters
-    ----------
-    time, value, uncertainty, jumps
-        as in `jumps_of`, and what it has found
-
+    time, value, uncertainty, jumps : as in `jumps_of`, and what it has found
     """
     found = _uncertain(value, uncertainty)
     found[jumps.interval] = False
@@ -120,11 +108,7 @@ def slopes_of(time: FloatArray, value: FloatArray, jumps: Jumps) -> FloatArray:
 
     An interval beside a jump or a corner is straight. Those of a jump itself mean nothing.
 
-    Parameters
-    ----------
-    time, value, jumps
-        as in `holes_of`
-
+    time, value, jumps : as in `holes_of`
     """
     k, left, right = jumps.interval, jumps.left[:, 0], jumps.right[:, 0]
     slopes = np.tile((np.diff(value) / np.diff(time))[:, np.newaxis], 2)

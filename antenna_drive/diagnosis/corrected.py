@@ -52,12 +52,9 @@ class Corrected:
     """
     A corrected configuration.
 
-    Attributes
-    ----------
     text : the file
     recorder : errors of the recorder: name, value, unit
     unwritten : what the file cannot hold, for people
-
     """
 
     text: str
@@ -70,15 +67,9 @@ def correct(drive: Drive, records: Sequence[np.ndarray[Any, np.dtype[Any]]],
     """
     Return the configuration with a hypothesis in it.
 
-    Parameters
-    ----------
-    drive
-        the configuration that was diagnosed
-    records
-        of the drive in each test
-    hypothesis
-        as fitted to the tests
-
+    drive : the configuration that was diagnosed
+    records : of the drive in each test
+    hypothesis : as fitted to the tests
     """
     given = _as_all_tests_have_it(drive, records)
     point = hypothesis.state.point()

@@ -37,29 +37,16 @@ def diagnose_recordings(recordings: Mapping[str, Recording], drive: Drive,
     """
     Say where a real drive and its model part, which effect is behind it, and how far it goes.
 
-    Parameters
-    ----------
-    recordings
-        of one machine, by name, with their test sheets
-    drive
-        the configuration of the model
-    progress
-        called with the share that is done, 0 to 1, and what is being done
-    threads
-        how many simulations at once
-    settings
-        thresholds
-    without
-        effects that the catalogue shall lack
-    limits
-        for some signals, the remainder beyond noise from which it matters
-    earlier
-        answers of a verdict on some of the recordings, see `diagnosis.diagnose`
+    recordings : of one machine, by name, with their test sheets
+    drive : the configuration of the model
+    progress : called with the share that is done, 0 to 1, and what is being done
+    threads : how many simulations at once
+    settings : thresholds
+    without : effects that the catalogue shall lack
+    limits : for some signals, the remainder beyond noise from which it matters
+    earlier : answers of a verdict on some of the recordings, see `diagnosis.diagnose`
 
-    Raises
-    ------
-    UserError : a recording cannot be used; the message says which and why
-
+    Raises UserError: a recording cannot be used; the message says which and why.
     """
     machine = AntennaMachine(recordings, drive, threads)
     for effect in without:

@@ -17,12 +17,9 @@ class DriveDisturbance(DisturbanceInput):
     """
     A place of the drive.
 
-    Attributes
-    ----------
     path : the number of the record that the input is added to
     size : of one unit of the input, in the unit of that number
     settings : other changes of the record that the input needs: path, how, value
-
     """
 
     path: str = ''

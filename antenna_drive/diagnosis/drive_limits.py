@@ -42,14 +42,11 @@ class DriveLimits:
     """
     What a test must not exceed.
 
-    Attributes
-    ----------
     rate_deg_s, acceleration_deg_s2, travel_deg : of the axis
     current_A : of each motor, article amperes
     voltage_V : of each armature
     axis_torque_N_m : of both gearboxes together, at the axis
     hot_current_A, hot_s : a motor may spend `hot_s` above that current, in all
-
     """
 
     rate_deg_s: float = _limit('deg/s', 'rate of the axis')
@@ -79,10 +76,7 @@ class DriveLimits:
         """
         Return the limits with some of them given.
 
-        Raises
-        ------
-        ParameterError : a name or a value is not allowed; the message names the key
-
+        Raises ParameterError: a name or a value is not allowed; the message names the key.
         """
         known = {item.name: item for item in fields(self)}
         return replace(self, **{
@@ -97,15 +91,9 @@ class DriveLimits:
         """
         Return the share of each limit that a simulated test uses, 1 at the limit.
 
-        Parameters
-        ----------
-        time
-            shape (n,) [s]
-        out
-            values and slopes of `CHANNELS`, shape (n, 8, 2)
-        drive
-            the configuration
-
+        time : shape (n,) [s]
+        out : values and slopes of `CHANNELS`, shape (n, 8, 2)
+        drive : the configuration
         """
         value, slope = (dict(zip(CHANNELS, out[:, :, k].T, strict=True)) for k in (0, 1))
         armature, ratio = drive.motor_1.armature, drive.motor_1.gear_ratio
@@ -130,10 +118,8 @@ def read_limits(path: Path, drive: Drive) -> DriveLimits:
     """
     Read limits from a file; what it does not give follows from the configuration.
 
-    Raises
-    ------
-    ParameterError : the file cannot be read or an entry is not allowed; the message names both
-
+    Raises ParameterError: the file cannot be read or an entry is not allowed; the message names
+    both.
     """
     tree = read_yaml(path)
     try:

@@ -90,13 +90,10 @@ class Longest:
     """
     How long a step of the integration may be.
 
-    Attributes
-    ----------
     usual : at most so long [s]
     shortest : even where a wave asks for less [s]
     wave : angle by which a wave may turn in a step [rad]
     cycles : of the fastest wave per turn of the axis, 0 for none
-
     """
 
     usual: float
@@ -115,17 +112,10 @@ def schedule(command: CommandedRate, bias: Bias, samples: FloatArray, longest: L
     """
     Plan the integration of a test: no step reaches across a sample, a jump, or `longest`.
 
-    Parameters
-    ----------
-    command, bias
-        what the test does
-    samples
-        when the sensors are read, increasing, none before zero, shape (n,) [s]
-    longest
-        step, where the axis turns as commanded
-    delay
-        by which the command comes late [s]
-
+    command, bias : what the test does
+    samples : when the sensors are read, increasing, none before zero, shape (n,) [s]
+    longest : step, where the axis turns as commanded
+    delay : by which the command comes late [s]
     """
     end = float(samples[-1])
     jumps = command.knots(end) + delay

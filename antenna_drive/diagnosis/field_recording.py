@@ -44,8 +44,6 @@ class FieldRecording:
     """
     A recording as all its windows share it; time counts from the start of the test.
 
-    Attributes
-    ----------
     name : for people
     sheet : what the tester knows
     command : axis rate command
@@ -53,7 +51,6 @@ class FieldRecording:
     readings : those that were recorded, by their short names, without spikes
     time : of the samples of the reading with most of them, spikes included, shape (n,) [s]
     is_planned : the readings are not measured
-
     """
 
     name: str
@@ -69,19 +66,12 @@ class FieldRecording:
         """
         Check and clean a recording with its test sheet.
 
-        Parameters
-        ----------
-        name
-            for people
-        recording
-            with its test sheet
-        note
-            called with what was inferred or is missing
+        name : for people
+        recording : with its test sheet
+        note : called with what was inferred or is missing
 
-        Raises
-        ------
-        UserError : the rate command is missing, or there is no reading to compare, or nearly none
-
+        Raises UserError: the rate command is missing, or there is no reading to compare, or nearly
+        none.
         """
         if RATE_COMMAND not in recording or len(recording[RATE_COMMAND]) < _FEWEST:
             raise UserError(f'{name}: no rate command is recorded; {RATE_COMMAND} '
@@ -128,11 +118,7 @@ class FieldRecording:
         """
         Return the command of a window, in a time that counts from its beginning.
 
-        Parameters
-        ----------
-        begin, compared, end
-            of the window, see `Window` [s]
-
+        begin, compared, end : of the window, see `Window` [s]
         """
         if begin == 0.0 and compared < _CLOCK_S and isinstance(self.command, SheetCommand):
             return self.command

@@ -51,8 +51,6 @@ class FieldTest:
     """
     A window of a recording, prepared; its time counts from the beginning of the window.
 
-    Attributes
-    ----------
     name : for people
     record : of the drive as configured and as the sheet says, shape (1,)
     command : axis rate command
@@ -69,7 +67,6 @@ class FieldTest:
     start_angle : of the axis at the beginning of the window, since that of the recording [rad];
         waves go on where they were
     labels : what was different in this test, by its sheet
-
     """
 
     name: str
@@ -127,19 +124,11 @@ def prepared(recordings: Mapping[str, Recording], drive: Drive, note: Note) -> l
     """
     Make recordings of one machine ready: the windows that tell most, each a test of its own.
 
-    Parameters
-    ----------
-    recordings
-        with their test sheets, by name
-    drive
-        the configuration
-    note
-        called with what was inferred or is missing
+    recordings : with their test sheets, by name
+    drive : the configuration
+    note : called with what was inferred or is missing
 
-    Raises
-    ------
-    UserError : a recording lacks the rate command or readings, or cannot be of this drive
-
+    Raises UserError: a recording lacks the rate command or readings, or cannot be of this drive.
     """
     found = [FieldRecording.of(name, recording, note) for name, recording in recordings.items()]
     for recording in found:

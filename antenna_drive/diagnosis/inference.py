@@ -37,15 +37,9 @@ def completed(recordings: Sequence[FieldRecording], drive: Drive,
     """
     Return recordings of one machine with what their sheets lack, as far as they tell it.
 
-    Parameters
-    ----------
-    recordings
-        to be completed
-    drive
-        the configuration, which holds for what cannot be inferred
-    note
-        called with what was inferred, what is as configured, and what contradicts a sheet
-
+    recordings : to be completed
+    drive : the configuration, which holds for what cannot be inferred
+    note : called with what was inferred, what is as configured, and what contradicts a sheet
     """
     if any(recording.is_planned for recording in recordings):
         for recording in recordings:

@@ -35,25 +35,15 @@ class DriveBench(Bench):
     """
     A drive on which test sheets are played.
 
-    Parameters
-    ----------
-    drive
-        the configuration of the model
-    limits
-        that no test may exceed
-    base
-        what is known of every test: circuit, bias pot, sensors
-    play
-        plays a test on the drive
-    plan
-        of the investigation
-    sensors
-        whose errors are added to the recordings, for a drive that has none; None for a real one
-    threads
-        simulations at once
-    settings
-        thresholds
-
+    drive : the configuration of the model
+    limits : that no test may exceed
+    base : what is known of every test: circuit, bias pot, sensors
+    play : plays a test on the drive
+    plan : of the investigation
+    sensors : whose errors are added to the recordings, for a drive that has none; None for a real
+        one
+    threads : simulations at once
+    settings : thresholds
     """
 
     played = 'test_{number}.yaml'
@@ -95,15 +85,9 @@ def sensed(recording: Recording, sensors: SensorModel, seed: Sequence[int]) -> R
     The nodes give true values. A residual of theirs is smoother than any noise, and a verdict
     would take that for something unknown.
 
-    Parameters
-    ----------
-    recording
-        with the readings of every macro-step
-    sensors
-        whose errors are added
-    seed
-        of their noise
-
+    recording : with the readings of every macro-step
+    sensors : whose errors are added
+    seed : of their noise
     """
     command = recording[RATE_COMMAND]
     every = slice(None, None, max(1, round(1.0 / _RATE_HZ / float(

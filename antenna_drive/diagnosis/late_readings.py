@@ -70,11 +70,8 @@ class RipplingTachometer:
 
     What is interpolated is the motion of its rotor, from which the reading follows.
 
-    Attributes
-    ----------
     angle : of its rotor at each output, shape (n,) [rad]
     numbers : its record, shape (1,), see `parameters.sets.Tachometer`
-
     """
 
     angle: FloatArray

@@ -66,21 +66,12 @@ class AntennaMachine(Machine):
     """
     The antenna drive of a configuration, in the tests that were recorded.
 
-    Parameters
-    ----------
-    recordings
-        of one machine, by name
-    drive
-        the configuration
-    threads
-        how many runs at once
-    tolerance
-        of the parameters, where no sheet gives it
+    recordings : of one machine, by name
+    drive : the configuration
+    threads : how many runs at once
+    tolerance : of the parameters, where no sheet gives it
 
-    Raises
-    ------
-    UserError : a recording lacks its rate command or has no reading to compare
-
+    Raises UserError: a recording lacks its rate command or has no reading to compare.
     """
 
     catalogue: AntennaCatalogue

@@ -29,8 +29,6 @@ class RunSetup:
     """
     A run as parameters modify it.
 
-    Attributes
-    ----------
     numbers : the drive's record as plain numbers: numpy copies a record field by field
     kind : type of the record
     duration_s : of the test
@@ -40,7 +38,6 @@ class RunSetup:
     hole_means : by how much the mean of the command is higher in its holes, by number [rad/s]
     waves : parts of each wave
     start_angle : of the axis at the beginning [rad]; waves go on from there
-
     """
 
     numbers: FloatArray
@@ -78,8 +75,6 @@ class SensorReadings:
     """
     What parameters do to the readings of a run.
 
-    Attributes
-    ----------
     gain, zero, delay : of every reading; the last is by how much earlier it is read than its time
         stamps say [s]; shape (c,)
     clock : by how much later all readings are taken [s]
@@ -87,7 +82,6 @@ class SensorReadings:
     digit : of the encoder [rad]; 0 for none
     turn : share of a digit by which the encoder's rounding is off its middle
     waves : parts of each wave of the encoder
-
     """
 
     gain: FloatArray = field(default_factory=lambda: np.ones(len(READINGS)))
@@ -109,11 +103,8 @@ class Modifier(ABC):
     """
     What a parameter does.
 
-    Attributes
-    ----------
     fields : the numbers of the drive's configuration that it stands for
     how : how it changes them
-
     """
 
     fields: tuple[str, ...] = ()
@@ -251,10 +242,7 @@ class KnownModifiers:
     """
     What parameters do, by their names: a point is plain numbers.
 
-    Attributes
-    ----------
     of_runs, of_readings : modifiers, each with the index of the one test that it acts on, or None
-
     """
 
     def __init__(self) -> None:

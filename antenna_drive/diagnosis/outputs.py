@@ -24,11 +24,8 @@ class Outputs:
     """
     What a run gives at the output times.
 
-    Attributes
-    ----------
     values : and slopes of n channels, shape (times, n, 2)
     rippling : tachometers with a ripple, by the names of their readings
-
     """
 
     values: FloatArray
@@ -40,17 +37,10 @@ def readings_of(test: FieldTest, out: Outputs, errors: SensorReadings,
     """
     Return the readings of a run, shape (n, c).
 
-    Parameters
-    ----------
-    test
-        that was run
-    out
-        of its run, all readings
-    errors
-        of the sensors
-    digits
-        readings of the encoder in digits, shape (n,); None if they tell none
-
+    test : that was run
+    out : of its run, all readings
+    errors : of the sensors
+    digits : readings of the encoder in digits, shape (n,); None if they tell none
     """
     time, times = test.time, test.output_times
     wanted = time + errors.clock_rate * (time - time[0])

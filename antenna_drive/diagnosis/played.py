@@ -18,17 +18,10 @@ def parameters_of(sheet: TestSheet, drive: Drive) -> dict[str, dict[str, Value]]
     """
     Return what to set on each node, by unit and name, so that the drive runs a test.
 
-    Parameters
-    ----------
-    sheet
-        of the test
-    drive
-        the configuration of the nodes
+    sheet : of the test
+    drive : the configuration of the nodes
 
-    Raises
-    ------
-    UserError : there is no waveform, or the bias is to step in the middle of the test
-
+    Raises UserError: there is no waveform, or the bias is to step in the middle of the test.
     """
     if sheet.waveform is None:
         raise UserError('waveform: is missing, there is nothing to play')

@@ -29,10 +29,7 @@ def recorder_errors(entries: Iterable[Mapping[str, Any]]) -> SensorReadings:
     """
     Take the entries of a verdict's `recorder`.
 
-    Raises
-    ------
-    UserError : an entry is none
-
+    Raises UserError: an entry is none.
     """
     found = SensorReadings()
     for entry in entries:
@@ -57,11 +54,8 @@ class Prediction:
     """
     A recording and its prediction, at all of its times.
 
-    Attributes
-    ----------
     time : of the samples, as recorded, shape (n,) [s]
     measured, predicted : shape (n, c); NaN where nothing was measured
-
     """
 
     time: FloatArray
@@ -91,23 +85,13 @@ def predict(name: str, recording: Recording, drive: Drive, recorder: SensorReadi
     """
     Predict a recording from its rate command and its test sheet.
 
-    Parameters
-    ----------
-    name
-        for people
-    recording
-        its readings are compared and not used
-    drive
-        the configuration
-    recorder
-        its errors; None for none
-    note
-        called with what was inferred or is missing
+    name : for people
+    recording : its readings are compared and not used
+    drive : the configuration
+    recorder : its errors; None for none
+    note : called with what was inferred or is missing
 
-    Raises
-    ------
-    UserError : the recording lacks its rate command or any reading, or the run diverged
-
+    Raises UserError: the recording lacks its rate command or any reading, or the run diverged.
     """
     test = FieldRecording.of(name, recording, note)
     predicted = _readings(test, *as_the_sheet_says(test.sheet, drive),

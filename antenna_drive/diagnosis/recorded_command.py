@@ -25,17 +25,14 @@ class RecordedCommand:
     """
     A command that is known from its samples: cubic between jumps, straight beside corners.
 
-    Attributes
-    ----------
     time, value : of the samples, and of both sides of each jump, shape (n,) [s], [rad/s]
     slope : at the two ends of each interval between them, shape (n - 1, 2) [rad/s^2]
     jumps : times at which the command jumps, shape (k,) [s]
     slack : by how much each jump may come earlier (negative) and later, shape (k, 2) [s]: up to
         the samples on its two sides
-    holes : begin and end of each interval whose rows are missing and not told by those around
-        it, shape (h, 2) [s]
+    holes : begin and end of each interval whose rows are missing and not told by those around it,
+        shape (h, 2) [s]
     uncertainty : by how much the command may be off in the middle of each hole, shape (h,) [rad/s]
-
     """
 
     time: FloatArray
@@ -135,13 +132,8 @@ def _taken_on(derivatives: FloatArray, later: FloatArray) -> tuple[FloatArray, F
     """
     Return by how much parabolas rise within some time, and their slopes after it, shape (k,) each.
 
-    Parameters
-    ----------
-    derivatives
-        first and second, where the time begins, shape (k, 2)
-    later
-        the time [s], shape (k,)
-
+    derivatives : first and second, where the time begins, shape (k, 2)
+    later : the time [s], shape (k,)
     """
     slope, curve = derivatives.T
     return (slope + 0.5 * curve * later) * later, slope + curve * later

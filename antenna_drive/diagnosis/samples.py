@@ -33,11 +33,8 @@ def spikes(values: FloatArray) -> NDArray[np.bool_]:
     """
     Return which samples are spikes: alone, and far from neighbours that agree.
 
-    Parameters
-    ----------
-    values
-        of one channel in the order of time, at the rate at which they were recorded, shape (n,)
-
+    values : of one channel in the order of time, at the rate at which they were recorded, shape
+        (n,)
     """
     if values.size < _FEWEST:
         return np.zeros(values.size, dtype=bool)
@@ -63,13 +60,8 @@ def slips(rates: FloatArray, noise: float) -> NDArray[np.bool_]:
     """
     Return which samples of a motor at rest are slips.
 
-    Parameters
-    ----------
-    rates
-        of the motor while nothing is commanded, shape (n,) [rad/s], NaN where there is none
-    noise
-        standard deviation that the scatter has at least [rad/s]
-
+    rates : of the motor while nothing is commanded, shape (n,) [rad/s], NaN where there is none
+    noise : standard deviation that the scatter has at least [rad/s]
     """
     if not np.isfinite(rates).any():
         return np.zeros(rates.size, dtype=bool)

@@ -81,11 +81,7 @@ def digit_of(values: FloatArray) -> float:
     """
     Return the digit of which all readings are whole multiples, but for a constant; 0 if none is.
 
-    Parameters
-    ----------
-    values
-        readings in the order in which they were taken, NaN where there is none, shape (n,)
-
+    values : readings in the order in which they were taken, NaN where there is none, shape (n,)
     """
     change = np.abs(np.diff(values[np.isfinite(values)]))
     change = change[change > 0.0]

@@ -38,19 +38,12 @@ def check(recording: FieldRecording, drive: Drive, note: Note) -> None:
     """
     Check that a recording can be of this drive.
 
-    Parameters
-    ----------
-    recording
-        to be checked
-    drive
-        the configuration
-    note
-        called with what is doubtful
+    recording : to be checked
+    drive : the configuration
+    note : called with what is doubtful
 
-    Raises
-    ------
-    UserError : a column is in other units or holds something else; the message gives the remedy
-
+    Raises UserError: a column is in other units or holds something else; the message gives the
+    remedy.
     """
     _check_sizes(recording, drive)
     rates = recording.rates.values

@@ -45,13 +45,8 @@ def nuisances(tests: Sequence[FieldTest], tolerance: float) -> tuple[AntennaPara
     """
     Return the nuisances of a machine in its tests.
 
-    Parameters
-    ----------
-    tests
-        that were made
-    tolerance
-        by what share the machine's numbers may differ from the configuration
-
+    tests : that were made
+    tolerance : by what share the machine's numbers may differ from the configuration
     """
     return (*_of_the_machine(tests[0], tolerance), *_of_zeros_and_recorders(tests),
             *(item for k, test in enumerate(tests) for item in _of_a_test(k, test, tolerance)))

@@ -40,11 +40,8 @@ class Tuned:
     """
     What a quiet record shows of a drive.
 
-    Attributes
-    ----------
     text : of a configuration file with the tolerances as they were fitted
     outside : what the record has beyond all tolerances, a line for each signal, the greatest first
-
     """
 
     text: str
@@ -55,17 +52,10 @@ def tuned(recording: Recording, drive: Drive) -> Tuned:
     """
     Return the configuration with the tolerances as a quiet record shows them, and what is beyond.
 
-    Parameters
-    ----------
-    recording
-        of a healthy drive that stood still at the beginning, with its test sheet
-    drive
-        the configuration
+    recording : of a healthy drive that stood still at the beginning, with its test sheet
+    drive : the configuration
 
-    Raises
-    ------
-    UserError : the recording cannot be compared with the drive
-
+    Raises UserError: the recording cannot be compared with the drive.
     """
     machine = AntennaMachine({'quiet record': recording}, drive, threads=1)
     problem = LeastSquares(machine)
@@ -112,10 +102,7 @@ def loaded(text: str) -> Drive:
     """
     Return the drive of a configuration file that is kept as text.
 
-    Raises
-    ------
-    ParameterError : an entry is not allowed
-
+    Raises ParameterError: an entry is not allowed.
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / 'tuned.yaml'

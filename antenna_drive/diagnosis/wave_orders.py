@@ -26,17 +26,10 @@ def likely_orders(form: Wave, experiments: Sequence[Experiment],
     The first stands out most from its neighbours, which a misfit without a period does not do.
     The second holds most of the energy. The others follow in turn.
 
-    Parameters
-    ----------
-    form
-        of the wave: the angle it follows, and the channels it shows in
-    experiments
-        the tests
-    residuals
-        in the readings' own units, shape (n, c) for each test
-    count
-        how many
-
+    form : of the wave: the angle it follows, and the channels it shows in
+    experiments : the tests
+    residuals : in the readings' own units, shape (n, c) for each test
+    count : how many
     """
     orders = np.array(form.orders)
     energy = np.zeros(orders.size)

@@ -17,13 +17,10 @@ class WaveShape:
     """
     Where a wave is and which angle it follows.
 
-    Attributes
-    ----------
     stem : what the names of the amplitude, cycles and phases in the record begin with
     paths : where these fields are
     angle : 'motor_1', 'motor_2' or 'axis'
     order : cycles per revolution; 0 if not chosen yet
-
     """
 
     stem: str
@@ -35,14 +32,9 @@ class WaveShape:
         """
         Return the wave as the record has it: amplitudes and phases, by the ends of their names.
 
-        Parameters
-        ----------
-        parts
-            sine and cosine, relative change of the order, sine and cosine of the second and of
+        parts : sine and cosine, relative change of the order, sine and cosine of the second and of
             the third harmonic
-        turned
-            angle from which the angle of the record counts [rad]
-
+        turned : angle from which the angle of the record counts [rad]
         """
         sine, cosine, change, second_sine, second_cosine, third_sine, third_cosine = parts
         cycles = self.order * (1.0 + change)

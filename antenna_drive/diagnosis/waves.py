@@ -71,11 +71,8 @@ class Wave(Form):
     """
     A wave of three harmonics by their sine and cosine parts.
 
-    Attributes
-    ----------
     shape : where it is
     orders : cycles per revolution to look for
-
     """
 
     shape: WaveShape = WaveShape('', (), '')
@@ -85,10 +82,7 @@ class Wave(Form):
         """
         Return the order in the name of a form that `at` has made.
 
-        Raises
-        ------
-        KeyError : there is none in it
-
+        Raises KeyError: there is none in it.
         """
         try:
             return float(name.removesuffix(_CYCLES))
@@ -113,19 +107,11 @@ def wave(unit: str, limit: float, step: float, shape: WaveShape, orders: tuple[f
     """
     Return the form of a wave whose order is not chosen yet.
 
-    Parameters
-    ----------
-    unit, limit, step
-        of each amplitude: unit, greatest size, step of the difference quotient
-    shape
-        where it is
-    orders
-        cycles per revolution to look for
-    on_readings
-        True if nothing feeds the wave back
-    healthy
-        amplitude of each part that a machine in good order may have
-
+    unit, limit, step : of each amplitude: unit, greatest size, step of the difference quotient
+    shape : where it is
+    orders : cycles per revolution to look for
+    on_readings : True if nothing feeds the wave back
+    healthy : amplitude of each part that a machine in good order may have
     """
     made = _ReadingWavePart if on_readings else _WavePart
 

@@ -77,13 +77,10 @@ class Window:
     """
     A part of a recording.
 
-    Attributes
-    ----------
     begin : of the simulation [s]
     compared : from this time on readings are compared [s]
     end : of the window [s]
     known_start : the drive stood still until `begin`
-
     """
 
     begin: float = 0.0
@@ -102,17 +99,10 @@ def windows(recording: FieldRecording, drive: Drive, bias: Bias, most: int) -> l
     """
     Return the windows of a recording that tell most, in the order of time.
 
-    Parameters
-    ----------
-    recording
-        to look at
-    drive
-        as the sheet says
-    bias
-        source of bias voltage
-    most
-        how many windows there may be
-
+    recording : to look at
+    drive : as the sheet says
+    bias : source of bias voltage
+    most : how many windows there may be
     """
     first = first_window(recording)
     if recording.end <= first.end:

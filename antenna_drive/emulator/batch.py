@@ -101,15 +101,12 @@ class Schedule:
     """
     What a test does to the drive, step by step of the integration, and where it is read.
 
-    Attributes
-    ----------
     steps : shape (n, COLUMNS): length [s]; rate command as value, slope and half the curvature
-        from the step's start on [rad/s, rad/s^2, rad/s^3]; torque on the axis, value and slope
-        [N m, N m/s]; voltage of a fixed bias source [V]; change of the number at `changing`, in
-        its own unit
+        from the step's start on [rad/s, rad/s^2, rad/s^3]; torque on the axis, value and slope [N
+        m, N m/s]; voltage of a fixed bias source [V]; change of the number at `changing`, in its
+        own unit
     keep : shape (n + 1,): the row of the result at the start and after each step, -1 for none
     changing : which number of the drive's record changes over time, see `records.place_of`
-
     """
 
     steps: FloatArray

@@ -29,13 +29,10 @@ class Coupling:
     In the text x, mode, p and dx are those of the whole drive, u_NAME the inputs of a block, and
     t the time since the start of the step.
 
-    Attributes
-    ----------
     table, blocks : an expression for each signal of the source, and the blocks, by name
     u : the NAME of the u_NAME that a block reads
     functions : what the text calls, by name
     inputs : the number of inputs in each u_NAME
-
     """
 
     def __init__(self, wiring: Wiring, table: Mapping[str, str]) -> None:

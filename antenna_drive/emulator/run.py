@@ -38,14 +38,11 @@ class Run:
     """
     What a run gave: value and time derivative of every signal at every kept macro-step.
 
-    Attributes
-    ----------
     step_s : macro-step [s]
     steps : numbers of the kept macro-steps, shape (n,)
     names : the signals, 'unit/signal', in the order of the columns
     samples : shape (n, len(names), 2), value and time derivative, SI units, article amperes
     changes : the live changes that took effect, by step
-
     """
 
     step_s: float
@@ -85,22 +82,13 @@ class Emulator:
     """
     A drive that can be stepped, changed while it runs, and run again.
 
-    Parameters
-    ----------
-    drive
-        parameters of the whole drive, a `wiring.parameters`
-    step_s
-        macro-step [s]
-    replaced
-        units of your own, by the name of the unit that each replaces
-    wiring
-        which units there are and what feeds them, the drive's own unless said otherwise
+    drive : parameters of the whole drive, a `wiring.parameters`
+    step_s : macro-step [s]
+    replaced : units of your own, by the name of the unit that each replaces
+    wiring : which units there are and what feeds them, the drive's own unless said otherwise
 
-    Raises
-    ------
-    ParameterError : the macro-step is not a positive number, a replaced unit does not exist,
-        lacks an output, or wants an input that nobody puts out
-
+    Raises ParameterError: the macro-step is not a positive number, a replaced unit does not exist,
+    lacks an output, or wants an input that nobody puts out.
     """
 
     def __init__(self, drive: Drive, step_s: float = MACRO_STEP,
@@ -158,10 +146,7 @@ class Emulator:
 
         The next `step` is the first that they count for, as with a live change of a node.
 
-        Raises
-        ------
-        ParameterError : as `Unit.tune`, or there is no such unit
-
+        Raises ParameterError: as `Unit.tune`, or there is no such unit.
         """
         for name, settings in changes.items():
             if name not in self.units:
@@ -233,16 +218,10 @@ class Emulator:
 
         Memory does not grow with the duration if the caller keeps only what it needs.
 
-        Parameters
-        ----------
-        duration
-            [s], rounded to macro-steps
-        changes
-            live changes by the step at which each takes effect: a change at step k is in
+        duration : [s], rounded to macro-steps
+        changes : live changes by the step at which each takes effect: a change at step k is in
             force when the units go from k to k + 1
-        every
-            keep the samples of the steps that this number divides
-
+        every : keep the samples of the steps that this number divides
         """
         self.restart()
         total = round(duration / self.step_s)
@@ -261,13 +240,8 @@ class Emulator:
         """
         Run from the start for a duration [s] and keep the samples; see `chunks`.
 
-        Parameters
-        ----------
-        duration, changes, every
-            as in `chunks`
-        progress
-            called with the share that is done, from 0 to 1
-
+        duration, changes, every : as in `chunks`
+        progress : called with the share that is done, from 0 to 1
         """
         steps, samples = [], []
         for numbers, values in self.chunks(duration, changes, every):
@@ -284,20 +258,11 @@ def simulate(drive: Drive, duration: float, step_s: float = MACRO_STEP,
     """
     Run a drive from rest in one process; see `Emulator` and `Emulator.run`.
 
-    Parameters
-    ----------
-    drive
-        parameters of the whole drive
-    duration
-        [s]
-    step_s
-        macro-step [s]
-    changes
-        live changes by the step at which each takes effect
-    every
-        keep the samples of the steps that this number divides
-    wiring
-        which units there are and what feeds them
-
+    drive : parameters of the whole drive
+    duration : [s]
+    step_s : macro-step [s]
+    changes : live changes by the step at which each takes effect
+    every : keep the samples of the steps that this number divides
+    wiring : which units there are and what feeds them
     """
     return Emulator(drive, step_s, wiring=wiring).run(duration, changes, every)

@@ -84,11 +84,8 @@ class Unit(ABC):
         """
         Change tuning parameters: all of them or, if one is refused, none.
 
-        Raises
-        ------
-        ParameterError : a name is unknown or not a tuning parameter, or a value is not allowed;
-            the message names the key and what is allowed
-
+        Raises ParameterError: a name is unknown or not a tuning parameter, or a value is not
+        allowed; the message names the key and what is allowed.
         """
         self.check(changes)
 

@@ -202,10 +202,7 @@ def home(parameter: str) -> tuple[str, str]:
 
     'torque_share.circuit.bias_pot' is the setting bias_pot of the unit torque_share.
 
-    Raises
-    ------
-    KeyError : there is no such unit
-
+    Raises KeyError: there is no such unit.
     """
     name, _, rest = parameter.partition('.')
     bare = DRIVE.units[name].interface.bare
@@ -216,17 +213,10 @@ def overridden(drive: Drive, overrides: Mapping[str, Mapping[str, Value]]) -> Dr
     """
     Return the drive with settings of its units changed, constants too.
 
-    Parameters
-    ----------
-    drive
-        the parameters of the whole drive
-    overrides
-        values by unit and by the name that the unit's setting has
+    drive : the parameters of the whole drive
+    overrides : values by unit and by the name that the unit's setting has
 
-    Raises
-    ------
-    ParameterError : see `build`
-
+    Raises ParameterError: see `build`.
     """
     sets = {name: build(name, drive, given).parameters  # type: ignore[attr-defined]
             for name, given in overrides.items()}
@@ -238,23 +228,14 @@ def build(name: str, drive: Drive, overrides: Mapping[str, Value] | None = None,
     """
     Build one of the units of a wiring.
 
-    Parameters
-    ----------
-    name
-        one of wiring.units
-    drive
-        the parameters of the whole drive, a `wiring.parameters`
-    overrides
-        settings of the unit, constants too, that differ from the drive's
-    wiring
-        the drive's own unless said otherwise
+    name : one of wiring.units
+    drive : the parameters of the whole drive, a `wiring.parameters`
+    overrides : settings of the unit, constants too, that differ from the drive's
+    wiring : the drive's own unless said otherwise
 
-    Raises
-    ------
-    KeyError : there is no unit of that name
-    ParameterError : an override is unknown or its value is not allowed; the wiring says what the
-        unit looks like but not what it does
-
+    Raises KeyError: there is no unit of that name.
+    Raises ParameterError: an override is unknown or its value is not allowed; the wiring says what
+    the unit looks like but not what it does.
     """
     wired = wiring.units[name]
     if isinstance(wired.interface, Block):

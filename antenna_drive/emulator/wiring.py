@@ -27,12 +27,9 @@ class Wired(NamedTuple):
     """
     A unit in its place.
 
-    Attributes
-    ----------
     interface : what the unit is, a `Block` as a rule
     node : the Python module that runs it as a node
     feeds : the signal that feeds each input, 'unit/signal' by the input's name
-
     """
 
     interface: Interface
@@ -53,17 +50,10 @@ class Wiring:
     """
     Units, in the order of their signals in a sample, and what feeds them.
 
-    Parameters
-    ----------
-    units
-        by name; the name is that of the unit's node too
-    configuration
-        files with the parameters of units that the reference set does not know
+    units : by name; the name is that of the unit's node too
+    configuration : files with the parameters of units that the reference set does not know
 
-    Raises
-    ------
-    UserError : an input is fed by nothing, or by what no unit puts out
-
+    Raises UserError: an input is fed by nothing, or by what no unit puts out.
     """
 
     def __init__(self, units: Mapping[str, Wired], configuration: tuple[Path, ...] = ()) -> None:
@@ -134,10 +124,7 @@ def find(name: str) -> Wiring:
     """
     Return the wiring that is called 'module:NAME'; '' is the drive's own.
 
-    Raises
-    ------
-    UserError : there is none of that name
-
+    Raises UserError: there is none of that name.
     """
     if not name:
         return DRIVE

@@ -17,10 +17,7 @@ async def ask(client: Any, request: Any, who: str) -> Any:
     """
     Return the answer of a node whose callbacks are served in another thread.
 
-    Raises
-    ------
-    UserError : it does not answer
-
+    Raises UserError: it does not answer.
     """
     if not client.service_is_ready():
         raise UserError(f'{who} does not answer: is it running?')

@@ -116,11 +116,8 @@ class ExperimentChanges(NamedTuple):
     """
     What an experiment changes in a drive, by unit.
 
-    Attributes
-    ----------
     live : tuning parameters that differ
     constants : names of the physical constants that differ, which only a restart can change
-
     """
 
     live: dict[str, dict[str, Value]]
@@ -132,15 +129,9 @@ def plan(name: str, settings: Mapping[str, Mapping[str, Any]],
     """
     Compare an experiment with what is in force.
 
-    Parameters
-    ----------
-    name
-        one of `experiments`
-    settings
-        the parameters in force, by unit and name
-    configuration
-        files that the experiment is built on, as in `DriveExperiment.drive`
-
+    name : one of `experiments`
+    settings : the parameters in force, by unit and name
+    configuration : files that the experiment is built on, as in `DriveExperiment.drive`
     """
     result = ExperimentChanges({}, {})
     for unit, (entry, value) in _wanted(experiments()[name].drive(*configuration)):

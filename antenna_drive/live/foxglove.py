@@ -36,17 +36,10 @@ class FoxgloveServer(ServerListener):
         """
         Listen; from a coroutine, in whose loop requests are then done.
 
-        Parameters
-        ----------
-        session
-            what is served
-        port
-            0 for any free one
+        session : what is served
+        port : 0 for any free one
 
-        Raises
-        ------
-        UserError : the port cannot be had
-
+        Raises UserError: the port cannot be had.
         """
         self._session = session
         self._loop = asyncio.get_running_loop()
@@ -167,13 +160,8 @@ def messages(piece: Piece, signals: tuple[Signal, ...], columns: slice,
     """
     Yield a message for each interval that is complete: its time [ns], and values by name.
 
-    Parameters
-    ----------
-    piece
-        of the history
-    signals, columns
-        of a unit, and where they are in the piece
-
+    piece : of the history
+    signals, columns : of a unit, and where they are in the piece
     """
     names = [signal.name for signal in signals]
     per = round(piece.interval_s / piece.step_s)

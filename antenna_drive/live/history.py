@@ -37,8 +37,6 @@ class Piece(NamedTuple):
     """
     A part of the history: intervals that follow each other.
 
-    Attributes
-    ----------
     run, first, interval_s, time_s, step_s : the run, the number of the first interval, the length
         of one [s], the time of the last step [s], the macro-step [s]
     resume : number of the first interval that may still change: ask for it again
@@ -46,7 +44,6 @@ class Piece(NamedTuple):
     ends : the value at the last step of each interval, shape (intervals, signals), NaN where that
         step was not received
     now : the last value of each signal, shape (signals,)
-
     """
 
     run: int
@@ -72,23 +69,15 @@ class History:
     """
     Takes the frames of the units in any portions, from one thread; gives pieces to any other.
 
-    Attributes
-    ----------
     lost : steps of any unit that were missed after the first that was received
-
     """
 
     def __init__(self, signals: Mapping[str, int], conductor: str) -> None:
         """
         Begin with no run.
 
-        Parameters
-        ----------
-        signals
-            how many signals each unit puts out, in the order of the columns
-        conductor
-            the unit whose frames tell the run
-
+        signals : how many signals each unit puts out, in the order of the columns
+        conductor : the unit whose frames tell the run
         """
         self._columns: dict[str, slice] = {}
         first = 0
@@ -123,14 +112,9 @@ class History:
         """
         Take frames of a unit in the order in which they were sent.
 
-        Parameters
-        ----------
-        unit
-            that sent them
-        frames
-            rows of a `FrameLayout`: header, then value and derivative of each signal; what is
+        unit : that sent them
+        frames : rows of a `FrameLayout`: header, then value and derivative of each signal; what is
             not finite or of another run is left out
-
         """
         with self._lock:
             early = self._early.pop(unit, None)

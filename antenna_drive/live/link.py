@@ -56,12 +56,9 @@ class DriveLink:
     """
     What can be seen of a drive, and what can be asked of it.
 
-    Attributes
-    ----------
     history : the signals of the last minute
     settings : the parameters of each unit as they are in force
     twins : those that report in the same ROS 2 domain
-
     """
 
     def __init__(self, board: Board, namespace: str = '', domain_id: int | None = None) -> None:
@@ -191,10 +188,7 @@ class DriveLink:
         """
         Ask a unit for its parameters, and post their table.
 
-        Raises
-        ------
-        UserError : it does not answer
-
+        Raises UserError: it does not answer.
         """
         listed = await ask(self._clients[unit, 'list_parameters'],
                            ListParameters.Request(), unit)
@@ -215,10 +209,8 @@ class DriveLink:
         """
         Set parameters of a unit, all or none; return why they are refused, or ''.
 
-        Raises
-        ------
-        UserError : there is no such unit, a value is of no kind, or the node does not answer
-
+        Raises UserError: there is no such unit, a value is of no kind, or the node does not
+        answer.
         """
         if unit not in OUTPUTS:
             raise UserError(f'{unit}: no such node')
@@ -232,10 +224,7 @@ class DriveLink:
         """
         Call a service of the run control; return whether it is done, and what was said.
 
-        Raises
-        ------
-        UserError : it does not answer
-
+        Raises UserError: it does not answer.
         """
         answer = await ask(self._triggers[service], Trigger.Request(), TEST_SIGNAL)
         return bool(answer.success), str(answer.message)

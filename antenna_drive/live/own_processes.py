@@ -53,10 +53,7 @@ class OwnDrive:
 
         The caller's thread has to live as long as they: the kernel ends them with it.
 
-        Raises
-        ------
-        ParameterError : a configuration is not allowed
-
+        Raises ParameterError: a configuration is not allowed.
         """
         config = list(self._config)
         parameters: dict[str, dict[str, Any]] = {
@@ -91,11 +88,8 @@ class RecorderProcess:
     """
     The recorder of this package as a process of its own, which the drive does not wait for.
 
-    Attributes
-    ----------
     path : the folder of the recording under way, or of the last one
     said : what the recorder said at its end
-
     """
 
     def __init__(self, folder: Path, namespace: str = '') -> None:
@@ -117,10 +111,7 @@ class RecorderProcess:
         """
         Begin to record; return the folder of the bag.
 
-        Raises
-        ------
-        UserError : a recording is under way, the name is not allowed or taken
-
+        Raises UserError: a recording is under way, the name is not allowed or taken.
         """
         if self.running:
             raise UserError(f'{self.path}: is being recorded, stop this first')

@@ -28,13 +28,10 @@ class Description(NamedTuple):
     """
     A descriptor in plain data.
 
-    Attributes
-    ----------
     name, text, allowed : the parameter, what it is, what is allowed (additional_constraints)
     read_only : whether it is a constant while the drive runs
     low, high : the range, None if it has none
     whole : whether only whole numbers are allowed
-
     """
 
     name: str

@@ -161,21 +161,12 @@ class Server:
         """
         Listen.
 
-        Parameters
-        ----------
-        session
-            what is served
-        host
-            address to listen on; '' for this machine only
-        port
-            0 for any free one
-        token
-            needed with each request; '' for none
+        session : what is served
+        host : address to listen on; '' for this machine only
+        port : 0 for any free one
+        token : needed with each request; '' for none
 
-        Raises
-        ------
-        UserError : the address cannot be had
-
+        Raises UserError: the address cannot be had.
         """
         hosts = () if host else _LOCAL
         rest = {'hosts': hosts, 'token': token, 'session': session}

@@ -42,15 +42,9 @@ class Session:
         """
         Serve a drive.
 
-        Parameters
-        ----------
-        link, board, recorder
-            the drive, what pages are told, who records
-        own
-            the drive's processes if they are ours; None for a drive that was joined
-        experiment
-            the experiment that was started
-
+        link, board, recorder : the drive, what pages are told, who records
+        own : the drive's processes if they are ours; None for a drive that was joined
+        experiment : the experiment that was started
         """
         self.link, self.board = link, board
         self._recorder, self._own = recorder, own

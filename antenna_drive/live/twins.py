@@ -76,10 +76,7 @@ class Twins:
         """
         Tell a twin that another test begins.
 
-        Raises
-        ------
-        UserError : there is no such twin
-
+        Raises UserError: there is no such twin.
         """
         if name not in self._begins:
             raise UserError(f'{name[:80]}: no such twin')
@@ -89,10 +86,7 @@ class Twins:
         """
         Ask a twin for the next test; return what it answers.
 
-        Raises
-        ------
-        UserError : there is no such twin, it does not answer, or it refuses
-
+        Raises UserError: there is no such twin, it does not answer, or it refuses.
         """
         if name not in self._proposes:
             raise UserError(f'{name[:80]}: no such twin')
@@ -105,10 +99,7 @@ class Twins:
         """
         Return the test sheet that a twin proposes, as plain data.
 
-        Raises
-        ------
-        UserError : there is none
-
+        Raises UserError: there is none.
         """
         proposed = (self._told.get(name) or {}).get('next_test') or {}
         if not proposed.get('test'):

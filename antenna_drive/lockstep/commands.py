@@ -19,10 +19,7 @@ class Commanded:
     A value that is refused leaves the one of before in force. The first of several is said in the
     log.
 
-    Attributes
-    ----------
     refused : how many values have been refused
-
     """
 
     def __init__(self, node: Node, setting: str, limit: float,
@@ -30,15 +27,9 @@ class Commanded:
         """
         Follow the topic.
 
-        Parameters
-        ----------
-        node, setting
-            the node of the unit, and the name of the setting
-        limit
-            the greatest magnitude that is taken
-        change
-            asks for changes; returns why they are refused, or ''
-
+        node, setting : the node of the unit, and the name of the setting
+        limit : the greatest magnitude that is taken
+        change : asks for changes; returns why they are refused, or ''
         """
         self.refused = 0
         self._setting, self._limit = setting, limit

@@ -28,15 +28,12 @@ class CompiledForm(NamedTuple):
     """
     What a compiled loop needs of a unit.
 
-    Attributes
-    ----------
     name : tells the form from others
     advance : compiled (k, h, u, y, memory), one macro-step of h [s] from step k
     memory : gives the last argument, for a macro-step [s]; asked anew after each change
     outputs : y, value and time derivative in each row
     reached : tells the unit that the loop has gone on to a step
     folder : of the sources that it is compiled from
-
     """
 
     name: str

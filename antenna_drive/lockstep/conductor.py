@@ -38,17 +38,10 @@ class Conductor(Member):
         """
         Prepare to conduct every unit in `outputs` and the observers named.
 
-        Parameters
-        ----------
-        unit, birth, outputs
-            see Member
-        step_s
-            length of the macro-step [s]
-        last_step
-            the step at which a run ends; None for a run without end
-        observers
-            further members, which read the drive and say now and then how far they are
-
+        unit, birth, outputs : see Member
+        step_s : length of the macro-step [s]
+        last_step : the step at which a run ends; None for a run without end
+        observers : further members, which read the drive and say now and then how far they are
         """
         members = [name for name in outputs if name != unit.name]
         super().__init__(unit, birth, outputs, unit.name, (*members, *observers), observers)

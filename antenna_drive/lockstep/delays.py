@@ -54,10 +54,7 @@ class Delays:
 
     Percentiles are exact to the width of a bin, 4.4 percent.
 
-    Attributes
-    ----------
     counts : how many delays each bin holds, shape (bins,)
-
     """
 
     def __init__(self) -> None:

@@ -206,21 +206,13 @@ def ros_node(name: str, arguments: Sequence[str], example: str,
 
     Signals are left to the process.
 
-    Parameters
-    ----------
-    name
-        of the node unless it is remapped
-    arguments
-        command line without the program's name
-    example
-        a right ROS 2 parameter, for the error
-    undeclared
-        whether parameters that nobody has declared reach `Overrides`, which says what was meant
+    name : of the node unless it is remapped
+    arguments : command line without the program's name
+    example : a right ROS 2 parameter, for the error
+    undeclared : whether parameters that nobody has declared reach `Overrides`, which says what was
+        meant
 
-    Raises
-    ------
-    UserError : the command line has an argument that is none of ROS 2's, or a wrong one
-
+    Raises UserError: the command line has an argument that is none of ROS 2's, or a wrong one.
     """
     from antenna_drive.lockstep.leaving import leave
     import rclpy

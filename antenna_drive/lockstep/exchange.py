@@ -62,15 +62,12 @@ class FrameChannel(Protocol):
     """
     What carries the frames: C functions and what they are called with, all as addresses.
 
-    Attributes
-    ----------
     calls : a function for each name in `Call`
     publisher, guard, wait_set : of the node
     subscriptions : of each peer
     readings : row in the outputs, scale and publisher of each; row TIME is the simulated time
     incoming : a serialised message to take frames into, as words
     allocator : the five words that end a serialised message
-
     """
 
     calls: Mapping[str, int]
@@ -135,12 +132,9 @@ class Exchange:
     """
     The compiled exchange of one member.
 
-    Attributes
-    ----------
     steps : how many steps it has made
     running : whether the loop runs just now
     pauses : steps after which it returns whatever else is due, in order
-
     """
 
     def __init__(self, member: Member, form: CompiledForm, channel: FrameChannel,
@@ -148,15 +142,9 @@ class Exchange:
         """
         Prepare the loop.
 
-        Parameters
-        ----------
-        member, form
-            whose steps are to be made, and the compiled form of its unit
-        channel
-            what carries the frames; it must outlive every call of `run`
-        stamps
-            how many steps to note the time of, in `stamps`
-
+        member, form : whose steps are to be made, and the compiled form of its unit
+        channel : what carries the frames; it must outlive every call of `run`
+        stamps : how many steps to note the time of, in `stamps`
         """
         self._member = member
         self._form = form

@@ -75,27 +75,19 @@ class Follower:
     """
     Puts frames together to steps.
 
-    Attributes
-    ----------
     run : the run in progress, 0 for none
     lost : steps that were missed after the first that was seen, in all runs together
     refused : frames that are none: wrong length, NaN or infinite, no run, no step, another than
         was sent before, or of a second sender
     doubled : of each unit in whose name two have sent frames of one run, those two
-
     """
 
     def __init__(self, lengths: Mapping[str, int], conductor: str) -> None:
         """
         Prepare to follow.
 
-        Parameters
-        ----------
-        lengths
-            how many numbers a frame of each unit has, in the order of the signals
-        conductor
-            the unit that owns the run: nobody else begins one
-
+        lengths : how many numbers a frame of each unit has, in the order of the signals
+        conductor : the unit that owns the run: nobody else begins one
         """
         self._lengths = dict(lengths)
         self._conductor = conductor

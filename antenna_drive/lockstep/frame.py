@@ -64,13 +64,9 @@ class FrameLayout:
         """
         Return the serialised message.
 
-        Parameters
-        ----------
-        run, step, step_s, sender
-            the run's id, the macro-step, its length [s], who sends it, see `new_sender`
-        packed
-            value and time derivative of each signal, as little-endian doubles
-
+        run, step, step_s, sender : the run's id, the macro-step, its length [s], who sends it, see
+            `new_sender`
+        packed : value and time derivative of each signal, as little-endian doubles
         """
         return self.prefix + self._header.pack(run, step, step_s, sender) + packed
 

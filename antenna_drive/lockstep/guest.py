@@ -22,10 +22,7 @@ class Guest(Member):
     the same. From there on it follows as any member does. While it reads what was sent before
     it came, its peers go on and forget: where such a frame is lost it joins again behind it.
 
-    Attributes
-    ----------
     joined : how many times it has joined a run
-
     """
 
     def __init__(self, unit: Unit, outputs: Mapping[str, Sequence[Signal]] = OUTPUTS,

@@ -44,14 +44,11 @@ class Inbox:
     """
     The frames of the run in progress, by peer and step.
 
-    Attributes
-    ----------
     run, step : the run in progress (0.0: none) and the step whose frames are wanted next
     senders : who speaks for each peer in this run: whose frame of it was taken in first
     doubled : of each peer in whose name another has sent frames of this run, those two
     refused : how many frames were refused, by (peer, reason)
     hellos : births [us] of peers that said hello, in order of arrival; the owner empties it
-
     """
 
     def __init__(self, lengths: Mapping[str, int], in_bulk: Collection[str] = ()) -> None:

@@ -44,14 +44,11 @@ class Member:
     if the run goes on. Should it have been an invention all the same, the conductor's next
     announcement is followed from there, whichever of the two runs has the greater id.
 
-    Attributes
-    ----------
     run, step, step_s : the run (0.0: none yet), the step last put out, its length [s]
     sender : the identity of this member in all of its frames
     fault : why the unit cannot go on in this run, '' if it can
     sources : of each input of the unit, the peer and the column of its value in a frame
     packed : the bytes of the outputs last put out
-
     """
 
     def __init__(self, unit: Unit, birth: float,
@@ -61,25 +58,14 @@ class Member:
         """
         Prepare a unit for its first run.
 
-        Parameters
-        ----------
-        unit
-            the unit to be stepped
-        birth
-            when this node was started [us of wall time]; it joins younger runs only
-        outputs
-            signals of each unit of the drive, by unit
-        conductor
-            name of the unit that owns the run
-        others
-            peers to wait for although the unit reads nothing from them
-        in_bulk
-            those of them that do not make every step
+        unit : the unit to be stepped
+        birth : when this node was started [us of wall time]; it joins younger runs only
+        outputs : signals of each unit of the drive, by unit
+        conductor : name of the unit that owns the run
+        others : peers to wait for although the unit reads nothing from them
+        in_bulk : those of them that do not make every step
 
-        Raises
-        ------
-        ValueError : an input of the unit names no signal of the drive
-
+        Raises ValueError: an input of the unit names no signal of the drive.
         """
         self.unit = unit
         self.birth = birth

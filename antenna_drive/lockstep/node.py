@@ -68,30 +68,20 @@ class DriveNode:
         """
         Declare parameters and topics.
 
-        Parameters
-        ----------
-        node
-            a bare node of the unit's name
-        unit
-            the unit, with every override already in force
-        overrides
-            what the user gave at the start
-        config
-            the configuration files the unit was made from
-        fed_by_topic
-            live settings that follow a Float64 topic `<node>/<setting>` instead of
+        node : a bare node of the unit's name
+        unit : the unit, with every override already in force
+        overrides : what the user gave at the start
+        config : the configuration files the unit was made from
+        fed_by_topic : live settings that follow a Float64 topic `<node>/<setting>` instead of
             being parameters, and the greatest magnitude of each
-        wiring, outputs
-            what the wiring of the drive is called, and the signals of each of its units
-        read_sheet
-            returns the settings of this unit that play the test sheet in a file; None if it
-            plays none
+        wiring, outputs : what the wiring of the drive is called, and the signals of each of its
+            units
+        read_sheet : returns the settings of this unit that play the test sheet in a file; None if
+            it plays none
 
-        Raises
-        ------
-        ParameterError : an override is not allowed, or no parameter has that name
-        UserError : real-time scheduling or locked memory was asked for, and is not to be had
-
+        Raises ParameterError: an override is not allowed, or no parameter has that name.
+        Raises UserError: real-time scheduling or locked memory was asked for, and is not to be
+        had.
         """
         self._node = node
         self._unit = unit

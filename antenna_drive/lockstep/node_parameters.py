@@ -62,21 +62,13 @@ def declare(node: Node, unit: Unit, overrides: Overrides, settings: Settings,
     """
     Declare the parameters of a unit's node; `overrides.own` then holds those of the node itself.
 
-    Parameters
-    ----------
-    node, unit, overrides
-        the node, its unit, and what the user gave at the start
-    settings
-        those of the unit that are parameters
-    config, wiring
-        the configuration files that the unit was made from, and the name of the wiring
-    plays
-        whether the conductor plays test sheets
+    node, unit, overrides : the node, its unit, and what the user gave at the start
+    settings : those of the unit that are parameters
+    config, wiring : the configuration files that the unit was made from, and the name of the
+        wiring
+    plays : whether the conductor plays test sheets
 
-    Raises
-    ------
-    ParameterError : an override is not allowed, or no parameter has that name
-
+    Raises ParameterError: an override is not allowed, or no parameter has that name.
     """
     partner = _PARTNER if isinstance(unit, PartnerUnit) else {}
     conductor = _CONDUCTOR if unit.name == TEST_SIGNAL else {}

@@ -71,10 +71,7 @@ class Observer:
 
     Use it as a context manager; `spin` does the work, in the thread that calls it.
 
-    Attributes
-    ----------
     names : the signals, 'unit/signal', in the order of the rows given to `on_step`
-
     """
 
     def __init__(self, name: str, on_step: OnStep, *, on_begin: OnBegin | None = None,
@@ -84,27 +81,17 @@ class Observer:
         """
         Join a drive.
 
-        Parameters
-        ----------
-        name
-            name of the observer's node; a member is one that run.observers names
-        on_step
-            called as on_step(step, time [s], samples) with an array of shape
-            (len(names), 2), value and derivative, valid during the call only
-        on_begin
-            called as on_begin(run, macro-step [s]) when a run begins, also in the middle
-            of another: what came before belongs to a run that is over; a guest's first step
-            need not be step 0, and it may join the same run twice: what came before is void
-        on_change
-            called as on_change(unit, record) with what a node says on `<unit>/changes`,
+        name : name of the observer's node; a member is one that run.observers names
+        on_step : called as on_step(step, time [s], samples) with an array of shape (len(names),
+            2), value and derivative, valid during the call only
+        on_begin : called as on_begin(run, macro-step [s]) when a run begins, also in the middle of
+            another: what came before belongs to a run that is over; a guest's first step need not
+            be step 0, and it may join the same run twice: what came before is void
+        on_change : called as on_change(unit, record) with what a node says on `<unit>/changes`,
             see `changes`; from another thread
-        namespace, domain_id
-            where the drive is; None for the domain in the environment
-        guest
-            True for an observer that nobody waits for
-        outputs
-            the signals of each unit
-
+        namespace, domain_id : where the drive is; None for the domain in the environment
+        guest : True for an observer that nobody waits for
+        outputs : the signals of each unit
         """
         choose_transport(os.environ)
         self.names = tuple(

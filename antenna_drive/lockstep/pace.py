@@ -20,14 +20,11 @@ class Pace:
     may be made `lead_s` earlier, so that a process which has to wait for the machine makes none
     late. A step that comes late is counted and made all the same; the next ones catch up.
 
-    Attributes
-    ----------
     factor : how many times faster than real time; 0 for as fast as possible
     lead_s : how long before it is due a step may be made [s]
     late_steps : steps of this run that came more than one step's time after they were due
     worst_s : how long after it was due the latest of them came [s]
     delays : of each step of this run, from when it may be made until it is made
-
     """
 
     def __init__(self, factor: float, lead_s: float = 0.0) -> None:

@@ -36,23 +36,15 @@ class PartnerUnit(Unit):
 
     Its one setting, `answer`, is the step that was answered and a value of each output.
 
-    Attributes
-    ----------
     seen : what it read in its last step, shape (len(inputs), 2)
-
     """
 
     def __init__(self, name: str, outputs: Sequence[Signal], reads: Sequence[str] = ()) -> None:
         """
         Stand in for a unit.
 
-        Parameters
-        ----------
-        name, outputs
-            of the unit that the partner takes the place of
-        reads
-            the signals that the partner is told, 'unit/signal'
-
+        name, outputs : of the unit that the partner takes the place of
+        reads : the signals that the partner is told, 'unit/signal'
         """
         super().__init__(name)
         self.inputs = tuple(reads)  # type: ignore[misc]
@@ -102,15 +94,12 @@ class Answers:
     deadline. It lasts until the next answer. Before its first answer of a run a partner misses
     nothing.
 
-    Attributes
-    ----------
     taken, refused, misses : how many answers were taken and refused, how many misses there were
     overdue_steps : steps made with an overdue answer
     missing : whether the answer in force is overdue
     of_step : the step that was answered last in this run, NO_STEP for none
     age : of the last answer when it was taken [steps]
     round_trips : from the sending of a step to the arrival of its answer [s]
-
     """
 
     def __init__(self, values: int, deadline_s: float) -> None:

@@ -35,22 +35,13 @@ class PartnerLink:
         """
         Offer the topics.
 
-        Parameters
-        ----------
-        node, member, unit
-            in whose place the partner works
-        rate_hz
-            how often per simulated second the partner is told its inputs
-        deadline_s, on_miss
-            how old the step that was answered last may be [s of simulated time], 0 for any age,
-            and what the outputs do when it is older, one of `partner.ON_MISS`
-        reached
-            returns the step that the node is at, to any thread
-        ask
-            asks from another thread for an answer to be put in force
-        force
-            puts an answer in force at once, in the lock-step's thread
-
+        node, member, unit : in whose place the partner works
+        rate_hz : how often per simulated second the partner is told its inputs
+        deadline_s, on_miss : how old the step that was answered last may be [s of simulated time],
+            0 for any age, and what the outputs do when it is older, one of `partner.ON_MISS`
+        reached : returns the step that the node is at, to any thread
+        ask : asks from another thread for an answer to be put in force
+        force : puts an answer in force at once, in the lock-step's thread
         """
         self._node = node
         self._member = member

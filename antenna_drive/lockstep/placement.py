@@ -51,10 +51,7 @@ def idle_share(before: str, after: str) -> float:
     """
     Return the share of its time that the machine was idle, from two first lines of /proc/stat.
 
-    Raises
-    ------
-    ValueError : the lines are no such lines, or no time has passed between them
-
+    Raises ValueError: the lines are no such lines, or no time has passed between them.
     """
     first, last = (list(map(int, line.split()[1:1 + _COLUMNS])) for line in (before, after))
     passed = sum(last) - sum(first)
@@ -69,12 +66,8 @@ def hasten(pids: Mapping[str, int]) -> None:
 
     Where the system does not offer this (it is Linux's), or does not allow it, nothing changes.
 
-    Parameters
-    ----------
-    pids
-        processes that have just been started, by unit; test_signal, who waits for all the
+    pids : processes that have just been started, by unit; test_signal, who waits for all the
         others, may run on any core
-
     """
     if not hasattr(os, 'SCHED_BATCH'):
         return

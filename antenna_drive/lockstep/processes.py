@@ -46,26 +46,15 @@ class DriveProcesses:
         """
         Say what to start; `start` or entering the context does it.
 
-        Parameters
-        ----------
-        config, parameters
-            configuration files or sets of config/ for every node, and what to set on each node
-            over them, by unit and parameter name
-        namespace
-            of every node, '/east'; '' for none
-        domain_id
-            the ROS 2 domain; None for the one in the environment
-        order
-            the units, in the order in which they are started; that of the wiring if empty
-        wiring
-            module:NAME of the wiring, '' for the drive's own
-        commands
-            commands to run in place of our own nodes, by unit
-        environment
-            variables to set beside those of this process
-        placed
-            whether to place the processes for speed; None for what is said above
-
+        config, parameters : configuration files or sets of config/ for every node, and what to set
+            on each node over them, by unit and parameter name
+        namespace : of every node, '/east'; '' for none
+        domain_id : the ROS 2 domain; None for the one in the environment
+        order : the units, in the order in which they are started; that of the wiring if empty
+        wiring : module:NAME of the wiring, '' for the drive's own
+        commands : commands to run in place of our own nodes, by unit
+        environment : variables to set beside those of this process
+        placed : whether to place the processes for speed; None for what is said above
         """
         self._wiring = wiring
         self._units = find(wiring).units
@@ -124,10 +113,7 @@ class DriveProcesses:
         """
         Make sure that all processes run.
 
-        Raises
-        ------
-        UserError : one has ended by itself; the message is its last line
-
+        Raises UserError: one has ended by itself; the message is its last line.
         """
         for unit, process in self._processes.items():
             status = process.poll()

@@ -67,10 +67,7 @@ class RclChannel:
         """
         Look everything up and check it, for a node's frames and readings.
 
-        Raises
-        ------
-        Unusable : something is not as expected
-
+        Raises Unusable: something is not as expected.
         """
         _check_platform()
         rcl, rcutils, libc = _loaded('rcl'), _loaded('rcutils'), ctypes.CDLL(None)

@@ -39,18 +39,11 @@ class Readings:
         """
         Advertise the topics.
 
-        Parameters
-        ----------
-        node, signals
-            the node and what its unit puts out
-        rate_hz
-            messages per simulated second and topic; 0 for none
-        with_clock
-            whether to publish `clock`
-        amperes
-            real amperes per article ampere, to publish `<node>/armature_current` [real A]
+        node, signals : the node and what its unit puts out
+        rate_hz : messages per simulated second and topic; 0 for none
+        with_clock : whether to publish `clock`
+        amperes : real amperes per article ampere, to publish `<node>/armature_current` [real A]
             beside `<node>/current`; None for not
-
         """
         name = node.get_name()
         self.rate_hz = rate_hz

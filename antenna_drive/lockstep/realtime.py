@@ -23,15 +23,9 @@ def schedule_first_in_first_out(priority: int) -> None:
     These are the lock-step's thread and those of the middleware. Threads that they start later
     are scheduled as usual: whoever serves parameters delays no step.
 
-    Parameters
-    ----------
-    priority
-        1 to 99, higher goes first
+    priority : 1 to 99, higher goes first
 
-    Raises
-    ------
-    UserError : the user may not do this, or the system does not offer it
-
+    Raises UserError: the user may not do this, or the system does not offer it.
     """
     if not hasattr(os, 'SCHED_FIFO'):
         raise UserError('realtime.priority: this system has no SCHED_FIFO; leave it at 0')
@@ -51,10 +45,7 @@ def lock_memory() -> None:
     """
     Keep all memory of this process in RAM, also what it asks for later.
 
-    Raises
-    ------
-    UserError : the user may not do this, or the system does not offer it
-
+    Raises UserError: the user may not do this, or the system does not offer it.
     """
     library = ctypes.CDLL(None, use_errno=True)
     if not hasattr(library, 'mlockall'):

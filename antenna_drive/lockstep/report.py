@@ -38,15 +38,9 @@ class Report:
         """
         Report on `member`.
 
-        Parameters
-        ----------
-        node
-            the node that publishes and logs
-        member, pace
-            what to report on; pace only for the conductor
-        publishers
-            returns how many publishers each peer's frame topic has
-
+        node : the node that publishes and logs
+        member, pace : what to report on; pace only for the conductor
+        publishers : returns how many publishers each peer's frame topic has
         """
         self._node = node
         self._member = member

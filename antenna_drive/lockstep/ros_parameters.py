@@ -113,10 +113,7 @@ class Overrides:
 
         rclpy cannot declare an empty list, which has no type, so nothing is declared to be read.
 
-        Raises
-        ------
-        ParameterError : the QoS of a topic of the lock-step is to be changed
-
+        Raises ParameterError: the QoS of a topic of the lock-step is to be changed.
         """
         self._values: dict[str, Any] = {}
         for name, parameter in node._parameter_overrides.items():
@@ -133,10 +130,7 @@ class Overrides:
         """
         Return the value given for a parameter, or its default.
 
-        Raises
-        ------
-        ParameterError : the value given is not allowed
-
+        Raises ParameterError: the value given is not allowed.
         """
         self._asked.add(name)
         value = entry.check(name, self._values[name]) if name in self._values else default
@@ -153,10 +147,7 @@ class Overrides:
         """
         Return a list of texts.
 
-        Raises
-        ------
-        ParameterError : something else was given
-
+        Raises ParameterError: something else was given.
         """
         self._asked.add(name)
         given = self._values.get(name, list(default))
@@ -173,10 +164,7 @@ class Overrides:
         """
         Refuse what no parameter has asked for.
 
-        Raises
-        ------
-        ParameterError : a name is unknown
-
+        Raises ParameterError: a name is unknown.
         """
         for name in self.rest():
             if name not in known:
@@ -217,15 +205,9 @@ def accept_changes(node: Node, entries: Mapping[str, Entry],
     """
     Let parameters be set while the node runs.
 
-    Parameters
-    ----------
-    node
-        the node on which they are declared
-    entries
-        what may be said of each parameter
-    change
-        puts a set of changes in force and returns '', or refuses all and returns why
-
+    node : the node on which they are declared
+    entries : what may be said of each parameter
+    change : puts a set of changes in force and returns '', or refuses all and returns why
     """
     def as_floats(parameters: list[Parameter[Any]]) -> list[Parameter[Any]]:
         # `ros2 param set ... 1` sends a whole number where 1.0 is meant

@@ -27,11 +27,8 @@ class RunState(NamedTuple):
     """
     What a conductor says of its run.
 
-    Attributes
-    ----------
     state : one of STATES
     run, step : the run, 0 if there is none yet, and its last step that was made
-
     """
 
     state: str
@@ -128,11 +125,7 @@ class RunControl:
         """
         Make no more steps; return when the drive stands still.
 
-        Parameters
-        ----------
-        wake
-            makes the lock-step thread look
-
+        wake : makes the lock-step thread look
         """
         with self._changed:
             if not self._paused:
@@ -154,13 +147,8 @@ class RunControl:
         """
         Make some steps of a paused run; return when they are made or after `patience_s` [s].
 
-        Parameters
-        ----------
-        count
-            how many
-        wake, patience_s
-            see `pause`; after that time the steps go on to be made
-
+        count : how many
+        wake, patience_s : see `pause`; after that time the steps go on to be made
         """
         with self._changed:
             if not self._paused or self._standing is None:

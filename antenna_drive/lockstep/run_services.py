@@ -50,20 +50,12 @@ class RunServices:
         """
         Offer the services.
 
-        Parameters
-        ----------
-        node, conductor, pace
-            the node that offers them, and the run that they control
-        wake
-            makes the lock-step thread look
-        reached
-            returns the step that the node is at, to any thread
-        hurry
-            lets /diagnostics follow a change of the state at once
-        read_sheet
-            returns the settings that play the test sheet in a file; None for a conductor that
-            plays none
-
+        node, conductor, pace : the node that offers them, and the run that they control
+        wake : makes the lock-step thread look
+        reached : returns the step that the node is at, to any thread
+        hurry : lets /diagnostics follow a change of the state at once
+        read_sheet : returns the settings that play the test sheet in a file; None for a conductor
+            that plays none
         """
         self.control = RunControl(PATIENCE_S)
         self._node, self._conductor, self._pace = node, conductor, pace

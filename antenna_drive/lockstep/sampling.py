@@ -28,14 +28,11 @@ class Sampled:
     """
     What a run in five processes gave.
 
-    Attributes
-    ----------
     names : the signals, 'unit/signal'
     samples : shape (steps + 1, len(names), 2), value and time derivative
     processes : how many ran
     wall_s : from frame 0 to the last [s]
     first_step_s : from the start of the last process to frame 0 of all [s]
-
     """
 
     names: tuple[str, ...]
@@ -53,28 +50,16 @@ def sample_processes(steps: int, step_s: float, *, name: str = 'observer',
     """
     Run the drive in five processes and keep every sample of every signal.
 
-    Parameters
-    ----------
-    steps, step_s
-        number and length [s] of the macro-steps
-    name
-        name of the observing node, and of the drive's own namespace
-    settings
-        parameters of the drive by dotted name, such as 'torque_share.circuit.bias_pot'
-    config, domain_id
-        see DriveProcesses
-    namespace
-        None for one of the drive's own, see drive_namespace
-    pace
-        how many times faster than real time, 0 for as fast as possible
-    progress
-        called with the step about ten times a second
+    steps, step_s : number and length [s] of the macro-steps
+    name : name of the observing node, and of the drive's own namespace
+    settings : parameters of the drive by dotted name, such as 'torque_share.circuit.bias_pot'
+    config, domain_id : see DriveProcesses
+    namespace : None for one of the drive's own, see drive_namespace
+    pace : how many times faster than real time, 0 for as fast as possible
+    progress : called with the step about ten times a second
 
-    Raises
-    ------
-    AnotherDrive : the namespace is not free, or nodes of others have taken part
-    UserError : a process has ended by itself or the drive does not go on
-
+    Raises AnotherDrive: the namespace is not free, or nodes of others have taken part.
+    Raises UserError: a process has ended by itself or the drive does not go on.
     """
     given: dict[str, dict[str, Parameter]] = {
         TEST_SIGNAL: {'run.step': float(step_s), 'run.pace': float(pace),
@@ -110,11 +95,8 @@ class RunWatch:
     """
     How far a run of the processes is, and whether it goes on.
 
-    Attributes
-    ----------
     done : the last step that was received, -1 for none
     deadline : when the next step must have come, on the clock of time.monotonic() [s]
-
     """
 
     def __init__(self, last: int, progress: Callable[[int], None] | None = None) -> None:
@@ -130,11 +112,8 @@ class RunWatch:
         """
         Return whether the last step has come.
 
-        Raises
-        ------
-        AnotherDrive : frames have come from a process that is none of these
-        UserError : a process has ended, or no step comes any more
-
+        Raises AnotherDrive: frames have come from a process that is none of these.
+        Raises UserError: a process has ended, or no step comes any more.
         """
         now = time.monotonic()
         if self.done < self._last and now < self._next_look:

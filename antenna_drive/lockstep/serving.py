@@ -19,10 +19,7 @@ class Serving:
     Whatever arrives may be wrong: a callback that fails is logged, and the next one
     is served.
 
-    Attributes
-    ----------
     faults : how many callbacks have failed
-
     """
 
     def __init__(self, node: Node) -> None:

@@ -29,11 +29,7 @@ def is_cut_off(process: Path = Path('/proc/self')) -> bool:
     """
     Return whether a port at which the process listens for frames has been removed.
 
-    Parameters
-    ----------
-    process
-        its folder in /proc; where there is none, nothing is known, and the answer is False
-
+    process : its folder in /proc; where there is none, nothing is known, and the answer is False
     """
     try:
         removed = set(_REMOVED.findall((process / 'maps').read_text(encoding='utf-8')))

@@ -33,13 +33,9 @@ class SimTime:
         """
         Begin to look; in the root namespace `/clock` is the drive's own clock, and nothing is due.
 
-        Parameters
-        ----------
-        node
-            the conductor's
-        simulated_s
-            returns the time of the drive [s], 0.0 if it has not begun; called by another thread
-
+        node : the conductor's
+        simulated_s : returns the time of the drive [s], 0.0 if it has not begun; called by another
+            thread
         """
         self._node = node
         self._space = node.get_namespace()

@@ -24,11 +24,8 @@ class Thinned(NamedTuple):
     """
     One step of all units that are read.
 
-    Attributes
-    ----------
     run, step, step_s : the run, the number of the step, the macro-step [s]
     values : by unit, the value of each of its signals, shape (signals,)
-
     """
 
     run: int
@@ -49,14 +46,9 @@ class Thinning:
         """
         Begin with no step.
 
-        Parameters
-        ----------
-        units
-            whose frames make a step complete
-        rate_hz
-            how many steps for each simulated second; the nearest that the macro-step allows, and
-            at most every step
-
+        units : whose frames make a step complete
+        rate_hz : how many steps for each simulated second; the nearest that the macro-step allows,
+            and at most every step
         """
         self._units = tuple(units)
         self._rate_hz = rate_hz
@@ -68,14 +60,9 @@ class Thinning:
         """
         Take frames of a unit.
 
-        Parameters
-        ----------
-        unit
-            that sent them
-        frames
-            rows of a `FrameLayout`; rows that are no frame of a run are left out, and those of a
-            second node of the unit's name
-
+        unit : that sent them
+        frames : rows of a `FrameLayout`; rows that are no frame of a run are left out, and those
+            of a second node of the unit's name
         """
         frames = frames[np.isfinite(frames).all(axis=1)]
         run, step, step_s, _ = frames[:, :len(HEADER)].T

@@ -104,16 +104,10 @@ def axis_state(step: Thinned, name: str, gear_ratio: float | None) -> JointState
     """
     Return the axis as a joint.
 
-    Parameters
-    ----------
-    step
-        with the frames of plant and motors
-    name
-        of the joint
-    gear_ratio
-        motor turns for each turn of the axis; the effort is left out if it is None, because the
-        plant has not told it yet
-
+    step : with the frames of plant and motors
+    name : of the joint
+    gear_ratio : motor turns for each turn of the axis; the effort is left out if it is None,
+        because the plant has not told it yet
     """
     torque = sum(_value(step, motor, 'gear_torque') for motor in MOTORS)
     return _state(step, [name], position=[_value(step, PLANT, 'encoder')],

@@ -289,10 +289,7 @@ def _read_quiet(path: Path | None) -> tuple[Baseline | None, str, tuple[str, ...
     """
     Return a quiet record that is kept, the configuration tuned to it, and what is outside.
 
-    Raises
-    ------
-    UserError : the file cannot be read, or is none
-
+    Raises UserError: the file cannot be read, or is none.
     """
     if path is None or not path.exists():
         return None, '', None
@@ -310,13 +307,8 @@ def told(twin: Twin, named: str = '') -> tuple[bytes, str, list[tuple[str, str]]
     """
     Return how bad the state of a twin is, in a line, and in named values.
 
-    Parameters
-    ----------
-    twin
-        that reports
-    named
-        what a verdict on the same drive names, '' for nothing
-
+    twin : that reports
+    named : what a verdict on the same drive names, '' for nothing
     """
     state, settings, judge = twin.state, twin.settings, twin.judge
     values = [('state', state), ('tuning', twin.tuned or 'not yet'),

@@ -22,10 +22,7 @@ def config_dir() -> Path:
     `colcon build --symlink-install`: an edit counts at once), else the one that pip or
     colcon installed as share/antenna_drive/config.
 
-    Raises
-    ------
-    UserError : there is none; the message says where it was looked for
-
+    Raises UserError: there is none; the message says where it was looked for.
     """
     places = list(dict.fromkeys(_candidates()))
     for place in places:

@@ -48,19 +48,12 @@ def load(*sources: str | Path, kind: Any = Drive) -> Drive:
     """
     Load configuration files, each over the one before, and check everything.
 
-    Parameters
-    ----------
-    sources
-        paths, or names of the sets in config/ ('new_circuit'); none is the reference set
-    kind
-        Drive, or a subclass with further parameter sets; a file gives each in a section of its
+    sources : paths, or names of the sets in config/ ('new_circuit'); none is the reference set
+    kind : Drive, or a subclass with further parameter sets; a file gives each in a section of its
         field's name
 
-    Raises
-    ------
-    ParameterError : a file cannot be read, or an entry is wrong, missing, misspelt or out of
-        range; one line names file, key and what is allowed
-
+    Raises ParameterError: a file cannot be read, or an entry is wrong, missing, misspelt or out of
+    range; one line names file, key and what is allowed.
     """
     given: _Given = {}
     alone = False
@@ -79,10 +72,7 @@ def find(source: str | Path) -> Path:
     """
     Return the path of a file, or of a set in config/ by its name.
 
-    Raises
-    ------
-    ParameterError : there is no such file or set
-
+    Raises ParameterError: there is no such file or set.
     """
     path = Path(source)
     if path.is_file():
@@ -213,10 +203,7 @@ def check_waveform(waveform: Waveform, key: str) -> None:
     """
     Check what no single entry shows: lists that belong together, and the order of times.
 
-    Raises
-    ------
-    ParameterError : lists differ in length, or times go back; the message begins with `key`
-
+    Raises ParameterError: lists differ in length, or times go back; the message begins with `key`.
     """
     for first, name in (('frequencies', 'weights'), ('frequencies', 'phases'),
                         ('knot_times', 'knot_values')):

@@ -46,13 +46,8 @@ def place_of(kind: np.dtype[Any], path: str) -> int:
     """
     Return where a number lies in a record, in numbers: every field takes eight bytes.
 
-    Parameters
-    ----------
-    kind
-        of the record, from `dtype_of`
-    path
-        names of the fields with dots between; the last one may be the index of a list
-
+    kind : of the record, from `dtype_of`
+    path : names of the fields with dots between; the last one may be the index of a list
     """
     at = 0
     for part in path.split('.'):

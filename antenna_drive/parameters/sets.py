@@ -352,10 +352,7 @@ def changed(parameters: Set, changes: dict[str, Any]) -> Set:
     """
     Return the set with the parameters of these dotted names changed; values are not checked.
 
-    Raises
-    ------
-    AttributeError : a name does not exist
-
+    Raises AttributeError: a name does not exist.
     """
     for name, value in changes.items():
         head, _, rest = name.partition('.')

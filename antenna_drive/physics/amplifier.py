@@ -22,17 +22,10 @@ def rate_error(
     """
     Return the error e of amplifier 1 [article A].
 
-    Parameters
-    ----------
-    command_voltage
-        v_c [V]
-    tach_rate
-        tachometer reading [rad/s]
-    bias_command
-        s s_F x_F, the counter-torque with the sign of this motor [V]
-    p
-        Amplifier
-
+    command_voltage : v_c [V]
+    tach_rate : tachometer reading [rad/s]
+    bias_command : s s_F x_F, the counter-torque with the sign of this motor [V]
+    p : Amplifier
     """
     volts = command_voltage - p.tach_gain * tach_rate + bias_command + p.offset
     if p.dead_zone > 0.0:
@@ -52,15 +45,9 @@ def limit_centre(rate: float, p: Amplifier, armature: Armature) -> float:
 
     A demand of k_e w plus the current limit lets just that current flow against the back-EMF.
 
-    Parameters
-    ----------
-    rate
-        w of the motor [rad/s]
-    p
-        Amplifier
-    armature
-        Armature
-
+    rate : w of the motor [rad/s]
+    p : Amplifier
+    armature : Armature
     """
     kappa = armature.physical_amperes_per_article_ampere
     return armature.back_emf_constant / kappa / (armature.resistance
@@ -86,15 +73,9 @@ def error_slope(
     """
     Return the time derivative of `rate_error` [article A/s].
 
-    Parameters
-    ----------
-    error
-        e [article A], zero within the dead zone
-    command_slope, tach_slope, bias_slope
-        derivatives of its arguments [V/s], [rad/s^2], [V/s]
-    p
-        Amplifier
-
+    error : e [article A], zero within the dead zone
+    command_slope, tach_slope, bias_slope : derivatives of its arguments [V/s], [rad/s^2], [V/s]
+    p : Amplifier
     """
     if p.dead_zone > 0.0 and error == 0.0:
         return 0.0
@@ -106,19 +87,11 @@ def next_winding(winding: int, error: float, excess: float, needed: float, p: Am
     """
     Return what the integral does next: it must not wind up while the demand is limited.
 
-    Parameters
-    ----------
-    winding
-        FREE, FROZEN or HELD so far
-    error
-        e [article A]
-    excess
-        how far the demand is beyond the limit, in the direction of the error [article A]
-    needed
-        rate of the integral, in that direction, that keeps the excess as it is [article A/s]
-    p
-        Amplifier
-
+    winding : FREE, FROZEN or HELD so far
+    error : e [article A]
+    excess : how far the demand is beyond the limit, in the direction of the error [article A]
+    needed : rate of the integral, in that direction, that keeps the excess as it is [article A/s]
+    p : Amplifier
     """
     free = abs(error) / p.integral_time
     if winding == HELD:
@@ -152,17 +125,10 @@ def armature_voltage(
     """
     Return the voltage of amplifier 2 at the armature [V], limited to +- V_max.
 
-    Parameters
-    ----------
-    lagged_demand
-        v, the demand behind the lag T_a [article A]
-    current
-        i [article A]
-    p
-        Amplifier
-    armature
-        Armature
-
+    lagged_demand : v, the demand behind the lag T_a [article A]
+    current : i [article A]
+    p : Amplifier
+    armature : Armature
     """
     kappa = armature.physical_amperes_per_article_ampere
     gain = p.current_feedback_gain

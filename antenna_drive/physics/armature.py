@@ -13,17 +13,10 @@ def current_rate(voltage: float, current: float, rate: float, p: Armature) -> fl
     """
     Return the time derivative of the current [article A/s]: L i' = V/kappa - R i - (k_b/kappa) w.
 
-    Parameters
-    ----------
-    voltage
-        V at the armature [V]
-    current
-        i [article A]
-    rate
-        w of the motor [rad/s]
-    p
-        Armature; resistance_change is zero and back_emf_share 1 in the article
-
+    voltage : V at the armature [V]
+    current : i [article A]
+    rate : w of the motor [rad/s]
+    p : Armature; resistance_change is zero and back_emf_share 1 in the article
     """
     kappa = p.physical_amperes_per_article_ampere
     return ((voltage - p.back_emf_constant * p.back_emf_share * rate) / kappa

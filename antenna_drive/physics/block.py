@@ -69,13 +69,10 @@ class Equation(NamedTuple):
     """
     How a continuous run computes an output, or its slope, that is none of the states.
 
-    Attributes
-    ----------
     function : compiled (t, x, mode, u, p) -> float
     feedthrough : the inputs that the function reads
     rate_of : a state whose time derivative is just this, '' if there is none; where the
         derivatives are known anyway, the function is not called
-
     """
 
     function: Any
@@ -88,13 +85,10 @@ class Interface:
     """
     What others see of a unit, whatever is within.
 
-    Attributes
-    ----------
     kind : the type of its parameter set
     inputs : names of what it reads, from `rows`
     outputs : the signals that it puts out
     bare : the set within `kind` whose parameters go by their bare names, '' for none
-
     """
 
     kind: type
@@ -118,8 +112,6 @@ class Block(Interface):
     record of `kind`, and t the time since the start of the macro-step [s]. An output with the
     name of a state is that state.
 
-    Attributes
-    ----------
     states, modes : their names, from `rows`
     more_states : gives the number of further states, from p; None if there are never any
     start : (p, x, mode) writes what differs from zero at t = 0
@@ -129,11 +121,10 @@ class Block(Interface):
     read : (x, mode, u, t, p, y) writes the outputs
     begin, end : (x, mode, u, p, h, y) act before and after a macro-step of h [s], when y still
         holds the outputs at its start, and when it holds those at its end; None for nothing
-    values : equations of outputs that are no states; None for an output that has no meaning in
-        a continuous run, and is zero there
+    values : equations of outputs that are no states; None for an output that has no meaning in a
+        continuous run, and is zero there
     slopes : equations of the slopes of outputs, where another unit's rates or modes use them
     slopes_used : the inputs whose slopes its rates or modes use other than to extrapolate
-
     """
 
     states: Any

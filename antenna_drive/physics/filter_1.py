@@ -16,17 +16,10 @@ def counter_torque_rate(
     """
     Return the time derivative of x_F [V/s]; the filter acts on the error of the torque bias.
 
-    Parameters
-    ----------
-    counter_torque
-        x_F, state [V]
-    bias_voltage
-        v_b, the bias asked for [V]
-    current_1, current_2
-        of the motors [article A]
-    p
-        Filter1
-
+    counter_torque : x_F, state [V]
+    bias_voltage : v_b, the bias asked for [V]
+    current_1, current_2 : of the motors [article A]
+    p : Filter1
     """
     error = bias_voltage - p.difference_gain * (current_2 - current_1)
     return p.gain * error - p.pole * counter_torque

@@ -15,15 +15,9 @@ def twist(motor_angle: float, axis_angle: float, gear_ratio: float, p: Gearbox) 
     """
     Return the angle between motor and axis at the motor shaft [rad].
 
-    Parameters
-    ----------
-    motor_angle, axis_angle
-        [rad]
-    gear_ratio
-        N [1]
-    p
-        Gearbox; transmission_error is the unmodelled effect of eccentric or uneven teeth
-
+    motor_angle, axis_angle : [rad]
+    gear_ratio : N [1]
+    p : Gearbox; transmission_error is the unmodelled effect of eccentric or uneven teeth
     """
     angle = motor_angle - gear_ratio * axis_angle
     if (p.transmission_error != 0.0 or p.transmission_error_second != 0.0
@@ -55,17 +49,10 @@ def gear_torque(side: int, angle: float, rate: float, presliding: float, p: Gear
     """
     Return T_g, the torque of the gearbox at the motor shaft; positive drives the axis [N m].
 
-    Parameters
-    ----------
-    side
-        the flank that touches: +1, -1 or 0 for none
-    angle, rate
-        `twist` and `twist_rate` [rad], [rad/s]
-    presliding
-        state of the hysteresis, from -1 to 1
-    p
-        Gearbox
-
+    side : the flank that touches: +1, -1 or 0 for none
+    angle, rate : `twist` and `twist_rate` [rad], [rad/s]
+    presliding : state of the hysteresis, from -1 to 1
+    p : Gearbox
     """
     torque = contact_torque(side, angle, rate, p.half_gap, p.stiffness, p.contact_damping)
     if torque != 0.0 and (p.hysteresis != 0.0 or p.hysteresis_share != 0.0):

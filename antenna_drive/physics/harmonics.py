@@ -14,17 +14,10 @@ def wave(angle: float, amplitude: float, second: float, third: float, cycles: fl
     """
     Return a wave of three harmonics, in the unit of its amplitudes.
 
-    Parameters
-    ----------
-    angle
-        that it follows [rad]
-    amplitude, second, third
-        of the harmonics
-    cycles
-        of the first harmonic per revolution
-    phase, second_phase, third_phase
-        of the harmonics at angle zero [rad]
-
+    angle : that it follows [rad]
+    amplitude, second, third : of the harmonics
+    cycles : of the first harmonic per revolution
+    phase, second_phase, third_phase : of the harmonics at angle zero [rad]
     """
     turned = cycles * angle
     return (amplitude * sine(turned + phase)

@@ -15,15 +15,9 @@ def driving_torque(current: float, angle: float, p: Motor) -> float:
     """
     Return the torque of the armature on the rotor [N m].
 
-    Parameters
-    ----------
-    current
-        i [article A]
-    angle
-        of the rotor [rad]
-    p
-        Motor; torque_ripple is the unmodelled effect of a rotor with poles and slots
-
+    current : i [article A]
+    angle : of the rotor [rad]
+    p : Motor; torque_ripple is the unmodelled effect of a rotor with poles and slots
     """
     torque = p.torque_constant * current
     if p.torque_ripple != 0.0 or p.torque_ripple_second != 0.0 or p.torque_ripple_third != 0.0:
@@ -38,15 +32,9 @@ def friction_level(rate: float, gear_torque: float, p: Motor) -> float:
     """
     Return the size of the rotor's friction torque while it slips [N m].
 
-    Parameters
-    ----------
-    rate
-        w of the rotor [rad/s]
-    gear_torque
-        T_g on the shaft, for the effect of a friction that grows with load [N m]
-    p
-        Motor
-
+    rate : w of the rotor [rad/s]
+    gear_torque : T_g on the shaft, for the effect of a friction that grows with load [N m]
+    p : Motor
     """
     coulomb = p.coulomb_torque * p.friction_torque_per_ampere
     if p.load_dependent_friction != 0.0:
@@ -61,13 +49,8 @@ def tachometer(rate: float, angle: float, p: Tachometer) -> float:
     """
     Return what the tachometer says [rad/s].
 
-    Parameters
-    ----------
-    rate, angle
-        of the rotor [rad/s], [rad]
-    p
-        Tachometer; gain 1, offset 0 and ripple 0 in the article
-
+    rate, angle : of the rotor [rad/s], [rad]
+    p : Tachometer; gain 1, offset 0 and ripple 0 in the article
     """
     reading = p.gain * rate + p.offset
     if p.ripple != 0.0 or p.ripple_second != 0.0 or p.ripple_third != 0.0:
@@ -81,13 +64,8 @@ def tachometer_slope(rate: float, angle: float, acceleration: float, p: Tachomet
     """
     Return the time derivative of what the tachometer says [rad/s^2].
 
-    Parameters
-    ----------
-    rate, angle, acceleration
-        of the rotor [rad/s], [rad], [rad/s^2]
-    p
-        Tachometer
-
+    rate, angle, acceleration : of the rotor [rad/s], [rad], [rad/s^2]
+    p : Tachometer
     """
     slope = p.gain * acceleration
     if p.ripple != 0.0 or p.ripple_second != 0.0 or p.ripple_third != 0.0:

@@ -13,14 +13,8 @@ def command_voltage_rate(voltage: float, rate_command: float, p: RateCommand) ->
     """
     Return the time derivative of the command voltage [V/s]: k_s k_1 / (1 + tau_1 s), Table 1.
 
-    Parameters
-    ----------
-    voltage
-        v_c, state [V]
-    rate_command
-        r, axis rate command [rad/s]
-    p
-        RateCommand
-
+    voltage : v_c, state [V]
+    rate_command : r, axis rate command [rad/s]
+    p : RateCommand
     """
     return (p.k_s * p.k_1 * rate_command - voltage) / p.tau_1

@@ -119,15 +119,9 @@ def waveform(t: float, p: Waveform, bits: FloatArray) -> tuple[float, float]:
     """
     Return value and slope of a test signal at a time.
 
-    Parameters
-    ----------
-    t
-        time since the waveform was chosen [s]
-    p
-        Waveform
-    bits
-        from `prbs_bits`
-
+    t : time since the waveform was chosen [s]
+    p : Waveform
+    bits : from `prbs_bits`
     """
     if p.waveform == EXTERNAL:
         return p.offset + p.external, 0.0
@@ -143,17 +137,10 @@ def values(t: FloatArray, p: Waveform, bits: FloatArray, y: FloatArray) -> None:
     """
     Write the values of a test signal at any times.
 
-    Parameters
-    ----------
-    t
-        times since the waveform was chosen [s], shape (n,)
-    p
-        record of Waveform
-    bits
-        from `prbs_bits`; any array if the waveform is another
-    y
-        receives the values, shape (n,)
-
+    t : times since the waveform was chosen [s], shape (n,)
+    p : record of Waveform
+    bits : from `prbs_bits`; any array if the waveform is another
+    y : receives the values, shape (n,)
     """
     for i in range(t.size):
         y[i] = waveform(t[i], p, bits)[0]
@@ -167,22 +154,13 @@ def sample(
     """
     Write both test signals at `count` macro-steps.
 
-    Parameters
-    ----------
-    first, count
-        number of the first macro-step, and how many
-    h
-        macro-step [s]
-    origins
-        time at which each waveform was chosen [s], shape (2,)
-    records
-        the record of TestSignal, in an array of one: numba looks anew at a single record in
+    first, count : number of the first macro-step, and how many
+    h : macro-step [s]
+    origins : time at which each waveform was chosen [s], shape (2,)
+    records : the record of TestSignal, in an array of one: numba looks anew at a single record in
         every call, which takes longer than the rest
-    bits
-        from `prbs_bits`
-    y
-        receives value and derivative of the outputs, shape (count, 2, 2)
-
+    bits : from `prbs_bits`
+    y : receives value and derivative of the outputs, shape (count, 2, 2)
     """
     p = records[0]
     for i in range(count):

@@ -132,13 +132,8 @@ def encoder(angle: float, p: Encoder) -> float:
     """
     Return what the elevation encoder says [rad].
 
-    Parameters
-    ----------
-    angle
-        of the hub [rad]
-    p
-        Encoder; offset, cyclic error and step are zero in the article
-
+    angle : of the hub [rad]
+    p : Encoder; offset, cyclic error and step are zero in the article
     """
     reading = angle + p.offset
     if p.cyclic_error != 0.0 or p.cyclic_error_second != 0.0 or p.cyclic_error_third != 0.0:

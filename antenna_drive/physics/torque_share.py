@@ -42,13 +42,8 @@ def steady_bias_voltage(current_sum: float, p: TorqueShare) -> float:
     """
     Return v_b of a current that does not change [V], Eq. (14).
 
-    Parameters
-    ----------
-    current_sum
-        i_1 + i_2 [article A]
-    p
-        TorqueShare
-
+    current_sum : i_1 + i_2 [article A]
+    p : TorqueShare
     """
     share = p.k_2 / p.s_2 * (p.fade_out_voltage
                              + p.g_4 * abs(p.current_to_voltage * current_sum))

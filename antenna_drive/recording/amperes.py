@@ -31,11 +31,8 @@ def with_real_amperes(recording: Recording, names: Iterable[str]) -> Recording:
 
     A current `motor_1/current` is followed by `motor_1/real_current`.
 
-    Raises
-    ------
-    RecordingError : the recording does not tell how many real amperes an article ampere is, or
-        there is no current
-
+    Raises RecordingError: the recording does not tell how many real amperes an article ampere is,
+    or there is no current.
     """
     kappa = real_amperes(recording)
     if kappa is None:

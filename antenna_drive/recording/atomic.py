@@ -20,10 +20,7 @@ def refuse_existing(path: Path) -> None:
     """
     Check that nothing is in the place of a new file or folder.
 
-    Raises
-    ------
-    RecordingError : there is something
-
+    Raises RecordingError: there is something.
     """
     if path.exists() or path.is_symlink():
         raise RecordingError(f'{path}: exists already; remove it or choose another name')
@@ -38,10 +35,7 @@ def sync_folder(path: Path) -> None:
     """
     Make the disk hold the names of the files in a folder, and of the folder.
 
-    Raises
-    ------
-    OSError : it cannot be done
-
+    Raises OSError: it cannot be done.
     """
     for folder in (path, path.absolute().parent):
         handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
@@ -56,10 +50,7 @@ def new_file(path: Path) -> Iterator[IO[bytes]]:
     """
     Give a stream that becomes the file `path` at the end, if all went well.
 
-    Raises
-    ------
-    RecordingError : the file exists already or cannot be written
-
+    Raises RecordingError: the file exists already or cannot be written.
     """
     refuse_existing(path)
     try:
@@ -74,10 +65,7 @@ def new_folder(path: Path) -> Iterator[Path]:
     """
     Give a folder that becomes `path` at the end, if all went well.
 
-    Raises
-    ------
-    RecordingError : there is something at `path` already, or it cannot be written
-
+    Raises RecordingError: there is something at `path` already, or it cannot be written.
     """
     refuse_existing(path)
     try:

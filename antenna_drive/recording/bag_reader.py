@@ -82,10 +82,7 @@ def message_counts(path: Path) -> dict[str, int]:
     """
     Return how many messages of each topic the description of a bag tells of.
 
-    Raises
-    ------
-    RecordingError : it is no bag, or it has no description
-
+    Raises RecordingError: it is no bag, or it has no description.
     """
     counts = _files(path)[1]
     if not counts:

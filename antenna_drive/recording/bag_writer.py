@@ -51,12 +51,9 @@ class BagWriter:
     last `flush`, but metadata.yaml is missing and `read_bag` wants to be told that a part is
     enough.
 
-    Attributes
-    ----------
     path : the folder
     written_ns : time stamp of the last sample that is safe in the file [ns], -1 if none is
     synced_ns : time stamp of the last sample that a failure of the power leaves [ns], -1 if none
-
     """
 
     def __init__(self, path: str | Path, signals: Mapping[str, str], *,
@@ -67,31 +64,18 @@ class BagWriter:
         """
         Create the folder and write everything that is known before the first sample.
 
-        Parameters
-        ----------
-        path
-            folder that is not there yet
-        signals
-            name -> unit of each signal that will come
-        configuration, sheet, notes
-            see Recording
-        stem
-            first part of the storage file's name; the folder's name if not given
-        flush_s
-            longest time between chunks, by `clock` and by the time stamps [s]
-        sync_s
-            after how long by `clock` the disk is made to hold what was written [s], at the end
-            of a chunk; None for at the end of each storage file only
-        split_s
-            how long a storage file becomes, by `clock` or by the time stamps [s]
-        clock
-            a steady clock [s]
+        path : folder that is not there yet
+        signals : name -> unit of each signal that will come
+        configuration, sheet, notes : see Recording
+        stem : first part of the storage file's name; the folder's name if not given
+        flush_s : longest time between chunks, by `clock` and by the time stamps [s]
+        sync_s : after how long by `clock` the disk is made to hold what was written [s], at the
+            end of a chunk; None for at the end of each storage file only
+        split_s : how long a storage file becomes, by `clock` or by the time stamps [s]
+        clock : a steady clock [s]
 
-        Raises
-        ------
-        RecordingError : the folder exists already or cannot be written, or an argument is no
-            plain data
-
+        Raises RecordingError: the folder exists already or cannot be written, or an argument is no
+        plain data.
         """
         self.path = Path(path)
         self.written_ns = self.synced_ns = -1
@@ -164,20 +148,12 @@ class BagWriter:
         """
         Write one sample of every signal.
 
-        Parameters
-        ----------
-        step
-            number of the macro-step
-        time_ns
-            simulated time [ns], not negative
-        values
-            one for each signal, in their order; NaN where there is no sample
+        step : number of the macro-step
+        time_ns : simulated time [ns], not negative
+        values : one for each signal, in their order; NaN where there is no sample
 
-        Raises
-        ------
-        RecordingError : the disk is full or the file cannot be written, a value is infinite, or
-            the time is negative; what was written before stays readable
-
+        Raises RecordingError: the disk is full or the file cannot be written, a value is infinite,
+        or the time is negative; what was written before stays readable.
         """
         if not 0 <= time_ns < 2**63 or any(map(math.isinf, values)):
             for i, value in enumerate(values):
@@ -200,10 +176,7 @@ class BagWriter:
         """
         Write one sample of one signal, given by its place in the order of the signals.
 
-        Raises
-        ------
-        RecordingError : see `write`
-
+        Raises RecordingError: see `write`.
         """
         self._check(signal, time_ns, value)
         with self._guarded() as writer:
@@ -222,10 +195,7 @@ class BagWriter:
         """
         Write down the configuration, in the place of what was known of it before.
 
-        Raises
-        ------
-        RecordingError : the file cannot be written, or it is no plain data
-
+        Raises RecordingError: the file cannot be written, or it is no plain data.
         """
         text = _as_json(configuration)
         with self._guarded() as writer:
@@ -235,10 +205,7 @@ class BagWriter:
         """
         Write down that tuning parameters changed and act from `step` on.
 
-        Raises
-        ------
-        RecordingError : the file cannot be written, or a value is no plain data
-
+        Raises RecordingError: the file cannot be written, or a value is no plain data.
         """
         text = _as_json(values, f'{unit}: ')
         with self._guarded() as writer:
@@ -249,10 +216,7 @@ class BagWriter:
         """
         Complete the chunk, so that what was written so far survives this process.
 
-        Raises
-        ------
-        RecordingError : the disk is full or the file cannot be written
-
+        Raises RecordingError: the disk is full or the file cannot be written.
         """
         with self._guarded() as writer:
             writer.flush()
@@ -300,10 +264,7 @@ class BagWriter:
         """
         Complete the bag: the index, and metadata.yaml, which ROS 2 tools look for.
 
-        Raises
-        ------
-        RecordingError : the disk is full or the file cannot be written
-
+        Raises RecordingError: the disk is full or the file cannot be written.
         """
         if self._writer is None:
             return
@@ -345,11 +306,8 @@ def write_bag(recording: Recording, path: str | Path) -> None:
     """
     Write a recording as a rosbag2 folder, whole or not at all.
 
-    Raises
-    ------
-    RecordingError : the folder exists already or cannot be written, or a time stamp is negative,
-        which ROS 2 does not know (`Recording.shift` moves it)
-
+    Raises RecordingError: the folder exists already or cannot be written, or a time stamp is
+    negative, which ROS 2 does not know (`Recording.shift` moves it).
     """
     path = Path(path)
     if recording.start_ns < 0:

@@ -181,10 +181,7 @@ def parse_known(meta: dict[str, Any]) -> dict[str, Any]:
     """
     Return configuration, changes and notes from plain data that a file held.
 
-    Raises
-    ------
-    PlainDataError : something in it is not what it has to be
-
+    Raises PlainDataError: something in it is not what it has to be.
     """
     changes = []
     given = meta.get('changes', [])

@@ -29,12 +29,9 @@ class BiasStatistics:
     """
     The bias voltage.
 
-    Attributes
-    ----------
     minimum_V, maximum_V : the range
     at_zero : share of time at or below `zero_V`, within which the motors do not counteract
     zero_V : what counts as zero: 0, or the noise and resolution that the test sheet tells
-
     """
 
     minimum_V: float
@@ -48,8 +45,6 @@ class MotorStatistics:
     """
     One motor; None where its signal was not recorded.
 
-    Attributes
-    ----------
     current_peak_A : greatest current either way, with its sign; the ammeter's where the current
         itself was not recorded [article A]
     current_peak_s : when it flowed
@@ -58,7 +53,6 @@ class MotorStatistics:
     still_rad_s : rate that counts as standing still: 0, or noise and resolution of the sheet
     backlash_crossings : how often the teeth changed from one flank to the other: changes of the
         sign of the gear torque, the zeros in the gap between left out
-
     """
 
     current_peak_A: float | None = None
@@ -74,13 +68,10 @@ class Statistics:
     """
     The figures of a recording; None where a signal was not recorded.
 
-    Attributes
-    ----------
     start_s, end_s : span of the samples [s]
     bias : the bias voltage
     motors : 'motor_1' and 'motor_2' -> the motor's figures
     axis_stick : share of time that the axis stands still, its rate being exactly zero
-
     """
 
     start_s: float

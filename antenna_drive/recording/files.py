@@ -15,18 +15,11 @@ def read_recording(path: str | Path, *, partial: bool = False) -> Recording:
     """
     Read a rosbag2 folder, or a file .mcap or .csv.
 
-    Parameters
-    ----------
-    path
-        the folder or file
-    partial
-        read what can be read of a bag that was cut off or damaged
+    path : the folder or file
+    partial : read what can be read of a bag that was cut off or damaged
 
-    Raises
-    ------
-    RecordingError : there is nothing at `path`, or it is no recording that can be read
-    ParameterError : the test sheet beside a CSV is none
-
+    Raises RecordingError: there is nothing at `path`, or it is no recording that can be read.
+    Raises ParameterError: the test sheet beside a CSV is none.
     """
     path = Path(path)
     if not path.exists():

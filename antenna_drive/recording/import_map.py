@@ -23,10 +23,7 @@ def load_map(path: str | Path) -> ImportMap:
     """
     Read a map whose signals may be the drive's own.
 
-    Raises
-    ------
-    ParameterError : as in `column_map.load_map`
-
+    Raises ParameterError: as in `column_map.load_map`.
     """
     return column_map.load_map(path, DRIVE)
 
@@ -40,11 +37,8 @@ def import_file(path: str | Path, import_map: ImportMap) -> Recording:
     """
     Read a file of any kind that `tables` knows, and the test sheet NAME.yaml beside it.
 
-    Raises
-    ------
-    RecordingError : the file cannot be read as the map says, see `read_mapped`
-    ParameterError : NAME.yaml is no test sheet
-
+    Raises RecordingError: the file cannot be read as the map says, see `read_mapped`.
+    Raises ParameterError: NAME.yaml is no test sheet.
     """
     path = Path(path)
     channels = read_mapped(path, import_map)

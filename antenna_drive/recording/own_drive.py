@@ -31,10 +31,7 @@ def check_rows(path: Path, rows: int) -> None:
     """
     Make sure that a bag has so many samples of every signal.
 
-    Raises
-    ------
-    IncompleteRecording : it has more or fewer
-
+    Raises IncompleteRecording: it has more or fewer.
     """
     counts = message_counts(path)
     wrong = {topic: count for topic, count in counts.items() if count != rows}
@@ -48,20 +45,12 @@ def check_settings(path: Path, told: Mapping[str, Any],
     """
     Make sure that each unit has said that it has the parameters which it was to have.
 
-    Parameters
-    ----------
-    path
-        the recording, for the error
-    told
-        by unit, what it has said that is in force
-    parameters, config
-        as `DriveProcesses` takes them
+    path : the recording, for the error
+    told : by unit, what it has said that is in force
+    parameters, config : as `DriveProcesses` takes them
 
-    Raises
-    ------
-    AnotherDrive : a unit has others
-    IncompleteRecording : a unit has said nothing
-
+    Raises AnotherDrive: a unit has others.
+    Raises IncompleteRecording: a unit has said nothing.
     """
     drive = load(*config)
     for unit in UNITS:

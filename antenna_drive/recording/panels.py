@@ -56,10 +56,7 @@ def chosen(recording: Recording, patterns: Sequence[str] | None) -> tuple[str, .
     """
     Return the signals whose names fit any of the patterns, such as 'motor_*/current'.
 
-    Raises
-    ------
-    RecordingError : a pattern fits no signal; the message names the nearest one
-
+    Raises RecordingError: a pattern fits no signal; the message names the nearest one.
     """
     if not patterns:
         return tuple(name for name in recording if len(recording[name]))
@@ -78,18 +75,11 @@ def panels_of(recording: Recording, patterns: Sequence[str] | None = None) -> tu
     """
     Return the panels that show a recording: the drive's own first, then one for each other signal.
 
-    Parameters
-    ----------
-    recording
-        what is to be looked at
-    patterns
-        the signals, see `chosen`; if not given, panels that tell nothing are left out: an
+    recording : what is to be looked at
+    patterns : the signals, see `chosen`; if not given, panels that tell nothing are left out: an
         external torque of zero, ammeters that read the currents, and the lock-step's own signal
 
-    Raises
-    ------
-    RecordingError : a pattern fits no signal, or there is no sample at all
-
+    Raises RecordingError: a pattern fits no signal, or there is no sample at all.
     """
     names = chosen(recording, patterns)
     if not names:

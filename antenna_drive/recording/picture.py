@@ -22,23 +22,13 @@ def draw(recording: Recording, stream: IO[bytes], form: str, *,
     """
     Draw the signals over time, one panel for those that belong together.
 
-    Parameters
-    ----------
-    recording
-        what to draw
-    stream
-        where to write the picture
-    form
-        one of FORMATS
-    patterns
-        the signals, such as 'motor_*/current'; all that have samples if not given
-    title
-        above the picture
+    recording : what to draw
+    stream : where to write the picture
+    form : one of FORMATS
+    patterns : the signals, such as 'motor_*/current'; all that have samples if not given
+    title : above the picture
 
-    Raises
-    ------
-    RecordingError : there is no such signal or format, or there is no sample
-
+    Raises RecordingError: there is no such signal or format, or there is no sample.
     """
     if form not in FORMATS:
         raise RecordingError(f'{form!r}: no format of a picture, allowed are '
@@ -78,10 +68,7 @@ def picture_format(path: Path) -> str:
     """
     Return the format that a file's name asks for.
 
-    Raises
-    ------
-    RecordingError : it asks for none of FORMATS
-
+    Raises RecordingError: it asks for none of FORMATS.
     """
     form = path.suffix.lstrip('.').lower()
     if form not in FORMATS:

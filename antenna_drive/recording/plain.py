@@ -18,10 +18,7 @@ def freeze(value: object, where: str = '') -> Any:
     """
     Return an unchangeable copy: mappings become read-only views, lists become tuples.
 
-    Raises
-    ------
-    PlainDataError : a part is none of the plain kinds, or a number is not finite
-
+    Raises PlainDataError: a part is none of the plain kinds, or a number is not finite.
     """
     if value is None or isinstance(value, (bool, str)):
         return value

@@ -30,12 +30,9 @@ class RunRecorder:
     """
     Records a drive: every step of every signal, the configuration in force, live changes.
 
-    Attributes
-    ----------
     path : folder of the run in progress, or of the first
     steps : how many steps of it were written
     refused : how often `told` was given what is no record, or too many to keep
-
     """
 
     def __init__(self, path: str | Path, signals: Mapping[str, str],
@@ -44,21 +41,12 @@ class RunRecorder:
         """
         Prepare to record.
 
-        Parameters
-        ----------
-        path
-            folder that is not there yet; later runs go to PATH_run_2, PATH_run_3 ...
-        signals
-            name -> unit of every signal, in the order in which `step` gives them
-        sheet, notes
-            see Recording
-        sync_s, split_s
-            see BagWriter
+        path : folder that is not there yet; later runs go to PATH_run_2, PATH_run_3 ...
+        signals : name -> unit of every signal, in the order in which `step` gives them
+        sheet, notes : see Recording
+        sync_s, split_s : see BagWriter
 
-        Raises
-        ------
-        RecordingError : the folder exists already
-
+        Raises RecordingError: the folder exists already.
         """
         self.path = self._base = Path(path)
         self.steps = 0
@@ -82,10 +70,7 @@ class RunRecorder:
         """
         Begin a new bag, for a run with macro-steps of `step_s` [s].
 
-        Raises
-        ------
-        RecordingError : the folder exists already, or it or the last bag cannot be written
-
+        Raises RecordingError: the folder exists already, or it or the last bag cannot be written.
         """
         self.close()
         self._count += 1
@@ -103,17 +88,10 @@ class RunRecorder:
         """
         Write one step of the run that has begun.
 
-        Parameters
-        ----------
-        number
-            of the macro-step
-        values
-            one for each signal, NaN where there is no sample
+        number : of the macro-step
+        values : one for each signal, NaN where there is no sample
 
-        Raises
-        ------
-        RecordingError : the disk is full, or the bag cannot be written
-
+        Raises RecordingError: the disk is full, or the bag cannot be written.
         """
         assert self._bag is not None
         self._bag.write(number, nanoseconds(number * self._step_s), values)
@@ -136,10 +114,7 @@ class RunRecorder:
         """
         Make safe what was written, when no step comes for a while.
 
-        Raises
-        ------
-        RecordingError : the disk is full, or the bag cannot be written
-
+        Raises RecordingError: the disk is full, or the bag cannot be written.
         """
         self._catch_up()
         if self._bag is not None and not self._bag.closed:
@@ -149,10 +124,7 @@ class RunRecorder:
         """
         Complete the bag.
 
-        Raises
-        ------
-        RecordingError : the disk is full, or the bag cannot be written
-
+        Raises RecordingError: the disk is full, or the bag cannot be written.
         """
         self._catch_up()
         if self._bag is not None and not self._bag.closed:

@@ -62,14 +62,11 @@ class Aligned(NamedTuple):
     """
     Several signals on common time stamps.
 
-    Attributes
-    ----------
     time_s : array of shape (n,) [s]
     values : array of shape (n, m), one column for each name
     names, units : m texts each
     method : one sentence that says how the values were found
     longest_gap_s : for each name the widest distance between neighbouring samples used [s]
-
     """
 
     time_s: FloatArray
@@ -159,21 +156,12 @@ class Recording:
         """
         Make a recording of arrays that share one time axis, such as those of a run.
 
-        Parameters
-        ----------
-        time_s
-            shape (n,) [s]; rounded to whole nanoseconds
-        signals
-            name -> values, shape (n,)
-        units
-            name -> unit, for signals that the drive does not have
-        known
-            configuration, changes, sheet and notes
+        time_s : shape (n,) [s]; rounded to whole nanoseconds
+        signals : name -> values, shape (n,)
+        units : name -> unit, for signals that the drive does not have
+        known : configuration, changes, sheet and notes
 
-        Raises
-        ------
-        RecordingError : see Channel and Recording; the message names the signal
-
+        Raises RecordingError: see Channel and Recording; the message names the signal.
         """
         stamps = nanoseconds(np.atleast_1d(np.asarray(time_s, dtype=np.float64)))
         channels = {}
@@ -188,10 +176,7 @@ class Recording:
         """
         Return one signal.
 
-        Raises
-        ------
-        RecordingError : there is no such signal; the message names the nearest one
-
+        Raises RecordingError: there is no such signal; the message names the nearest one.
         """
         try:
             return self.channels[name]
@@ -233,10 +218,7 @@ class Recording:
         """
         Return the recording with these signals only, in this order.
 
-        Raises
-        ------
-        RecordingError : there is no such signal
-
+        Raises RecordingError: there is no such signal.
         """
         return replace(self, channels={name: self[name] for name in names})
 
@@ -258,10 +240,7 @@ class Recording:
         """
         Return the recording with `offset_ns` added to the time stamps of `names`, or of all.
 
-        Raises
-        ------
-        RecordingError : there is no such signal
-
+        Raises RecordingError: there is no such signal.
         """
         moved = dict(self.channels)
         for name in self.names if names is None else names:
@@ -305,10 +284,8 @@ class Recording:
         """
         Return the first and last time at which all of `names` have samples around [ns].
 
-        Raises
-        ------
-        RecordingError : there is no such signal, it has no sample, or there is no common time
-
+        Raises RecordingError: there is no such signal, it has no sample, or there is no common
+        time.
         """
         channels = {name: self[name] for name in names}
         for name, channel in channels.items():
@@ -328,21 +305,13 @@ class Recording:
         Nothing is filtered: thinning to fewer samples folds faster contents down. Nothing is
         extrapolated: only times at which all of `names` have samples around are used.
 
-        Parameters
-        ----------
-        names
-            the signals wanted; all if not given
-        onto
-            a signal, whose time stamps are used, or an array of times [s]; the first of
-            `names` if not given
-        method
-            one of METHODS
+        names : the signals wanted; all if not given
+        onto : a signal, whose time stamps are used, or an array of times [s]; the first of `names`
+            if not given
+        method : one of METHODS
 
-        Raises
-        ------
-        RecordingError : there is no such signal or method, no common time, or a time given in
-            `onto` lies outside the common time
-
+        Raises RecordingError: there is no such signal or method, no common time, or a time given
+        in `onto` lies outside the common time.
         """
         wanted = tuple(self.names if names is None else names)
         first, last = self.common_span_ns(wanted)
@@ -372,10 +341,7 @@ class Recording:
 
         The notes of the result say how it was done, under 'resampled'. Unfiltered, see `align`.
 
-        Raises
-        ------
-        RecordingError : the rate is not positive or above 1e9 Hz, or see `align`
-
+        Raises RecordingError: the rate is not positive or above 1e9 Hz, or see `align`.
         """
         if not 0.0 < rate_hz <= 1e9:
             raise RecordingError(f'a rate of {rate_hz:g} Hz is not above 0 and at most 1e9')

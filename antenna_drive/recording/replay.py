@@ -51,10 +51,7 @@ class CommandUnit(Unit):
         """
         Take the rate command of a recording, and the external torque if it has one.
 
-        Raises
-        ------
-        RecordingError : the recording holds no command
-
+        Raises RecordingError: the recording holds no command.
         """
         super().__init__(wiring.TEST_SIGNAL)
         if COMMAND not in recording or not len(recording[COMMAND]):
@@ -186,10 +183,7 @@ def of_sheet(sheet: TestSheet, step_s: float) -> tuple[Drive, Changes]:
     """
     Return the reference drive as a test sheet changes it, and what changes while it runs.
 
-    Raises
-    ------
-    ParameterError : the sheet says something that the drive does not allow
-
+    Raises ParameterError: the sheet says something that the drive does not allow.
     """
     drive = load(f'{sheet.circuit}_circuit') if sheet.circuit else load()
     if sheet.filter_1:

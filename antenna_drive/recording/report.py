@@ -24,17 +24,10 @@ def page(recording: Recording, title: str) -> str:
     """
     Return the page as HTML.
 
-    Parameters
-    ----------
-    recording
-        what the page is about
-    title
-        its name, for people
+    recording : what the page is about
+    title : its name, for people
 
-    Raises
-    ------
-    RecordingError : there is no sample to draw
-
+    Raises RecordingError: there is no sample to draw.
     """
     kappa = real_amperes(recording)
     panels = [_plotted(recording, panel, kappa) for panel in panels_of(recording)]

@@ -30,19 +30,11 @@ def from_run(run: Run, drive: Drive | None = None, sheet: TestSheet | None = Non
     """
     Return the values of every signal of a run; derivatives are left out.
 
-    Parameters
-    ----------
-    run
-        what the emulator gave
-    drive
-        the parameters that it began with, to be kept as the configuration
-    sheet, notes
-        see Recording
+    run : what the emulator gave
+    drive : the parameters that it began with, to be kept as the configuration
+    sheet, notes : see Recording
 
-    Raises
-    ------
-    RecordingError : a value is not finite; the message names the signal and the time
-
+    Raises RecordingError: a value is not finite; the message names the signal and the time.
     """
     configuration = {}
     if drive is not None:
@@ -59,20 +51,12 @@ def record(emulator: Emulator, duration: float, **known: Any) -> Recording:
     """
     Run an emulator, and record it with the settings that its own units have.
 
-    Parameters
-    ----------
-    emulator
-        the drive, some of its units perhaps replaced
-    duration
-        [s]
-    known
-        `changes` and `every` for the run; sheet and notes for the recording
+    emulator : the drive, some of its units perhaps replaced
+    duration : [s]
+    known : `changes` and `every` for the run; sheet and notes for the recording
 
-    Raises
-    ------
-    RecordingError : a value is not finite
-    ParameterError : a change is not allowed
-
+    Raises RecordingError: a value is not finite.
+    Raises ParameterError: a change is not allowed.
     """
     configuration = configuration_of(emulator.units)
     run = emulator.run(duration, known.pop('changes', None), known.pop('every', 1))

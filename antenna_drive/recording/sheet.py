@@ -172,8 +172,6 @@ class TestSheet:
     """
     What the tester knows. Every entry may be None: not known.
 
-    Attributes
-    ----------
     circuit, filter_1 : torque-share and Filter 1 constants of Table 1, 'old' or 'new'
     bias : where the bias voltage comes from
     waveform : the rate command
@@ -183,7 +181,6 @@ class TestSheet:
     parameter_tolerance : how far the machine's parameters may lie from the configuration [1]
     tolerances : the same for zeros, recorders and clocks
     labels : names and values of what was different in this test, such as load: A
-
     """
 
     __test__: ClassVar[bool] = False  # not a test case, whatever pytest makes of the name
@@ -208,10 +205,7 @@ def parse_sheet(tree: object) -> TestSheet:
     """
     Check the plain data of a test sheet.
 
-    Raises
-    ------
-    ParameterError : an entry is unknown or not allowed; the message names the key
-
+    Raises ParameterError: an entry is unknown or not allowed; the message names the key.
     """
     sheet: TestSheet = _parse('', tree, (TestSheet,))
     return sheet
@@ -290,11 +284,8 @@ def load_sheet(path: Path) -> TestSheet:
     """
     Read a test sheet from its file.
 
-    Raises
-    ------
-    ParameterError : the file cannot be read or an entry is not allowed; the message names the
-        file, the key and what is allowed
-
+    Raises ParameterError: the file cannot be read or an entry is not allowed; the message names
+    the file, the key and what is allowed.
     """
     tree = read_yaml(path)
     try:

@@ -52,10 +52,7 @@ def settings_of(path: Path) -> dict[str, Value]:
 
     The other entries of the sheet, such as the circuit, are for other nodes or for people.
 
-    Raises
-    ------
-    UserError : the file cannot be read, an entry is not allowed, or it has no waveform
-
+    Raises UserError: the file cannot be read, an entry is not allowed, or it has no waveform.
     """
     waveform = sheets.load_sheet(path).waveform
     if waveform is None:

@@ -63,15 +63,12 @@ class SignalBaseline:
     """
     What is known of one signal of a healthy drive.
 
-    Attributes
-    ----------
     lag : by which the reading is late [s]
     centre, scale : of the regressors, shape (m,)
     coefficients : of the standardised regressors, in units of the signal, shape (m,)
     sigma : robust standard deviation of what is left, in units of the signal
     mean, deviation : of the scores, shape (5,); deviation 0 where a score says nothing
     allowance : two standard errors of the mean, shape (5,), in deviations
-
     """
 
     lag: float
@@ -89,13 +86,10 @@ class Baseline:
     """
     What is known of a healthy drive.
 
-    Attributes
-    ----------
     signals : by name
     envelope : greatest rate command [rad/s] and greatest rms slope of it in a block [rad/s^2]
     spacing : of the samples of the command: how far a block may be shifted [s]
     blocks : of the quiet record
-
     """
 
     signals: Mapping[str, SignalBaseline]
@@ -175,13 +169,8 @@ def regressors(time: FloatArray, course: FloatArray) -> FloatArray:
 
     A constant, each reading and its slope, the direction of motion, and the jerk of motor 1.
 
-    Parameters
-    ----------
-    time
-        even, shape (n,) [s]
-    course
-        the twin's readings there, that of the encoder behind its high-pass, shape (n, 6)
-
+    time : even, shape (n,) [s]
+    course : the twin's readings there, that of the encoder behind its high-pass, shape (n, 6)
     """
     slopes = np.gradient(course, time, axis=0)
     return np.column_stack([
@@ -207,12 +196,9 @@ class SignalBlock:
     """
     One signal in one block.
 
-    Attributes
-    ----------
     column : of the signal among the readings
     residual : measured minus twin, shape (n,)
     rows : regressors at the same times, shape (n, 16)
-
     """
 
     column: int
@@ -238,11 +224,7 @@ def shift_of(block: Sequence[tuple[SignalBaseline, SignalBlock]]) -> tuple[float
     """
     Return by how much the twin is late in one block [s], and what that weighs [1/s^2].
 
-    Parameters
-    ----------
-    block
-        each signal's baseline and its part of the block
-
+    block : each signal's baseline and its part of the block
     """
     left = np.concatenate([part.left(item) / item.sigma for item, part in block])
     slope = np.concatenate([part.slope / item.sigma for item, part in block])
@@ -259,13 +241,9 @@ def scores(left: FloatArray, signal: FloatArray, slope: FloatArray,
     """
     Return the scores of one signal in one block, shape (5,), NaN for too few samples.
 
-    Parameters
-    ----------
-    left
-        what is left of the residual, in its standard deviations, shape (n,)
-    signal, slope, way
-        the signal and its slope, standardised, and the direction of motion, shape (n,)
-
+    left : what is left of the residual, in its standard deviations, shape (n,)
+    signal, slope, way : the signal and its slope, standardised, and the direction of motion, shape
+        (n,)
     """
     if left.size < LEAST_SAMPLES:
         return np.full(len(SCORES), np.nan)

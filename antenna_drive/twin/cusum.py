@@ -27,13 +27,8 @@ def run_length(reference: float, limit: float) -> float:
     """
     Return the mean number of increments to a false alarm of a one-sided chart.
 
-    Parameters
-    ----------
-    reference
-        k, above 0, in standard deviations of an increment
-    limit
-        h, in the same unit
-
+    reference : k, above 0, in standard deviations of an increment
+    limit : h, in the same unit
     """
     exponent = 2.0 * reference * (limit + _OVERSHOOT)
     return (math.exp(exponent) - exponent - 1.0) / (2.0 * reference**2)
@@ -43,13 +38,8 @@ def limit_for(reference: float, increments: float) -> float:
     """
     Return the limit h at which a one-sided chart alarms once in so many increments.
 
-    Parameters
-    ----------
-    reference
-        k, above 0
-    increments
-        mean number of increments to a false alarm, above 1
-
+    reference : k, above 0
+    increments : mean number of increments to a false alarm, above 1
     """
     low, high = -_OVERSHOOT, 1.0
     while run_length(reference, high) < increments:
@@ -66,17 +56,10 @@ def limit_of_rate(reference: float, alarms_per_day: float, sides: int, block_s: 
 
     Rates of false alarms add up at most (Bonferroni), whatever the charts have in common.
 
-    Parameters
-    ----------
-    reference
-        k, above 0
-    alarms_per_day
-        of all charts together
-    sides
-        number of one-sided charts
-    block_s
-        time between two increments [s]
-
+    reference : k, above 0
+    alarms_per_day : of all charts together
+    sides : number of one-sided charts
+    block_s : time between two increments [s]
     """
     return limit_for(reference, max(sides * DAY_S / block_s / alarms_per_day, 2.0))
 
@@ -85,17 +68,10 @@ class Charts:
     """
     Charts that go on together.
 
-    Parameters
-    ----------
-    two_sided
-        which of the charts look for a decrease too, shape (n,)
-    reference
-        k of each chart, shape (n,)
-    limit
-        h
-    clip
-        the greatest size of an increment: so no single block can alarm if h is larger
-
+    two_sided : which of the charts look for a decrease too, shape (n,)
+    reference : k of each chart, shape (n,)
+    limit : h
+    clip : the greatest size of an increment: so no single block can alarm if h is larger
     """
 
     def __init__(self, two_sided: NDArray[np.bool_], reference: FloatArray, limit: float,
@@ -118,13 +94,8 @@ class Charts:
         """
         Take one increment of each chart.
 
-        Parameters
-        ----------
-        z
-            shape (n,); NaN where there is none, which leaves the chart as it was
-        number
-            of the block, kept as the beginning of a change
-
+        z : shape (n,); NaN where there is none, which leaves the chart as it was
+        number : of the block, kept as the beginning of a change
         """
         there = np.isfinite(z)
         step = self._signs * np.clip(np.nan_to_num(z), -self._clip, self._clip) - self._reference

@@ -30,10 +30,7 @@ def diagnosed(recordings: Mapping[str, Recording], drive: Drive) -> dict[str, An
     """
     Return the result of a diagnosis; what a look asks its process for.
 
-    Raises
-    ------
-    UserError : a recording cannot be used
-
+    Raises UserError: a recording cannot be used.
     """
     from antenna_drive.diagnosis.diagnose import diagnose_recordings
     return diagnose_recordings(recordings, drive, threads=1).as_data()
@@ -53,23 +50,14 @@ class GrowingVerdict:
     """
     Looks at the tests of one machine while they are made.
 
-    Parameters
-    ----------
-    executor
-        that looks, one at a time
-    drive
-        the configuration
-    rule
-        when to stop
-    diagnose
-        what it does, a function of a module
+    executor : that looks, one at a time
+    drive : the configuration
+    rule : when to stop
+    diagnose : what it does, a function of a module
 
-    Attributes
-    ----------
     looks : what they said, in the order of time
     planning : what the design of a further test takes from the last one, {} before it
     fault : why the last look has failed; '' if it has not
-
     """
 
     def __init__(self, executor: Executor, drive: Drive, rule: Rule | None = None,
@@ -113,10 +101,7 @@ class GrowingVerdict:
         """
         Take the result of a look that has ended; return whether one has.
 
-        Raises
-        ------
-        BrokenExecutor : its process was ended
-
+        Raises BrokenExecutor: its process was ended.
         """
         if self._running is None or not self._running[0].done():
             return False

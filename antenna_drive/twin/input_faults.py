@@ -18,10 +18,7 @@ class InputFaults:
     """
     Watches the counts of an intake.
 
-    Attributes
-    ----------
     stale : whether no sample has come for so long that the real drive has stopped
-
     """
 
     def __init__(self, intake: Intake, stale_s: float) -> None:

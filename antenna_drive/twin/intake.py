@@ -34,11 +34,7 @@ class Intake:
     """
     The samples of the last minutes.
 
-    Parameters
-    ----------
-    keep_s
-        how much of each signal is kept [s]
-
+    keep_s : how much of each signal is kept [s]
     """
 
     def __init__(self, keep_s: float = 300.0) -> None:
@@ -56,15 +52,9 @@ class Intake:
         """
         Take a sample; return whether it is a good one.
 
-        Parameters
-        ----------
-        name
-            'unit/signal': the rate command, or one of the readings
-        stamp_ns
-            of any clock, the same for all signals [ns]
-        value
-            SI units, article amperes
-
+        name : 'unit/signal': the rate command, or one of the readings
+        stamp_ns : of any clock, the same for all signals [ns]
+        value : SI units, article amperes
         """
         what = _fault(name, value)
         if what:
@@ -96,13 +86,8 @@ class Intake:
         """
         Return the samples that have not been taken yet.
 
-        Parameters
-        ----------
-        name
-            of the signal
-        until_ns
-            leave those from this stamp on for later; None: take all [ns]
-
+        name : of the signal
+        until_ns : leave those from this stamp on for later; None: take all [ns]
         """
         stamps = self._stamps.get(name)
         if stamps is None:
@@ -145,13 +130,8 @@ class Intake:
         """
         Return what is kept as a recording, whose time counts from its first sample.
 
-        Parameters
-        ----------
-        sheet
-            of the test
-        since_ns
-            leave out what is earlier [ns]
-
+        sheet : of the test
+        since_ns : leave out what is earlier [ns]
         """
         channels: dict[str, Channel] = {}
         first = min((stamps[0] for stamps in self._stamps.values() if stamps), default=0)

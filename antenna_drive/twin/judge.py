@@ -35,14 +35,11 @@ class Gap:
     """
     What parts a signal from its twin.
 
-    Attributes
-    ----------
     name, unit : of the signal
     since_ns : stamp at which the change began, as the chart tells it [ns]
     score : what shows it most, one of SCORES
     sigma : mean of that score since then, in deviations of the quiet record
     rms, usual : of what the residual has beyond the healthy, since then and in the quiet record
-
     """
 
     name: str
@@ -63,14 +60,11 @@ class BlockJudge:
     """
     Judges the blocks of a twin by its quiet record.
 
-    Attributes
-    ----------
     baseline : what the quiet record shows; None before it was learned
     gap : whether the charts have found a gap that is not closed
     missing : signals without samples in the last block, and since when [s]
     blocks, unjudged : how many blocks there were, and how many of them with motion beyond that of
         the quiet record
-
     """
 
     def __init__(self, alarms_per_day: float, reference: float, clip: float) -> None:
@@ -140,17 +134,10 @@ class BlockJudge:
         """
         Judge a block.
 
-        Parameters
-        ----------
-        number
-            of the block, from the start on
-        course
-            of the twin, beyond the block's end by `BEHIND_S`
-        pending
-            the samples that were not judged yet, by signal; those of the block are taken out
-        run_in
-            blocks that begin before this are not judged [s]
-
+        number : of the block, from the start on
+        course : of the twin, beyond the block's end by `BEHIND_S`
+        pending : the samples that were not judged yet, by signal; those of the block are taken out
+        run_in : blocks that begin before this are not judged [s]
         """
         assert self.baseline is not None
         begin, end = number * BLOCK_S, (number + 1) * BLOCK_S

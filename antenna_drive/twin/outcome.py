@@ -16,10 +16,7 @@ def outcome(future: Future[dict[str, Any]]) -> tuple[dict[str, Any] | None, str]
     """
     Return what a task that has ended has found, None if it has failed, and why, '' if it has not.
 
-    Raises
-    ------
-    BrokenExecutor : its process was ended
-
+    Raises BrokenExecutor: its process was ended.
     """
     try:
         return future.result(), ''

@@ -64,19 +64,11 @@ class NextTest:
     """
     The design of a next test: asked for, under way, there.
 
-    Parameters
-    ----------
-    executor
-        that designs, after what it has to do already
-    drive
-        the configuration
-    design
-        what it does, a function of a module
+    executor : that designs, after what it has to do already
+    drive : the configuration
+    design : what it does, a function of a module
 
-    Attributes
-    ----------
     fault : why there is none although it was asked for; '' if that is not so
-
     """
 
     def __init__(self, executor: Executor, drive: Drive, design: Design = designed) -> None:
@@ -101,10 +93,7 @@ class NextTest:
         """
         Take what was found; return whether a design has ended.
 
-        Raises
-        ------
-        BrokenExecutor : its process was ended
-
+        Raises BrokenExecutor: its process was ended.
         """
         if self._running is None or not self._running.done():
             return False

@@ -32,13 +32,8 @@ def recording_of(columns: Mapping[str, FloatArray], sheet: Mapping[str, Any]) ->
     """
     Return a field test that was simulated, as a recording.
 
-    Parameters
-    ----------
-    columns
-        by name, NaN where there is no sample
-    sheet
-        plain data of the test sheet
-
+    columns : by name, NaN where there is no sample
+    sheet : plain data of the test sheet
     """
     stamps = np.round(columns['time_s'] * NANOSECONDS).astype(np.int64)
     channels = {}
@@ -54,13 +49,8 @@ def played(twin: Twin, columns: Mapping[str, FloatArray]) -> Iterator[float]:
     """
     Give a recording to a twin piece by piece; yield the time of the last sample after each [s].
 
-    Parameters
-    ----------
-    twin
-        to be advanced
-    columns
-        of a field test, by name; NaN where there is no sample
-
+    twin : to be advanced
+    columns : of a field test, by name; NaN where there is no sample
     """
     time = columns['time_s']
     stamps = np.round(time * NANOSECONDS).astype(np.int64).tolist()

@@ -45,15 +45,12 @@ class Track:
     """
     A stretch of the twin's course on an even grid, and the readings of a real drive beside it.
 
-    Attributes
-    ----------
     time : of the twin, ascending, shape (n,) [s]
     course : the twin's readings, shape (n, 6), in the order of `SIGNALS`
     washed : the same with the encoder behind its high-pass
     command : axis rate command, shape (n,) [rad/s]
     spacing : of the samples of the command that the twin was driven with [s]
     samples : times [s] and values of each measured signal
-
     """
 
     time: FloatArray
@@ -68,13 +65,8 @@ def learn(track: Track, begin: float) -> Baseline:
     """
     Return the baseline of a quiet record.
 
-    Parameters
-    ----------
-    track
-        of a healthy drive, a minute or more
-    begin
-        what is earlier is not learned from: high-passes have to settle [s]
-
+    track : of a healthy drive, a minute or more
+    begin : what is earlier is not learned from: high-passes have to settle [s]
     """
     table = regressors(track.time, track.washed)
     edges = np.arange(begin, track.time[-1] - 0.5 * BLOCK_S, BLOCK_S)

@@ -85,10 +85,7 @@ class RegularStamps:
     """
     The even times of one signal's samples.
 
-    Attributes
-    ----------
     waiting : stamps of those that are not settled yet [ns]
-
     """
 
     def __init__(self) -> None:

@@ -36,13 +36,10 @@ class Rule:
     """
     When to stop.
 
-    Attributes
-    ----------
     false_alarm : greatest probability that a gap is ever decided on a healthy machine
     error : greatest mean error of a decided answer
     looks : so many looks in a row must have the same first answer
     tests : the last look must be based on so many tests
-
     """
 
     false_alarm: float = 0.05
@@ -56,13 +53,10 @@ class Look:
     """
     What one look said.
 
-    Attributes
-    ----------
     seconds : of testing that it was based on [s]
     tests : that it was based on, those that are long enough to count
     probabilities : of the answers; they sum to 1
     confusable : groups of effects that the data cannot tell apart
-
     """
 
     seconds: float

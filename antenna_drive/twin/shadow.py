@@ -61,15 +61,9 @@ class Shadow:
     """
     The emulator of a drive, advanced as far as the measured command is known.
 
-    Parameters
-    ----------
-    drive
-        the configuration
-    changes
-        of the drive's parameters, by the macro-step at which each takes effect
-    step_s
-        macro-step [s]
-
+    drive : the configuration
+    changes : of the drive's parameters, by the macro-step at which each takes effect
+    step_s : macro-step [s]
     """
 
     def __init__(self, drive: Drive, changes: Changes | None = None,
@@ -151,15 +145,9 @@ def under_test(sheet: TestSheet, drive: Drive, step_s: float) -> tuple[Drive, Ch
     """
     Return a drive as a test sheet sets it, and what changes while it runs.
 
-    Parameters
-    ----------
-    sheet
-        of the test
-    drive
-        the configuration
-    step_s
-        macro-step [s]
-
+    sheet : of the test
+    drive : the configuration
+    step_s : macro-step [s]
     """
     drive, bias = as_the_sheet_says(sheet, drive)
     voltage = 'torque_share.circuit.fixed_voltage'

@@ -38,12 +38,9 @@ class Topic:
     """
     A topic of the real drive.
 
-    Attributes
-    ----------
     name : as the node subscribes to it
     vector : whether its messages have several numbers
     signals : what is read from it, by signal
-
     """
 
     name: str
@@ -56,14 +53,11 @@ class TopicMap:
     """
     The topics of a real drive, and how their messages are read.
 
-    Attributes
-    ----------
     topics : to subscribe to
     clock : SOURCE, ARRIVAL, or the topic that holds the time
     time_index : which of its numbers
     time_unit : nanoseconds in its unit
     offset_ns : added to every stamp [ns]
-
     """
 
     topics: Sequence[Topic]
@@ -84,15 +78,9 @@ class TopicMap:
 
         A number that is not there, or has no value, is NaN.
 
-        Parameters
-        ----------
-        topic
-            of the message
-        numbers
-            in the message
-        source_ns, arrival_ns
-            when it was sent and when it arrived [ns]
-
+        topic : of the message
+        numbers : in the message
+        source_ns, arrival_ns : when it was sent and when it arrived [ns]
         """
         stamp = source_ns if self.clock == SOURCE else arrival_ns
         if not self.has_stamps_of_messages:
@@ -129,11 +117,8 @@ def load_topics(path: str | Path) -> TopicMap:
     """
     Read a map of topics.
 
-    Raises
-    ------
-    ParameterError : the file cannot be read, or an entry is not allowed; one line names the file,
-        the key and what is allowed
-
+    Raises ParameterError: the file cannot be read, or an entry is not allowed; one line names the
+    file, the key and what is allowed.
     """
     tree: Any = read_yaml(Path(path))
     try:

@@ -47,8 +47,6 @@ class TwinSettings:
     """
     How a twin judges.
 
-    Attributes
-    ----------
     alarms_per_day : false alarms of a healthy drive, of all charts together
     quiet_s : length of the quiet record from which it learns what is healthy [s]
     run_in_s : after which a start at rest is forgotten; the diagnosis takes as much [s]
@@ -57,7 +55,6 @@ class TwinSettings:
     reference : k of the charts, half the shift that they find fastest, in deviations
     clip : greatest increment of a chart, in deviations
     keep_s : how much of the real drive's samples is kept [s]
-
     """
 
     alarms_per_day: float = 1.0
@@ -84,33 +81,21 @@ class Twin:
     """
     The twin of one drive.
 
-    Parameters
-    ----------
-    drive
-        the configuration
-    sheet
-        of the test that the real drive is in
-    settings
-        how to judge
-    baseline
-        of an earlier quiet record; None: learn one
-    tune
-        returns the configuration with the tolerances of a quiet record in it, and what is beyond
-        them; None: it stays as it is
-    outside
-        what an earlier quiet record had beyond the tolerances; None: nobody has compared it
-    step_s
-        macro-step [s]
+    drive : the configuration
+    sheet : of the test that the real drive is in
+    settings : how to judge
+    baseline : of an earlier quiet record; None: learn one
+    tune : returns the configuration with the tolerances of a quiet record in it, and what is
+        beyond them; None: it stays as it is
+    outside : what an earlier quiet record had beyond the tolerances; None: nobody has compared it
+    step_s : macro-step [s]
 
-    Attributes
-    ----------
     tuned : what became of the tuning, for people
     configuration : text of the tuned configuration; '' if it is as it was
-    outside : what the quiet record has beyond the tolerances of the configuration, () for
-        nothing; None if the two were not compared
+    outside : what the quiet record has beyond the tolerances of the configuration, () for nothing;
+        None if the two were not compared
     drive : the configuration in force
     judge, faults : of the blocks, and what is wrong with what the real drive sends
-
     """
 
     def __init__(self, drive: Drive, sheet: TestSheet | None = None,

@@ -26,21 +26,14 @@ def workers(count: int, scheduler: str | None = None, *, threads: bool = False,
     """
     Yield the workers of a batch; the work ends with the context.
 
-    Parameters
-    ----------
-    count
-        how many of this machine, without a scheduler
-    scheduler
-        address of a dask.distributed scheduler, 'tcp://host:8786', whose workers do the work
-    threads
-        threads of this machine instead of processes, for tasks that only wait for a process of
-        their own
+    count : how many of this machine, without a scheduler
+    scheduler : address of a dask.distributed scheduler, 'tcp://host:8786', whose workers do the
+        work
+    threads : threads of this machine instead of processes, for tasks that only wait for a process
+        of their own
 
-    Raises
-    ------
-    UserError : the scheduler cannot be reached, or has no workers
-    ModuleNotFoundError : a scheduler is given and dask.distributed is not installed
-
+    Raises UserError: the scheduler cannot be reached, or has no workers.
+    Raises ModuleNotFoundError: a scheduler is given and dask.distributed is not installed.
     """
     if scheduler is not None:
         from antenna_drive.workers.cluster import cluster

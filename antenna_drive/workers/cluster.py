@@ -94,16 +94,10 @@ def cluster(address: str) -> Iterator[ClusterWorkers]:
 
     Tasks that wait are taken back when the context ends; those that run come to their end there.
 
-    Parameters
-    ----------
-    address
-        of the scheduler, 'tcp://host:8786'
+    address : of the scheduler, 'tcp://host:8786'
 
-    Raises
-    ------
-    UserError : nobody answers there, or there is no worker
-    ModuleNotFoundError : dask.distributed is not installed
-
+    Raises UserError: nobody answers there, or there is no worker.
+    Raises ModuleNotFoundError: dask.distributed is not installed.
     """
     from distributed import Client
     try:

@@ -22,13 +22,8 @@ def worker_processes(count: int, finish: bool = True) -> Iterator[ProcessPoolExe
     Ctrl-C in a terminal goes to all of them, but only the parent answers it. If the parent is
     killed, the kernel ends them (on Linux).
 
-    Parameters
-    ----------
-    count
-        how many
-    finish
-        whether what they have begun is finished when the context ends without an error
-
+    count : how many
+    finish : whether what they have begun is finished when the context ends without an error
     """
     pool = ProcessPoolExecutor(count, initializer=_become_worker, initargs=(os.getpid(),))
     try:

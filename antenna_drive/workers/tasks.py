@@ -30,13 +30,8 @@ class Workers:
     """
     Those who do the tasks of a batch.
 
-    Parameters
-    ----------
-    executor
-        takes the tasks
-    count
-        how many tasks it does at once
-
+    executor : takes the tasks
+    count : how many tasks it does at once
     """
 
     def __init__(self, executor: Executor, count: int) -> None:
