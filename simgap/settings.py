@@ -3,9 +3,8 @@
 """
 Every threshold of the diagnosis: its unit, what it decides, and the trial that set it.
 
-`lab thresholds` prints the table and the effect of halving and doubling each. Trials are in
-lab/notebook/history.md. 'Practice cases' came before the first sealed trial; 'design' means
-without any.
+Trials are in lab/notebook/history.md. 'Practice cases' came before the first sealed trial;
+'design' means without any.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 import dataclasses
 from typing import Any, TypeVar
 
+from lab.antenna.days import apply_days, draw_days
 from lab.antenna.effect import Defect
 from lab.antenna.family import FAMILIES
 from lab.antenna.imperfections import (
@@ -45,7 +46,8 @@ def draw_truths(count: int, seed: int, tolerance: float, *, sample_rate: float =
     Effects take turns, so that all are equally frequent; sizes are spread evenly over the share
     `largest` of their range. `tolerance` is the largest relative deviation of any parameter from
     the reference. Instead of `sample_rate` [Hz] and `duration` [s], wild cases draw imperfections
-    and programmes of up to `longest` [s]. `family` is one of FAMILIES ('b' only for wild cases).
+    and programmes of up to `longest` [s]. `family` is one of FAMILIES (all but 'a' only for
+    wild cases).
     """
     forms = FAMILIES[family]
     random = np.random.default_rng([seed, 0])
@@ -90,7 +92,8 @@ def _wild_tests(family: str, tolerance: float, longest: float,
     tests = draw_programme(FAMILIES[family].shapes, tolerance, longest, random)
     return {'family': family, 'sample_rate_hz': tests.sample_rate_hz,
             'durations_s': tests.durations_s, 'sheets': [s.plain() for s in tests.sheets],
-            'given_sheets': tests.given, 'imperfections': draw_imperfections(random)}
+            'given_sheets': tests.given, 'imperfections': draw_imperfections(random),
+            **({'days': draw_days(len(tests.sheets), random)} if FAMILIES[family].days else {})}
 
 
 def kinds_of(count: int) -> list[str]:
@@ -132,6 +135,8 @@ def build_machine(truth: Truth, recording: int) -> Records:
     apply_tolerances(machine, draw_tolerances(truth['tolerance'], random))
     if 'imperfections' in truth:
         apply_imperfections(machine, truth['imperfections'])
+    if 'days' in truth:
+        apply_days(machine, truth['days'], recording)
     for entry in truth['effects']:
         effect = FAMILIES[truth.get('family', 'a')].defect(entry['id'])
         values = dict(entry['parameters'])
@@ -163,7 +168,7 @@ def make_recording(truth: Truth, recording: int) -> dict[str, FloatArray]:
     if 'imperfections' in truth:
         return imperfect_recording(machine, sheet, truth['imperfections'],
                                    truth['sample_rate_hz'], truth['durations_s'][recording],
-                                   random)
+                                   random, truth.get('days'))
     instants, stamps = sample_instants(truth['sample_rate_hz'], truth['duration_s'], random)
     place = (float(random.uniform(-1.0, 1.0)), float(random.uniform(-1.0, 1.0)))
     history = simulate(machine, sheet, instants, place)

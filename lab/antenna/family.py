@@ -1,6 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""The families of forms: the one that the diagnosis was developed on, and the one to report on."""
+"""
+The families of cases: the one that the diagnosis was developed on, and those to report on.
+
+Family b has other forms of effects, outsiders and programmes. Family c has those of a, and what
+every day and every logger bring (`days`).
+"""
 
 from __future__ import annotations
 
@@ -18,6 +23,7 @@ class Family(NamedTuple):
     catalogue: Mapping[str, Defect]
     outside: Mapping[str, Defect]
     shapes: Shapes
+    days: bool = False
 
     def defect(self, key: str) -> Defect:
         """Return an effect of the catalogue or outside it."""
@@ -25,4 +31,5 @@ class Family(NamedTuple):
 
 
 FAMILIES = {'a': Family(effects.CATALOGUE, outside.OUTSIDE, wild_programme.SHAPES),
+            'c': Family(effects.CATALOGUE, outside.OUTSIDE, wild_programme.SHAPES, days=True),
             'b': Family(family_b.CATALOGUE, family_b.OUTSIDE, family_b.SHAPES)}

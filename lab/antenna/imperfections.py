@@ -15,6 +15,7 @@ from dataclasses import replace
 import math
 from typing import Any
 
+from lab.antenna.days import Days, filtered
 from lab.antenna.machine import Records
 from lab.antenna.real_antenna import FloatArray, simulate, TrueSignals
 from lab.antenna.sensors import Noise, record, sample_instants
@@ -163,8 +164,8 @@ def late_history(machine: Records, sheet: CaseSheet, instants: FloatArray,
 
 
 def imperfect_recording(machine: Records, sheet: CaseSheet, imperfections: Imperfections,
-                        rate: float, duration: float,
-                        random: np.random.Generator) -> dict[str, FloatArray]:
+                        rate: float, duration: float, random: np.random.Generator,
+                        days: Days | None = None) -> dict[str, FloatArray]:
     """
     Return one test's columns as an imperfect recorder writes them, by name, each of shape (n,).
 
@@ -175,6 +176,8 @@ def imperfect_recording(machine: Records, sheet: CaseSheet, imperfections: Imper
     place = (float(random.uniform(-1.0, 1.0)), float(random.uniform(-1.0, 1.0)))
     delays = {name: part / rate for name, part in imperfections['delay_samples'].items()}
     history = late_history(machine, sheet, instants, delays, place)
+    if days is not None:
+        history = filtered(history, days, rate)
     columns = record(history, machine, sheet.sensors, _clock(stamps, imperfections), random,
                      recorder_noise(imperfections, rate, random))
     rows = kept_rows(len(stamps), imperfections['missing_share'], random)

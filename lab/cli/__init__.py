@@ -18,7 +18,6 @@ COMMANDS = {
     'trial-test': Command('trial_test', 'make one test more on a sealed antenna'),
     'twin-trial': Command('twin_trial', 'test the twin on sealed antennas that change'),
     'score': Command('score', 'score the verdicts of a trial against its truths'),
-    'thresholds': Command('thresholds', "list the diagnosis' thresholds and what they decide"),
     'servo': Command('servo', 'say what the model of an ordinary servo lacks'),
     'bench': Command('bench', 'measure speed'),
     'campaign': Command('campaign', 'look for faults: kills, garbage, damaged files, full disks'),

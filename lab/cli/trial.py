@@ -22,7 +22,8 @@ resumes an interrupted trial. On another machine, --skip leaves out the cases th
 With --wild, each case also has the imperfections of a real machine and recorder, which no sheet
 lists, and other programmes, lengths, rates and sheets. A fourth recording is kept from the
 diagnosis, in DIR/kept/case_0001/rec_d.csv. lab/notebook/trial.md has the sizes. --family b draws
-other forms, outsiders and programmes, to report on only.
+other forms, outsiders and programmes; --family c adds what days and loggers bring. Both are to
+report on only.
 
 With --machine joint, --machine axis or both, the machines are a robot joint and a linear axis.
 Each is diagnosed with a model of one's own (docs/own-machine.md). Their cases always have the

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""The fits that a verdict was made from, as plain data, so that it can be decided again."""
+"""The fits that a verdict was made from, and the same as plain data."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
-from simgap.fit.state import FitState
-from simgap.machine.contract import Form, Parameter
+from simgap.machine.contract import Form
 from simgap.search.hypothesis import Hypothesis
 from simgap.settings import Settings
 from simgap.verdict import verdict
@@ -39,30 +37,9 @@ class Evidence:
                  'lack_of_fit': asdict(lack)}
                 for h, lack in zip(self.hypotheses, self.lacks, strict=True)]
 
-    @classmethod
-    def of_data(cls, data: Sequence[Mapping[str, Any]]) -> Evidence:
-        """Take evidence from plain data. Raises KeyError or TypeError if it is not."""
-        return cls([_hypothesis(item) for item in data],
-                   [LackOfFit(**item['lack_of_fit']) for item in data],
-                   data[0].get('inflation', 1.0) if data else 1.0)
-
 
 def _form_data(form: Form, point: Mapping[str, float]) -> dict[str, Any]:
     return {'name': form.name, 'scanned': form.scanned, 'parameters': [
         {'name': p.name, 'unit': p.unit, 'value': point[p.name], 'low': p.low, 'high': p.high,
          'prior_sigma': p.prior_sigma, 'tolerance': p.tolerance, 'is_shape': p.is_shape}
         for p in form.parameters]}
-
-
-def _hypothesis(data: Mapping[str, Any]) -> Hypothesis:
-    forms = tuple(Form(form['name'], tuple(
-        Parameter(p['name'], p['unit'], p['low'], p['high'], 1.0, p['prior_sigma'],
-                  tolerance=p['tolerance'], is_shape=p.get('is_shape', False))
-        for p in form['parameters']),
-        scanned=form['scanned']) for form in data['forms'])
-    values = [p['value'] for form in data['forms'] for p in form['parameters']]
-    none = np.zeros(0)
-    return Hypothesis(tuple(data['effects']), forms, FitState(
-        tuple(p for form in forms for p in form.parameters), np.array(values), none,
-        np.zeros((0, len(values)), np.float32), none, data['cost']),
-        data['doubts'])
