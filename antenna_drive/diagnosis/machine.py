@@ -27,6 +27,7 @@ from antenna_drive.diagnosis.outputs import coarser_digit, Outputs, readings_of
 from antenna_drive.diagnosis.plans import disturbed, Plans
 from antenna_drive.diagnosis.tolerances import nuisances
 from antenna_drive.diagnosis.waves import fastest_wave, is_there
+from antenna_drive.diagnosis.words import words
 from antenna_drive.emulator import batch
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.readings import AT, NAMED, READINGS, SIGNALS
@@ -104,6 +105,7 @@ class AntennaMachine(Machine):
         self._digit = coarser_digit(self._tests)
         tolerances = nuisances(self._tests, self.tolerance)
         effects = catalogue([float(test.time[-1]) for test in self._tests], self._digit)
+        self.words = words(effects.values(), drive, self._tests[0].record)
         modifiers = KnownModifiers()
         self._run_modifiers, self._reading_modifiers = modifiers.of_runs, modifiers.of_readings
         super().__init__((), AntennaNuisances(tolerances, self._tests, modifiers),

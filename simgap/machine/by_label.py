@@ -182,7 +182,7 @@ class ByLabel(Machine):
                          _LabelledCatalogue(inner.catalogue, labels))
         self.inner, self.labels = inner, labels
         self.disturbance_inputs, self.notes = inner.disturbance_inputs, inner.notes
-        self.diagram, self.advice = inner.diagram, inner.advice
+        self.diagram, self.advice, self.words = inner.diagram, inner.advice, inner.words
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
         return self.inner.predict(self.labels.in_test(point, experiment), experiment)

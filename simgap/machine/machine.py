@@ -21,7 +21,7 @@ import numpy as np
 from simgap.machine.arrays import Course, FloatArray, Point
 from simgap.machine.catalogue import Catalogue
 from simgap.machine.diagram import Diagram
-from simgap.machine.effect import Effect, Parameter
+from simgap.machine.effect import Effect, Parameter, Words
 from simgap.machine.experiment import Experiment
 from simgap.machine.motion import Motion, TimeScales
 from simgap.machine.nuisances import Nuisances
@@ -46,6 +46,7 @@ class Machine(ABC):
     diagram : picture of the machine for the page; None for a block for each component
     advice : tests that settle what is open: effects without their component (empty for any), and
         what to record
+    words : how people speak of the effects' numbers, by parameter
     planning : what the design of a further test must know of the tests, as plain data
     """
 
@@ -56,6 +57,7 @@ class Machine(ABC):
     notes: Sequence[str] = ()
     diagram: Diagram | None = None
     advice: Sequence[tuple[Sequence[str], str]] = ()
+    words: Mapping[str, Words] = MappingProxyType({})
     planning: Mapping[str, Any] = MappingProxyType({})
 
     def __init__(self, experiments: Iterable[Experiment], nuisances: Iterable[Parameter] = (),

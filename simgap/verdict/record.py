@@ -13,18 +13,12 @@ from simgap.machine.contract import Machine
 from simgap.search.hypothesis import Hypothesis
 from simgap.verdict.interventions import lines as lines_of_labels
 from simgap.verdict.localisation import Located
+from simgap.verdict.numbers import quantity
+from simgap.verdict.sentence import loud, said
 from simgap.verdict.unknown_input import Place
 
 # An effect of more parameters than this is summed up instead of listed.
 _LISTED = 12
-
-_HEADLINES = {
-    'no_gap': 'no gap: machine and model agree within tolerance and noise',
-    'too_few_to_judge': 'too few samples to judge: no gap shows, and none could',
-    'explained': 'explained: one of the known effects closes the gap',
-    'partly_explained': 'partly explained: a known effect closes some of the gap',
-    'unknown_effect': 'unknown effect: nothing in the catalogue closes the gap',
-}
 
 
 @dataclass(frozen=True)
@@ -74,7 +68,7 @@ class Verdict:
         """Return the JSON of docs/diagnosis.md as plain data."""
         entries = {field.name: getattr(self, field.name) for field in fields(self)
                    if field.name not in ('word', 'machine', 'none', 'best')}
-        return {'verdict': self.word, **{
+        return {'verdict': self.word, 'sentence': str(said(self)), **{
             name: entry for name, entry in entries.items() if entry is not None},
             'which': [vars(answer) for answer in self.which],
             'may_enter_at': [vars(place) for place in self.may_enter_at]}
@@ -85,7 +79,7 @@ class Verdict:
 
     def summary(self) -> str:
         """Return the verdict in a few lines."""
-        lines = [_HEADLINES[self.word]]
+        lines = [f'{self.word.replace("_", " ")}: {said(self)}']
         for answer in self.which[:3]:
             if answer.probability >= 0.01:
                 lines.append(f'  {100.0 * answer.probability:5.1f} %  '
@@ -134,10 +128,9 @@ def _why_small(item: Mapping[str, Any]) -> str:
 def _remainders(found: Mapping[str, Any]) -> list[str]:
     """Return what remains of the signals that matter, or of all if nobody said which do."""
     asked = any(item.get('matters') is not None for item in found.values())
-    return [f'{signal} {item["beyond_noise"]:.2g} {item["unit"]} beyond noise of '
-            f'{item["noise"]:.2g} {item["unit"]}' + (', which matters' if asked else '')
-            for signal, item in found.items() if 'rms' in item
-            and (item['matters'] if asked else item['beyond_noise'] > item['noise'])]
+    return [f'{signal} {quantity(found[signal]["beyond_noise"], found[signal]["unit"])} beyond '
+            f'noise of {quantity(found[signal]["noise"], found[signal]["unit"])}'
+            + (', which matters' if asked else '') for signal in loud(found)]
 
 
 def share_text(fraction: Mapping[str, Any]) -> str:

@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""The sentence of a verdict on any machine: it says what is known, and contradicts nothing."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from simgap.machine.contract import Effect, Form, Parameter, Words
+from simgap.verdict.numbers import number, percent, ratio
+from simgap.verdict.record import Named
+from simgap.verdict.sentence import said
+
+GAP = Parameter('gearbox.backlash.gap', 'rad', 0.0, 1.0, 0.01)
+EFFECTS = {'gearbox.backlash': Effect('gearbox.backlash', 'gearbox', 'worn {teeth}', '',
+                                      (Form('', (GAP,)),))}
+FOUND = Named(['gearbox.backlash'], 0.97, {
+    GAP.name: {'value': 0.03, 'ci95': [0.02, 0.04], 'unit': 'rad'}})
+QUIET = {'angle': {'unit': 'rad', 'rms': 0.01, 'noise': 0.01, 'beyond_noise': 0.002,
+                   'matters': None}}
+LOUD = {'angle': {**QUIET['angle'], 'beyond_noise': 0.05}}
+
+
+def verdict(word: str, top: Named = FOUND, **entries: Any) -> Any:
+    return SimpleNamespace(**{
+        'word': word, 'which': [top], 'where': [], 'confusable': [], 'may_enter_at': [],
+        'remains': QUIET, 'machine': SimpleNamespace(catalogue=EFFECTS, words={}),
+        'how_far': {'judged': top.effects, 'per_signal': {},
+                    'explained_fraction': {'value': 0.99, 'ci95': [0.97, 0.996]}}, **entries})
+
+
+def test_an_effect_of_a_machine_without_words_is_said_by_cause_number_and_unit() -> None:
+    assert str(said(verdict('explained'))) == (
+        'The model lacks gearbox.backlash (worn {teeth}), gap: 0.03 rad (0.02 to 0.04). '
+        'Probability 97 percent. Adding it removes 99 percent of the gap on data that was not '
+        'fitted (97 to 100). Next: inspect what may cause it; diagnose again with a recording '
+        'that was not used here.')
+
+
+def test_a_machine_may_have_words_of_its_own() -> None:
+    machine = SimpleNamespace(catalogue=EFFECTS, words={GAP.name: Words(
+        'the gap is {by} wider', configured=0.01, how='add', then=('turn it by hand',))})
+    found = said(verdict('explained', machine=machine))
+    assert found.what == 'The gap is 300 percent wider: 0.04 rad (0.03 to 0.05) instead of 0.01.'
+    assert found.then == 'Next: turn it by hand.'
+
+
+def test_what_cannot_be_told_apart_is_said_with_what_would_settle_it() -> None:
+    found = said(verdict('partly_explained', confusable=[['gearbox.backlash', 'shaft.twist']]))
+    assert 'Something else acts beside that.' in found.sure
+    assert 'cannot tell gearbox.backlash from shaft.twist: record the test that `propose`' in (
+        found.sure)
+
+
+def test_an_effect_that_widens_the_gap_is_not_said_to_remove_it() -> None:
+    far = {'judged': FOUND.effects, 'explained_fraction': {'value': -3.0, 'ci95': [-9.0, 0.1]}}
+    assert 'makes the gap wider' in str(said(verdict('explained', how_far=far)))
+    unjudged = {'judged': [], 'explained_fraction': {'value': None, 'reason': 'one test'}}
+    assert 'Adding' not in str(said(verdict('explained', how_far=unjudged)))
+
+
+def test_agreement_is_not_said_beside_a_remainder_that_is_louder_than_noise() -> None:
+    none = Named(['none'], 0.9, {})
+    assert said(verdict('no_gap', none)).what == (
+        'Machine and model agree within tolerance and noise.')
+    found = str(said(verdict('no_gap', none, remains=LOUD)))
+    assert 'agree' not in found
+    assert 'what remains of angle is 0.05 rad beyond noise of 0.01 rad' in found
+    # what a user says does not matter is no reason to doubt
+    asked = {'angle': {**LOUD['angle'], 'matters': False}}
+    assert 'agree' in str(said(verdict('no_gap', none, remains=asked)))
+    few = {'angle': {'unit': 'rad', 'too_few_to_judge': 12}}
+    assert said(verdict('too_few_to_judge', none, remains=few)).what.startswith('Too few samples')
+
+
+def test_unknown_says_place_size_and_when_and_what_would_settle_it() -> None:
+    place = SimpleNamespace(name='force on the carriage', component='carriage', explained=0.83)
+    found = said(verdict(
+        'unknown_effect', Named(['unknown'], 0.9, {}), may_enter_at=[place],
+        where=[{'component': 'carriage', 'signal': 'angle', 'regime': 'reversal', 'share': 0.6}],
+        how_far={'per_signal': {
+            'rate': {'before': 2.0, 'before_in_unit': 5.0, 'unit': 'rad/s'},
+            'angle': {'before': 9.0, 'before_in_unit': 0.0432, 'unit': 'rad'}}}))
+    assert found.what == (
+        'Something acts that no known effect explains, most likely in carriage; it shows most in '
+        'angle (reversal). The model misses angle by 0.0432 rad rms. As force on the carriage it '
+        'could explain 83 percent of the gap.')
+    assert 'one test is not enough' in found.then and '`propose`' in found.then
+
+
+@pytest.mark.parametrize('text, expected', [
+    (number(23.64), '23.6'), (number(8.74e6), '8.74e6'), (number(-2e-6), '-2e-6'),
+    (number(1234.0), '1234'), (percent(0.053), '5.3 percent'), (percent(0.9991), 'more than 99 '
+                                                                                'percent'),
+    (percent(1.0), '100 percent'), (percent(0.0001), 'less than 0.1 percent'),
+    (percent(0.0), '0.0 percent'),
+    (ratio(-0.4), '40 percent'), (ratio(930.0), '930 times'), (ratio(3.0), '300 percent'),
+    (number(float('inf')), 'no number'),
+])
+def test_numbers_are_as_people_say_them(text: str, expected: str) -> None:
+    assert text == expected
