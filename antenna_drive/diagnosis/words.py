@@ -148,7 +148,7 @@ _ROWS: Mapping[str, _Row] = {
         'the damping of {mode} is {by} smaller than configured',
         'bolted joints and dampers of the structure', _CHIRP),
     'axis.extra_mode': (
-        'the structure has a mode that the model lacks, with an inertia', '',
+        'the structure has one more mode, with an inertia', '',
         'parts of the structure that the model takes for rigid', _CHIRP),
     'axis.bull_gear_backlash': (
         'the bull gear has more play than configured, half of it at each pinion',

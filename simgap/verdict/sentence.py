@@ -9,7 +9,7 @@ import math
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from simgap.machine.contract import Words
-from simgap.verdict.numbers import number, percent, quantity, ratio
+from simgap.verdict.spoken import number, percent, quantity, ratio
 
 if TYPE_CHECKING:
     from simgap.verdict.record import Verdict
@@ -81,9 +81,9 @@ def _nothing(verdict: Verdict) -> tuple[str, list[str]]:
     rest = [_beyond(name, verdict.remains[name]) for name in loud(verdict.remains)]
     if not rest:
         return 'Machine and model agree within tolerance and noise.', []
-    return (f'No known effect shows, but not all is noise: what remains of {", and of ".join(rest)}'
-            '.', [f'compare the noise that is assumed with a recording at rest, and record '
-                  f'{_DESIGNED}'])
+    return (f'No known effect shows, but not all is noise: what remains of {"; of ".join(rest)}.',
+            [f'compare the noise that is assumed with a recording at rest, and record '
+             f'{_DESIGNED}'])
 
 
 def _beyond(name: str, item: Mapping[str, Any]) -> str:
@@ -134,6 +134,9 @@ def _effect(verdict: Verdict, effect: str,
         text += f', {name.partition("@")[2].partition("[")[0]} cycles a turn'
     if any(form.is_course for form in forms):
         text = text.replace(': ', ': up to ', 1)
+    text += ''.join(f', {key.rpartition(".")[2].replace("_", " ")} '
+                    f'{quantity(item["value"], item["unit"])}' for key, item in parameters.items()
+                    if _bare(key) in shapes and item['unit'] != '1')
     return text + (f', where {name[name.index("[") + 1:-1]}' if name.endswith(']') else ''
                    ), words.then
 

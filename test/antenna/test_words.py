@@ -58,6 +58,11 @@ def told(effect: str, parameters: dict[str, Any]) -> str:
     # three modes have no frequency in common
     (what('axis.mode_frequency', change=number(-0.1, -0.12, -0.08)),
      'The frequency of all modes is 10 percent (8 to 12) lower than configured.'),
+    # the shape of what it names, where it has a unit
+    (what('axis.extra_mode', inertia=number(2e6, 1.9e6, 2.1e6, 'kg m^2'),
+          frequency=number(3.1, 3.0, 3.2, 'Hz'), damping=number(0.03, 0.02, 0.04)),
+     'The structure has one more mode, with an inertia: 2e6 kg m^2 (1.9e6 to 2.1e6), frequency '
+     '3.1 Hz.'),
     # a number that the configuration lacks; its shape is no size
     (what('axis.viscous_friction', torque_per_rate=number(8e7, 7e7, 9e7, 'N m s/rad'),
           flow_index=number(1e9, 1e9, 1e9)),

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from simgap.machine.contract import Effect, Form, Parameter, Words
-from simgap.verdict.numbers import number, percent, ratio
+from simgap.verdict.spoken import number, percent, ratio
 from simgap.verdict.record import Named
 from simgap.verdict.sentence import said
 
@@ -92,9 +92,8 @@ def test_unknown_says_place_size_and_when_and_what_would_settle_it() -> None:
 
 @pytest.mark.parametrize('text, expected', [
     (number(23.64), '23.6'), (number(8.74e6), '8.74e6'), (number(-2e-6), '-2e-6'),
-    (number(1234.0), '1234'), (percent(0.053), '5.3 percent'), (percent(0.9991), 'more than 99 '
-                                                                                'percent'),
-    (percent(1.0), '100 percent'), (percent(0.0001), 'less than 0.1 percent'),
+    (number(1234.0), '1234'), (percent(0.053), '5.3 percent'),
+    (percent(0.9991), 'more than 99 percent'), (percent(1.0), '100 percent'), (percent(0.0001), 'less than 0.1 percent'),
     (percent(0.0), '0.0 percent'),
     (ratio(-0.4), '40 percent'), (ratio(930.0), '930 times'), (ratio(3.0), '300 percent'),
     (number(float('inf')), 'no number'),
