@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -14,14 +15,8 @@ from simgap.machine.contract import Experiment, FloatArray
 from simgap.machine.diagram import Diagram, DiagramBlock
 from simgap.report.curves import Panel
 from simgap.verdict.record import share_text, value_lines, Verdict
+from simgap.verdict.sentence import said
 
-_VERDICTS = {
-    'no_gap': ('No gap', 'Machine and model agree within tolerance and noise.'),
-    'too_few_to_judge': ('Too few samples', 'No gap shows, and none could.'),
-    'explained': ('Explained', 'A known effect closes the gap.'),
-    'partly_explained': ('Partly explained', 'A known effect closes some of the gap.'),
-    'unknown_effect': ('Unknown effect', 'Nothing in the catalogue closes the gap.'),
-}
 # How many hypotheses are shown, and how probable each has to be.
 _SHOWN, _LEAST = 8, 0.001
 # An effect so probable is still open.
@@ -42,8 +37,10 @@ class Likely:
 class Contents:
     """All that the page says."""
 
-    title: str  # the verdict in two words
-    lead: str  # the verdict in a sentence
+    title: str  # what was found: the beginning of the verdict's sentence
+    lead: str  # how sure it is
+    then: str  # what to do next
+    facts: Mapping[str, str]  # what was diagnosed, with what
     explained: str  # how much of the gap its effects explain; empty if it names none
     result: Mapping[str, Any]  # the JSON of docs/diagnosis.md, which holds the tables and notes
     diagram: Diagram  # of the machine
@@ -55,10 +52,9 @@ class Contents:
     advice: Sequence[str]  # tests that would settle what is open
 
 
-def contents(verdict: Verdict) -> Contents:
-    """Return what the page about a diagnosis says."""
+def contents(verdict: Verdict, facts: Mapping[str, str] = MappingProxyType({})) -> Contents:
+    """Return what the page about a diagnosis says; `facts` say what was diagnosed, with what."""
     effects = verdict.machine.catalogue
-    title, lead = _VERDICTS[verdict.word]
     suspicion = dict.fromkeys((effect.component for effect in effects.values()), 0.0)
     for answer in verdict.which:
         for component in {effects[name].component for name in answer.effects if name in effects}:
@@ -72,7 +68,8 @@ def contents(verdict: Verdict) -> Contents:
     fraction = verdict.how_far['explained_fraction']
     explained = '' if fraction['value'] is None else share_text(fraction)
     return Contents(
-        title, lead, explained, verdict.as_data(), diagram,
+        *said(verdict), {'verdict': verdict.word.replace('_', ' ').capitalize(), **facts},
+        explained, verdict.as_data(), diagram,
         [(block, min(shares.get(block.component, 0.0), 1.0)) for block in diagram.blocks],
         likely, _panels(verdict), _advice(verdict))
 

@@ -76,7 +76,7 @@ def diagnosis(result: dict[str, Any], **machine: Any) -> Verdict:
         catalogue={'motors.friction': Effect('motors.friction', 'motors', HOSTILE, '', ()),
                    'dial.gain': Effect('dial.gain', 'dial', 'a bent needle', '', ())},
         simulate=lambda points: [[true - 1.0] * 2, [true] * 2],
-        **{'diagram': None, 'advice': (), **machine})
+        **{'diagram': None, 'advice': (), 'words': {}, **machine})
     fit: Any = SimpleNamespace(state=SimpleNamespace(point=dict))
     entries = {'statements': {}, 'fits': [], 'planning': {}, 'labels': None, **result}
     return Verdict(**{
