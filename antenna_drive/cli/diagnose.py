@@ -31,10 +31,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from antenna_drive import __version__
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.import_map import import_file, load_map
 from simgap.cli.diagnose import (
-    add_diagnosis_options, add_map_option, diagnosed, earlier_of, numbers_of, settings_of,
+    add_diagnosis_options, add_map_option, diagnosed, earlier_of, facts, numbers_of, settings_of,
     write_report,
 )
 from simgap.command.large_arrays import give_back_large_arrays
@@ -93,7 +94,9 @@ def run(arguments: argparse.Namespace) -> int:
             recordings, drive, lambda share, doing: progress.update(share), arguments.jobs,
             settings, arguments.without, limits, earlier)
     correction = corrected(drive, diagnosis)
-    write_report(arguments.report, diagnosis)
+    write_report(arguments.report, diagnosis, facts(
+        f'antenna-drive {__version__}', 'antenna drive',
+        ' + '.join(arguments.config) or 'reference', arguments.recordings))
     lines = [diagnosis.summary()]
     if arguments.corrected:
         with replaced(arguments.corrected) as stream:

@@ -18,8 +18,9 @@ from antenna_drive.parameters.sets import Drive, values
 import numpy as np
 from simgap.machine.contract import Effect, Words
 
-_PREDICT = ('run `antenna-drive predict` on a recording that was not used here, with --config '
-            'corrected.yaml --recorder verdict.json --against reference')
+_PREDICT = ('run `antenna-drive predict RECORDING --config corrected.yaml --recorder verdict.json '
+            '--against reference` on a recording that was not used here (`diagnose --corrected` '
+            'writes the first file, `--json` the second)')
 # Tests that show an effect again.
 _RATES = 'constant rates, at least six from creep to the fastest, in both directions'
 _TURNS = 'one constant rate held for a minute'

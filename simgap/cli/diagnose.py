@@ -19,10 +19,14 @@ its fit had ended, beside what is found afresh.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import datetime
 from pathlib import Path
+import shlex
+import sys
 from typing import TYPE_CHECKING
 
+from simgap import __version__
 from simgap.command.large_arrays import give_back_large_arrays
 from simgap.command.output import (
     add_json_option, check_options, give, Progress, replaced, warnings_in_one_line,
@@ -89,7 +93,7 @@ def diagnosed(name: str, paths: Sequence[str], arguments: argparse.Namespace) ->
             model, logs, lambda share, doing: progress.update(share), arguments.jobs,
             settings_of(arguments.threshold), arguments.without,
             dict(numbers_of('--matters', arguments.matters)), earlier)
-    write_report(arguments.report, verdict)
+    write_report(arguments.report, verdict, facts(f'simgap {__version__}', name, '', paths))
     give(verdict.as_data(), arguments.json, verdict.summary())
     return 0
 
@@ -99,13 +103,23 @@ def earlier_of(path: Path | None) -> Sequence[Rival]:
     return findings_of(path, planning_of(path)).rivals if path else ()
 
 
-def write_report(path: str | None, verdict: Verdict) -> None:
-    """Write the page about a diagnosis, if one was asked for."""
+def facts(made_by: str, machine: str, configuration: str, paths: Sequence[str]) -> dict[str, str]:
+    """Return what was diagnosed, when it was written, and with what, for the page."""
+    called = [Path(sys.argv[0]).name, *sys.argv[1:]]
+    found = {'machine': machine, 'configuration': configuration, 'recordings': ', '.join(
+        f'{Path(path).name} ({datetime.fromtimestamp(Path(path).stat().st_mtime):%Y-%m-%d})'
+        for path in paths), 'made by': made_by,
+        'command': shlex.join(called) if called[1:] and 'diagnose' in called[1] else ''}
+    return {name: text for name, text in found.items() if text}
+
+
+def write_report(path: str | None, verdict: Verdict, about: Mapping[str, str]) -> None:
+    """Write the page about a diagnosis, if one was asked for; `about` is from `facts`."""
     if path:
         from simgap.report.page import contents
         from simgap.report.render import render
         with replaced(Path(path)) as stream:
-            stream.write(render('verdict.html', **vars(contents(verdict))).encode())
+            stream.write(render('verdict.html', **vars(contents(verdict, about))).encode())
 
 
 def numbers_of(option: str, texts: Sequence[str]) -> Iterator[tuple[str, float]]:

@@ -100,7 +100,7 @@ def test_every_effect_has_words_and_next_steps(effect: str) -> None:
         for item in form.parameters:
             inspect, predict, repeat = WORDS[item.name].then
             assert inspect.startswith('inspect ') and repeat.startswith('repeat ')
-            assert '`antenna-drive predict`' in predict
+            assert '`antenna-drive predict RECORDING ' in predict
         for value in {form.sizes[0].high, form.sizes[0].low} - {0.0}:
             text = told(effect, {form.sizes[0].name: number(value, 0.9 * value, 1.1 * value,
                                                             form.sizes[0].unit)})

@@ -16,7 +16,7 @@ from antenna_drive.pages import render
 from chromium import EXECUTABLE, Page
 import numpy as np
 import pytest
-from simgap.machine.contract import Effect, Experiment
+from simgap.machine.contract import Effect, Experiment, Words
 from simgap.machine.diagram import Diagram, DiagramBlock
 from simgap.report.page import contents
 from simgap.verdict.record import Named, Verdict
@@ -59,6 +59,8 @@ FULL: dict[str, Any] = {
 BARE: dict[str, Any] = {
     **FULL, 'verdict': 'no_gap', 'confusable': [], 'where': [], 'may_enter_at': [],
     'which': [{'effects': ['none'], 'probability': 1.0, 'parameters': {}}],
+    'remains': {'dial': {'unit': 'V', 'rms': 0.01, 'noise': 0.01, 'beyond_noise': 0.001,
+                         'matters': None}},
     'how_far': {**FULL['how_far'], 'explained_fraction': {
         'value': None, 'ci95': None, 'reason': 'no effect was found'}}}
 TIME = np.linspace(0.0, 1.99, 200)
@@ -103,6 +105,7 @@ def show(browser: Page, tmp_path: Path, result: dict[str, Any], **machine: Any) 
                         ) == 0
     # nothing is wider than the window of a phone but what scrolls within itself
     assert browser.tell('document.documentElement.scrollWidth <= innerWidth') is True
+    browser.tell('document.querySelectorAll("details").forEach(part => { part.open = true; })')
     text = browser.tell('document.body.innerText')
     assert isinstance(text, str)
     return ' '.join(text.replace('\xa0', ' ').split())
@@ -131,6 +134,39 @@ def test_everything_is_said_and_nothing_is_taken_for_html(browser: Page, tmp_pat
     blocks = browser.tell('[...document.querySelectorAll(".diagram text")]'
                           '.map(e => e.textContent.replace(/\\s+/g, " "))')
     assert blocks == ['motors 75 %', 'dial 15 %']
+
+
+@needs_browser
+def test_the_page_begins_with_the_sentence_and_with_what_was_diagnosed(
+        browser: Page, tmp_path: Path) -> None:
+    verdict = diagnosis({**FULL, 'confusable': []}, words={'motors.friction.torque': Words(
+        'the motors rub {by} more', configured=0.5, unit='N m', then=('run `this`', 'look'))})
+    path = tmp_path / 'verdict.html'
+    path.write_text(render('verdict.html', **vars(contents(verdict, {
+        'machine': HOSTILE, 'recordings': 'a.csv (2026-01-02)', 'made by': 'it 1.0'}))))
+    browser.look(390, 800)
+    browser.open(path.as_uri())
+    text = ' '.join(str(browser.tell('document.body.innerText')).replace('\xa0', ' ').split())
+    beginning = (
+        'The motors rub 50 percent more: 0.75 N m (0.7 to 0.8) instead of 0.5. Probability 75 '
+        'percent. Adding it removes 90 percent of the gap on data that was not fitted (80 to 95). '
+        'Something else acts beside that. Next: run this; look.')
+    assert text.startswith(f'{beginning} verdict Partly explained machine {HOSTILE} recordings '
+                           'a.csv (2026-01-02) made by it 1.0 ')
+    assert verdict.as_data()['sentence'] == beginning.replace('run this', 'run `this`')
+    assert verdict.summary().startswith(f'partly explained: {verdict.as_data()["sentence"]}')
+    # what is of the fit alone waits until somebody asks
+    assert 'Diagnostics of the fit' in text and 'greatest correlation' not in text
+    # a phone shows all of the answer
+    assert browser.tell('[...document.querySelectorAll("h1, .lead, .next, .facts dd, td")]'
+                        '.every(e => e.getBoundingClientRect().right <= 390)') is True
+
+
+@needs_browser
+def test_a_loud_remainder_is_not_called_an_agreement(browser: Page, tmp_path: Path) -> None:
+    text = show(browser, tmp_path, {**BARE, 'remains': {
+        'dial': {**BARE['remains']['dial'], 'beyond_noise': 0.5}}})
+    assert 'agree' not in text and 'dial is 0.5 V beyond noise of 0.01 V' in text
 
 
 @needs_browser
