@@ -23,6 +23,7 @@ import numpy as np
 from simgap.command.output import add_json_option, check_options, give, Progress
 from simgap.errors import UserError
 from simgap.inputs.schema import Entry
+from simgap.verdict.spoken import number, quantity
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -82,10 +83,17 @@ def run(arguments: argparse.Namespace) -> int:
     whole = next(iter(found.values()))
     lines = ['smallest detectable size, and the effects that look alike']
     for i, effect in enumerate(whole.effects):
-        lines.append(f'  {effect:36s} {whole.detectable[i]:10.3g} {whole.units[i]:12s} '
+        lines.append(f'  {effect:36s} {_size(whole.detectable[i], whole.units[i]):24s} '
                      + ', '.join(passing_for(whole, i, 3)))
     for name, item in found.items():
         lines.append(f'{name}: {100.0 * separated(item):.1f} % of all pairs of effects are '
                      f'separated; {len(groups(item))} groups are not')
     give(result, arguments.json, '\n'.join(lines))
     return 0
+
+
+def _size(size: float, unit: str) -> str:
+    """Return a detectable size as people say it."""
+    if not np.isfinite(size):
+        return 'does not show'
+    return f'{number(100.0 * size)} %' if unit == '1' else quantity(size, unit)

@@ -35,6 +35,7 @@ from simgap.command.output import (
     add_json_option, STANDARD_OUTPUT, warnings_in_one_line, write_json,
 )
 from simgap.errors import UserError
+from simgap.verdict.spoken import number
 
 if TYPE_CHECKING:
     from antenna_drive.diagnosis.modifiers import SensorReadings
@@ -93,7 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
         line = f'{channel:<14} {item["rms"]:.4g} {item["unit"]}'
         if 'against' in item:
             line += (f'   {item["against"]:.4g} {item["unit"]} with --against, '
-                     f'{100.0 * (1.0 - item["rms"] / max(item["against"], 1e-300)):.0f} % less')
+                     f'{_change(item["rms"], item["against"])}')
         print(line, file=stream)
     for note in notes:
         print(f'note: {note}', file=stream)
@@ -105,6 +106,16 @@ def _mean_ratio(signals: dict[str, dict[str, Any]]) -> float:
     tiny = 1e-300
     return math.exp(sum(math.log(max(item['rms'], tiny) / max(item['against'], tiny))
                         for item in signals.values()) / len(signals))
+
+
+def _change(now: float, before: float) -> str:
+    """Return how a size differs from another, as people say it."""
+    if now <= before:
+        return f'{100.0 * (1.0 - now / before) if before else 0.0:.0f} % less'
+    change = now / before - 1.0 if before else math.inf
+    if not math.isfinite(change):
+        return 'where there was nothing'
+    return f'{number(change)} times more' if change >= 1.0 else f'{100.0 * change:.0f} % more'
 
 
 def _recorder(path: Path) -> SensorReadings:

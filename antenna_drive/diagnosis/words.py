@@ -9,14 +9,19 @@ A row is a kind of effect, or one form of it. {part} is the part of the drive, {
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+import math
 from typing import Any
 
-from antenna_drive.diagnosis.modifiers import AntennaParameter
+from antenna_drive.diagnosis.modifiers import AntennaParameter, SCALE, SET
 from antenna_drive.parameters.records import place_of
 from antenna_drive.parameters.sets import Drive, values
 import numpy as np
-from simgap.machine.contract import Effect, Words
+from simgap.machine.contract import Effect
+from simgap.machine.machine import Words
+from simgap.verdict.spoken import number, quantity, with_interval
 
 _PREDICT = ('run `antenna-drive predict RECORDING --config corrected.yaml --recorder verdict.json '
             '--against reference` on a recording that was not used here (`diagnose --corrected` '
@@ -200,10 +205,51 @@ _PARTS = {
 _ADDED_TO = {'armature.resistance_change': 'armature.resistance'}
 
 
+# A change above this share is said as a multiple.
+_MULTIPLE = 10.0
+
+
+@dataclass(frozen=True)
+class _Said:
+    """What is said of a number: above zero, below it ('' for the same), and what to do next."""
+
+    greater: str
+    smaller: str
+    configured: float | None  # what the number changes; None for nothing
+    unit: str  # of `configured`
+    how: str  # what the number does to it
+    then: tuple[str, ...]
+
+    def sized(self, item: Mapping[str, Any]) -> str:
+        """Return what is said with the size, beside the configured one if there is one."""
+        base, values = self.configured, [item['value'], *item['ci95']]
+        if base:
+            made = [base * (1.0 + v) if self.how == SCALE else v if self.how == SET else base + v
+                    for v in values]
+            change = made[0] / base - 1.0
+        else:
+            change = values[0]
+            made = [-v for v in values] if change < 0.0 and self.smaller else values
+        text = self.smaller if change < 0.0 and self.smaller else self.greater
+        if '{by}' in text and not base:
+            near, far = sorted(max(v * math.copysign(1.0, change), 0.0) for v in values[1:])
+            return text.replace('{by}', f'{ratio(change)} ({ratio(near, "")} to {ratio(far, "")})')
+        told = with_interval({'value': made[0], 'ci95': sorted(made[1:]),
+                              'unit': self.unit or item['unit']})
+        return (f'{text.replace("{by}", ratio(change))}: {told}'
+                + (f' instead of {number(base)}' if base else ''))
+
+
+def ratio(change: float, word: str = ' percent') -> str:
+    """Return by how much a number differs, without its sign: 40 percent, 930 times."""
+    size = abs(change)
+    return f'{number(size)} times' if size >= _MULTIPLE else f'{100.0 * size:.3g}{word}'
+
+
 def words(effects: Iterable[Effect], drive: Drive,
           record: np.ndarray[Any, np.dtype[Any]]) -> dict[str, Words]:
     """
-    Return how people speak of the numbers of effects, by parameter.
+    Return what people say of effects, by id.
 
     Parameters
     ----------
@@ -218,16 +264,50 @@ def words(effects: Iterable[Effect], drive: Drive,
     units = {path: entry.unit for path, entry, _ in values(drive)}
     found = {}
     for effect in effects:
-        for form in effect.forms:
-            for item in form.parameters:
-                assert isinstance(item, AntennaParameter)
-                name = item.name.removeprefix(f'{effect.id}.')
-                found[item.name] = _words(effect, name, item, units, record)
+        sizes = {}
+        for item in (size for form in effect.forms for size in form.sizes):
+            assert isinstance(item, AntennaParameter)
+            name = item.name.removeprefix(f'{effect.id}.')
+            sizes[item.name] = _said(effect, name, item, units, record)
+        found[effect.id] = partial(_clause, effect, sizes)
     return found
 
 
-def _words(effect: Effect, name: str, item: AntennaParameter, units: Mapping[str, str],
-           record: np.ndarray[Any, np.dtype[Any]]) -> Words:
+def _clause(effect: Effect, said: Mapping[str, _Said],
+            numbers: Mapping[str, Any]) -> tuple[str, Sequence[str]]:
+    """Return what is said of an effect with some numbers, and its next steps."""
+    sizes = {name: item for name, item in numbers.items() if _bare(name) in said}
+    name = max(sizes, key=lambda key: abs(sizes[key]['value']))
+    words, form = said[_bare(name)], effect.forms[0]
+    text = words.sized(_amplitude(list(sizes.values())) if form.is_wave else sizes[name])
+    if form.is_wave:
+        text += f', {name.partition("@")[2].partition("[")[0]} cycles a turn'
+    else:
+        if form.is_course:
+            text = text.replace(': ', ': up to ', 1)
+        text += ''.join(f', {key.rpartition(".")[2].replace("_", " ")} '
+                        f'{quantity(item["value"], item["unit"])}' for key, item in numbers.items()
+                        if key not in sizes and item['unit'] != '1')
+    return text + (f', where {name[name.index("[") + 1:-1]}' if name.endswith(']') else ''
+                   ), words.then
+
+
+def _bare(name: str) -> str:
+    """Return the name of a number without its order and its label."""
+    return name.partition('@')[0].partition('[')[0]
+
+
+def _amplitude(parts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the amplitude of a wave from its sine and cosine parts, with its interval."""
+    size = math.hypot(*(part['value'] for part in parts))
+    half = math.hypot(*(0.5 * (part['ci95'][1] - part['ci95'][0]) * part['value'] / size
+                        for part in parts)) if size else 0.0
+    return {'value': size, 'ci95': [max(size - half, 0.0), size + half],
+            'unit': parts[0]['unit']}
+
+
+def _said(effect: Effect, name: str, item: AntennaParameter, units: Mapping[str, str],
+          record: np.ndarray[Any, np.dtype[Any]]) -> _Said:
     kind = f'{_kind(effect.component)}.{effect.id.partition(".")[2]}'
     greater, smaller, inspect, repeat = _ROWS.get(f'{kind}.{name}') or _ROWS[kind]
     number = name.rpartition('_')[2]
@@ -236,7 +316,7 @@ def _words(effect: Effect, name: str, item: AntennaParameter, units: Mapping[str
             'by': '{by}'}
     fields = [_changed(path) for path in getattr(item.modifier, 'fields', ())]
     base = _in_common(fields, record)
-    return Words(greater.format(**said), smaller.format(**said), base,
+    return _Said(greater.format(**said), smaller.format(**said), base,
                  units.get(_entry(fields[0]), '') if fields else '', item.modifier.how,
                  (f'inspect {inspect.format(**said)}', _PREDICT, f'repeat {repeat}'))
 

@@ -117,23 +117,3 @@ class Effect:
     forms: tuple[Form, ...]
     parts: tuple[str, ...] = ()
     simpler: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Words:
-    """
-    How people speak of a number of an effect.
-
-    greater, smaller : what is said of a number above zero, and below ('' for the same), such as
-        'gearbox 2 is {by} softer than configured'; {by} is a share such as '40 percent'
-    configured, unit : what the number changes, and its unit; None and '' for nothing
-    how : 'scale', 'add' or 'set': what the number does to it
-    then : next steps, such as 'inspect its housing'
-    """
-
-    greater: str
-    smaller: str = ''
-    configured: float | None = None
-    unit: str = ''
-    how: str = 'add'
-    then: tuple[str, ...] = ()

@@ -10,7 +10,7 @@ Your machine needs a simulation (`Machine.predict`) and the numbers that may dif
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 import math
@@ -21,10 +21,13 @@ import numpy as np
 from simgap.machine.arrays import Course, FloatArray, Point
 from simgap.machine.catalogue import Catalogue
 from simgap.machine.diagram import Diagram
-from simgap.machine.effect import Effect, Parameter, Words
+from simgap.machine.effect import Effect, Parameter
 from simgap.machine.experiment import Experiment
 from simgap.machine.motion import Motion, TimeScales
 from simgap.machine.nuisances import Nuisances
+
+# From the numbers of an effect, as a verdict has them, to a clause and the next steps.
+Words = Callable[[Mapping[str, Any]], tuple[str, Sequence[str]]]
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ class Machine(ABC):
     diagram : picture of the machine for the page; None for a block for each component
     advice : tests that settle what is open: effects without their component (empty for any), and
         what to record
-    words : how people speak of the effects' numbers, by parameter
+    words : what people say of effects, by id, see `Words`
     planning : what the design of a further test must know of the tests, as plain data
     """
 

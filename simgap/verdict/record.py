@@ -13,8 +13,8 @@ from simgap.machine.contract import Machine
 from simgap.search.hypothesis import Hypothesis
 from simgap.verdict.interventions import lines as lines_of_labels
 from simgap.verdict.localisation import Located
-from simgap.verdict.spoken import quantity
 from simgap.verdict.sentence import loud, said
+from simgap.verdict.spoken import quantity
 from simgap.verdict.unknown_input import Place
 
 # An effect of more parameters than this is summed up instead of listed.

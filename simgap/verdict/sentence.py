@@ -5,15 +5,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-import math
 from typing import Any, NamedTuple, TYPE_CHECKING
 
-from simgap.machine.contract import Words
-from simgap.verdict.spoken import number, percent, quantity, ratio
+from simgap.verdict.spoken import percent, quantity, with_interval
 
 if TYPE_CHECKING:
     from simgap.verdict.record import Verdict
 
+# A machine without words of its own has so many numbers of an effect listed.
+_LISTED = 4
 _DESIGNED = 'the test that `propose` designs from the JSON of this verdict'
 
 
@@ -113,63 +113,13 @@ def _unknown(verdict: Verdict) -> str:
 def _effect(verdict: Verdict, effect: str,
             parameters: Mapping[str, Any]) -> tuple[str, Sequence[str]]:
     """Return what is said of an effect, and its next steps."""
+    own = {name: item for name, item in parameters.items() if name.startswith(f'{effect}.')}
+    if own and effect in verdict.machine.words:
+        return verdict.machine.words[effect](own)
     known = verdict.machine.catalogue.get(effect)
-    forms = known.forms if known else ()
-    shapes = {_bare(p.name) for form in forms for p in form.parameters if p.is_shape}
-    sizes = {name: item for name, item in parameters.items()
-             if name.startswith(f'{effect}.') and _bare(name) not in shapes}
-    cause = f' ({known.cause})' if known and known.cause else ''
-    general = ['inspect what may cause it', 'diagnose again with a recording that was not used '
-               'here']
-    if not sizes:
-        return f'the model lacks {effect}{cause}', general
-    name = max(sizes, key=lambda key: abs(sizes[key]['value']))
-    waves = [key for key in sizes if _bare(key).endswith('sine')]
-    item = _amplitude([sizes[key] for key in waves]) if waves else sizes[name]
-    words = verdict.machine.words.get(_bare(name), Words(
-        f'the model lacks {effect}{cause}, {_bare(name).removeprefix(effect)[1:]}',
-        then=tuple(general)))
-    text = _sized(words, item)
-    if '@' in name:
-        text += f', {name.partition("@")[2].partition("[")[0]} cycles a turn'
-    if any(form.is_course for form in forms):
-        text = text.replace(': ', ': up to ', 1)
-    text += ''.join(f', {key.rpartition(".")[2].replace("_", " ")} '
-                    f'{quantity(item["value"], item["unit"])}' for key, item in parameters.items()
-                    if _bare(key) in shapes and item['unit'] != '1')
-    return text + (f', where {name[name.index("[") + 1:-1]}' if name.endswith(']') else ''
-                   ), words.then
-
-
-def _bare(name: str) -> str:
-    """Return the name of a parameter without its order and its label."""
-    return name.partition('@')[0].partition('[')[0]
-
-
-def _amplitude(parts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the amplitude of a wave from its sine and cosine parts, with its interval."""
-    size = math.hypot(*(part['value'] for part in parts))
-    half = math.hypot(*(0.5 * (part['ci95'][1] - part['ci95'][0]) * part['value'] / size
-                        for part in parts)) if size else 0.0
-    return {'value': size, 'ci95': [max(size - half, 0.0), size + half],
-            'unit': parts[0]['unit']}
-
-
-def _sized(words: Words, item: Mapping[str, Any]) -> str:
-    """Return what is said of a number with its size, beside the configured one if there is one."""
-    base, values = words.configured, [item['value'], *item['ci95']]
-    if base:
-        made = [base * (1.0 + v) if words.how == 'scale' else v if words.how == 'set' else base + v
-                for v in values]
-        change = made[0] / base - 1.0
-    else:
-        change = values[0]
-        made = [-v for v in values] if change < 0.0 and words.smaller else values
-    low, high = sorted(made[1:])
-    text = words.smaller if change < 0.0 and words.smaller else words.greater
-    if '{by}' in text and not base:
-        near, far = sorted(max(v * math.copysign(1.0, change), 0.0) for v in values[1:])
-        return text.replace('{by}', f'{ratio(change)} ({ratio(near, "")} to {ratio(far, "")})')
-    text = text.replace('{by}', ratio(change))
-    return (f'{text}: {quantity(made[0], words.unit or item["unit"])} '
-            f'({number(low)} to {number(high)})' + (f' instead of {number(base)}' if base else ''))
+    sizes = [f'{name.removeprefix(effect)[1:]} {with_interval(item)}'
+             for name, item in list(own.items())[:_LISTED]]
+    return (f'the model lacks {effect}' + (f' ({known.cause})' if known and known.cause else '')
+            + ': ' * bool(sizes) + ', '.join(sizes)), (
+        'inspect what may cause it',
+        'diagnose again, together with a recording that was not used here')

@@ -4,10 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 import math
-
-# A change above this share is said as a multiple.
-_MULTIPLE = 10.0
+from typing import Any
 
 
 def number(value: float) -> str:
@@ -34,9 +33,7 @@ def percent(share: float, word: str = ' percent') -> str:
     return f'{100.0 * share:.{0 if abs(share) >= 0.1 else 1}f}{word}'
 
 
-def ratio(change: float, word: str = ' percent') -> str:
-    """Return by how much a number differs, without its sign: 40 percent, 930 times."""
-    size = abs(change)
-    if not math.isfinite(size):
-        return 'without end'
-    return f'{number(size)} times' if size >= _MULTIPLE else f'{100.0 * size:.3g}{word}'
+def with_interval(item: Mapping[str, Any]) -> str:
+    """Return a number of a verdict with its unit and its interval."""
+    low, high = item['ci95']
+    return f'{quantity(item["value"], item["unit"])} ({number(low)} to {number(high)})'

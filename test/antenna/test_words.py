@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from antenna_drive.diagnosis.catalogue import catalogue
-from antenna_drive.diagnosis.words import words
+from antenna_drive.diagnosis.words import ratio, words
 from antenna_drive.parameters import load
 from antenna_drive.parameters.records import record_of
 import pytest
@@ -38,7 +38,7 @@ def told(effect: str, parameters: dict[str, Any]) -> str:
 
 
 # The reference drive has a gear of 23.6 N m/rad, a winding of 0.46 ohm, a motor friction of
-# 0.069 A, a first mode of 2.2 Hz and no tachometer error.
+# 0.069 article A, a first mode of 2.2 Hz and no tachometer error.
 @pytest.mark.parametrize('found, text', [
     (what('gearbox_2.stiffness', change=number(-0.4, -0.42, -0.38)),
      'Gearbox 2 is 40 percent softer than configured: 14.2 N m/rad (13.7 to 14.6) instead of '
@@ -50,8 +50,8 @@ def told(effect: str, parameters: dict[str, Any]) -> str:
      'The armature of motor 1 has 50 percent more resistance than configured: 0.69 ohm (0.644 to '
      '0.736) instead of 0.46.'),
     (what('motors.coulomb_friction', torque=number(-0.0345, -0.0414, -0.0276, 'A')),
-     'Each motor rubs 50 percent less than configured: 0.0345 A (0.0276 to 0.0414) instead of '
-     '0.069.'),
+     'Each motor rubs 50 percent less than configured: 0.0345 article A (0.0276 to '
+     '0.0414) instead of 0.069.'),
     (what('axis.mode_frequency', change_1=number(0.1, 0.05, 0.15)),
      'The frequency of mode 1 is 10 percent higher than configured: 2.42 Hz (2.31 to 2.53) '
      'instead of 2.2.'),
@@ -97,8 +97,8 @@ def test_what_is_said_of_an_effect(found: str, text: str) -> None:
 @pytest.mark.parametrize('effect', EFFECTS)
 def test_every_effect_has_words_and_next_steps(effect: str) -> None:
     for form in EFFECTS[effect].forms:
-        for item in form.parameters:
-            inspect, predict, repeat = WORDS[item.name].then
+        for item in form.sizes:
+            inspect, predict, repeat = WORDS[effect]({item.name: number(1.0, 1.0, 1.0)})[1]
             assert inspect.startswith('inspect ') and repeat.startswith('repeat ')
             assert '`antenna-drive predict RECORDING ' in predict
         for value in {form.sizes[0].high, form.sizes[0].low} - {0.0}:
@@ -111,5 +111,12 @@ def test_every_effect_has_words_and_next_steps(effect: str) -> None:
 def test_what_is_compared_is_that_of_the_drive_in_its_test() -> None:
     record = record_of(DRIVE)
     record['motor_2']['gearbox']['stiffness'] = 50.0
-    found = words(EFFECTS.values(), DRIVE, record)['gearbox_2.stiffness.change']
-    assert (found.configured, found.unit, found.how) == (50.0, 'N m/rad', 'scale')
+    said_of = words(EFFECTS.values(), DRIVE, record)['gearbox_2.stiffness']
+    assert said_of({'gearbox_2.stiffness.change': number(-0.1, -0.2, 0.0)})[0] == (
+        'gearbox 2 is 10 percent softer than configured: 45 N m/rad (40 to 50) instead of 50')
+
+
+@pytest.mark.parametrize('change, text', [
+    (-0.4, '40 percent'), (3.0, '300 percent'), (0.053, '5.3 percent'), (930.0, '930 times')])
+def test_a_change_is_a_share_or_a_multiple(change: float, text: str) -> None:
+    assert ratio(change) == text

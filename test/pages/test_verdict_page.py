@@ -16,7 +16,7 @@ from antenna_drive.pages import render
 from chromium import EXECUTABLE, Page
 import numpy as np
 import pytest
-from simgap.machine.contract import Effect, Experiment, Words
+from simgap.machine.contract import Effect, Experiment
 from simgap.machine.diagram import Diagram, DiagramBlock
 from simgap.report.page import contents
 from simgap.verdict.record import Named, Verdict
@@ -139,8 +139,9 @@ def test_everything_is_said_and_nothing_is_taken_for_html(browser: Page, tmp_pat
 @needs_browser
 def test_the_page_begins_with_the_sentence_and_with_what_was_diagnosed(
         browser: Page, tmp_path: Path) -> None:
-    verdict = diagnosis({**FULL, 'confusable': []}, words={'motors.friction.torque': Words(
-        'the motors rub {by} more', configured=0.5, unit='N m', then=('run `this`', 'look'))})
+    verdict = diagnosis({**FULL, 'confusable': [], 'statements': {'named': {
+        'best_of_catalogue': ['motors.friction']}}}, words={'motors.friction': lambda numbers: (
+            'the motors rub 50 percent more', ['run `this`', 'look'])})
     path = tmp_path / 'verdict.html'
     path.write_text(render('verdict.html', **vars(contents(verdict, {
         'machine': HOSTILE, 'recordings': 'a.csv (2026-01-02)', 'made by': 'it 1.0'}))))
@@ -148,8 +149,7 @@ def test_the_page_begins_with_the_sentence_and_with_what_was_diagnosed(
     browser.open(path.as_uri())
     text = ' '.join(str(browser.tell('document.body.innerText')).replace('\xa0', ' ').split())
     beginning = (
-        'The motors rub 50 percent more: 0.75 N m (0.7 to 0.8) instead of 0.5. Probability 75 '
-        'percent. Adding it removes 90 percent of the gap on data that was not fitted (80 to 95). '
+        'The motors rub 50 percent more. Probability 75 percent. Adding it removes 90 percent of the gap on data that was not fitted (80 to 95). '
         'Something else acts beside that. Next: run this; look.')
     assert text.startswith(f'{beginning} verdict Partly explained machine {HOSTILE} recordings '
                            'a.csv (2026-01-02) made by it 1.0 ')
