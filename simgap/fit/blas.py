@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Linear algebra in one thread.
-
-Fits go side by side. Matrices of a hundred columns gain nothing from threads of their own, which
-spin while they wait: with two in each of two jobs, a design takes five times the processor time.
-"""
+"""Linear algebra in one thread."""
 
 from __future__ import annotations
 

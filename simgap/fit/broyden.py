@@ -1,16 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The linear model of a prediction about a fit, corrected by each step that the fit takes.
-
-A step s should have changed the prediction by J s and has changed it by y. Broyden's rank-one
-update, in the metric D of the Hessian's diagonal, makes the Jacobian agree with the step:
-
-    J + (y - J s) (D s)^T / (s^T D s)
-
-(C. G. Broyden, Mathematics of Computation 19, 1965). A Jacobian takes many runs of the machine,
-a correction none.
-"""
+"""The linear model of a prediction about a fit, corrected by each step that the fit takes."""
 
 from __future__ import annotations
 

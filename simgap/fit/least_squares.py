@@ -1,13 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The residuals of a machine in its experiments, as a nonlinear least-squares problem.
-
-    minimise  sum_i rho((measured_i - predicted_i(x)) / sigma_i) + sum_j (x_j / prior_j)^2 / 2
-    within    low <= x <= high, with rho from `robust_loss` and the solver `levenberg_marquardt`
-
-A Jacobian takes many runs. A fit therefore starts from the Jacobian of a fit nearby.
-"""
+"""The residuals of a machine in its experiments, as a nonlinear least-squares problem."""
 
 from __future__ import annotations
 

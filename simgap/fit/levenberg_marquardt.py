@@ -1,16 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Levenberg-Marquardt within a box, with iteratively reweighted residuals.
-
-Each step d solves, within the bounds of the parameters,
-
-    (H + damping diag(H)) d = J^T W r - P x,    H = J^T W J + P
-
-with the weights W of the robust loss and the precision P of the priors. A step is taken if it
-gains. The damping falls after a good step and grows after one that failed. The linear model is in
-`broyden`, the step in `box_qp`.
-"""
+"""Levenberg-Marquardt within a box, with iteratively reweighted residuals."""
 
 from __future__ import annotations
 

@@ -1,14 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The noise of a channel as a recording shows it: its level and its colour.
-
-Real noise is louder or quieter than a test sheet says and partly slow, and no model is exact. Both
-are described as white noise plus a part behind a first-order low-pass. The two levels and the
-corner are estimated from a residual by the prediction error method (L. Ljung, System
-Identification, 2nd edition, chapter 7), within bounds: what is beyond them is not noise. Fits and
-tests use the innovations, which are white, so that a slow residual counts just once.
-"""
+"""The noise of a channel as a recording shows it: its level and its colour."""
 
 from __future__ import annotations
 

@@ -1,13 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The robust loss of a residual r: half its square up to a bound k, its logarithm beyond.
-
-    rho(r) = r^2 / 2                         for |r| < k
-           = k^2 (1/2 + log(|r| / k))        for |r| >= k
-
-Its weight in iteratively reweighted least squares is rho'(r) / r, which is 1 or (k / r)^2.
-"""
+"""The robust loss of a residual r: half its square up to a bound k, its logarithm beyond."""
 
 from __future__ import annotations
 

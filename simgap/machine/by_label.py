@@ -1,13 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-A machine whose effects may differ between labels of its tests.
-
-A label says what was different in a test: compensation on or off, load A or B, before or after a
-repair. An effect has one more form for each label: a size of its own under each value. That form
-pays for each of its numbers, so it is chosen only where the sizes differ. With one size for all
-tests, an effect that exists under one value only would get half its size, or none.
-"""
+"""A machine whose effects may differ between labels of its tests."""
 
 from __future__ import annotations
 

@@ -20,7 +20,6 @@ class Catalogue(dict[str, Effect]):
 
     def without(self, effects: Collection[str]) -> Catalogue:
         """Return the catalogue without effects and what depends on them; KeyError if unknown."""
-        # their parts, what they are parts of, and what becomes one of them at an end of its range
         # also without their parts, and what becomes one of them at an end of its range
         gone = {name for effect in effects for name in (effect, *self[effect].parts)}
         kept = copy(self)

@@ -1,12 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Which effects a set of tests can and cannot tell apart, before the tests are made.
-
-An effect shows if it does more than its price where the nuisances imitate as much of it as their
-tolerances allow. Derivatives are taken at one point; their possible error shows nothing. The angle
-between what cannot be imitated of two effects says whether one passes for the other.
-"""
+"""Which effects a set of tests can and cannot tell apart, before the tests are made."""
 
 from __future__ import annotations
 

@@ -1,12 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The design of the next test: which of the tests that a machine may run tells most.
-
-The search knows nothing of waveforms. It draws tests of every family from a `TestSpace`, keeps
-those within the limits, judges the most promising with all tolerances free, and varies the best.
-Last, each rival is fitted to the simulated readings of the others: derivatives promise too much.
-"""
+"""The design of the next test: which of the tests that a machine may run tells most."""
 
 from __future__ import annotations
 

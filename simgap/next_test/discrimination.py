@@ -1,20 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-How well a planned test would tell rivals apart.
-
-The criterion is T-optimality: a test is good if a wrong rival fits badly however its numbers
-follow (A. C. Atkinson, V. V. Fedorov, Biometrika 62, 57, 1975; for several rivals, the same
-volume, 289), with prior probabilities and prior knowledge of the numbers (A. C. Ponce de Leon, A.
-C. Atkinson, Biometrika 78, 601, 1991). W. G. Hunter, A. M. Reiner (Technometrics 7, 307, 1965)
-hold the numbers at their fitted values. G. E. P. Box, W. J. Hill (Technometrics 9, 57, 1967) see
-them through the variance of the prediction alone, which is as large as the readings with a hundred
-tolerances.
-
-The lack of fit of every pair becomes probabilities as in a verdict. The mean logarithm of what the
-true rival gets is the expected information. To first order the best that a rival can do is a
-projection (`separation`). That is a promise, which fits keep or break (`rival_fits`).
-"""
+"""How well a planned test would tell rivals apart."""
 
 from __future__ import annotations
 

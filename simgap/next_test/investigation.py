@@ -1,14 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The whole loop: a test, its verdict, the next test, until the answer is sure.
-
-An answer that a single test has made sure may be wrong: nothing has contradicted it yet. So one
-test more must leave it sure.
-
-Everything lies in one folder, a file for each step. A step whose file is there is not done again,
-so an investigation that was interrupted goes on where it was.
-"""
+"""The whole loop: a test, its verdict, the next test, until the answer is sure."""
 
 from __future__ import annotations
 

@@ -1,13 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-What a verdict knows of its rivals: the next test is designed from it, see `discrimination`.
-
-Each rival is a hypothesis with its fitted numbers and their covariance. Numbers of a single test,
-such as where it starts, are integrated out: the next test has its own. Two answers may come from
-one fit, if it is not sure that an effect exceeds its tolerance. Each is then taken at its mean in
-its own region, and holds the doubts that a test may end.
-"""
+"""What a verdict knows of its rivals: the next test is designed from it, see `discrimination`."""
 
 from __future__ import annotations
 

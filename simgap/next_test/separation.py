@@ -1,14 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-What a planned test tells of rivals: how badly a wrong one would fit, and what that decides.
-
-In most open verdicts one answer names one effect more than the other, which already misses the
-readings by far. What is open is whether the effect exceeds its tolerance. A smaller deviation of
-its size or a larger gain ends this doubt (`doubts`), and separates the rivals by no more
-(`Separation.odds`), as D_s-optimality asks: A. C. Atkinson, A. N. Donev, R. D. Tobias, Optimum
-Experimental Designs (2007), section 10.3.
-"""
+"""What a planned test tells of rivals: how badly a wrong one would fit, and what that decides."""
 
 from __future__ import annotations
 

@@ -1,13 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Answers of an earlier verdict, fitted to more tests than it has seen.
-
-A test in which motors creep and stick may hold every fit that begins at the model as configured in
-a wrong minimum. An answer of the earlier tests begins near its optimum. Where the new test leaves
-much at first, the noise counts as louder for one fit, which flattens the hills between minima
-(graduated non-convexity: A. Blake, A. Zisserman, Visual Reconstruction, 1987).
-"""
+"""Answers of an earlier verdict, fitted to more tests than it has seen."""
 
 from __future__ import annotations
 

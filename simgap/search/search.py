@@ -1,17 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The search for effects: from the nuisances alone over single effects to pairs.
-
-The nuisances are fitted without any effect: the hypothesis 'none'. While something strong is
-missing, the misfit counts as noise, and the nuisances stay close to their priors. A screening by
-derivatives chooses a dozen effects, which are fitted, each together with all nuisances. While they
-leave much, so is the effect that each single test promises most of. If the best explains much, the
-noise is lowered to what it leaves, and the best are fitted again. Several of the best are given
-partners, and the pairs are fitted. Answers of an earlier verdict are fitted from where they ended.
-All this is done with coarser steps of the simulation. The best are then fitted to the whole tests
-and compared (`full_fits`).
-"""
+"""The search for effects: from the nuisances alone over single effects to pairs."""
 
 from __future__ import annotations
 

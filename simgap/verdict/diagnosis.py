@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The diagnosis of a gap between a machine and its model: where, which effect, how far it shrinks.
-
-It works on any `Machine`.
-"""
+"""The diagnosis of a gap between any `Machine` and its model: where, which effect, how far."""
 
 from __future__ import annotations
 

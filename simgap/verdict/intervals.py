@@ -1,18 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Intervals of fitted values, by Laplace's approximation with a cluster-robust variance.
-
-Residuals are never quite independent. The scores of the likelihood are summed over blocks of time,
-and the scatter of these sums is compared with that of independent noise (K.-Y. Liang, S. L. Zeger,
-Biometrika 73, 1986). Where the law of an effect is wrong, each test asks for another value,
-however little noise there is. The jackknife over the tests shows that (J. W. Tukey, Annals of
-Mathematical Statistics 29, 1958, 614). The larger deviation counts.
-
-Difference quotients of a drive that sticks and slips are right to a tenth. In directions in which
-two columns differ by less, the priors alone count. Otherwise the error of a difference quotient
-would separate a change of a number from the tolerance of the same number.
-"""
+"""Intervals of fitted values, by Laplace's approximation with a cluster-robust variance."""
 
 from __future__ import annotations
 

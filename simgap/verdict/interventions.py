@@ -1,12 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-What an intervention changes: the numbers of the named effects under each value of a label.
-
-For each label the named effects are fitted once more, with a size of their own under each value.
-The difference of two values has an interval of its own, because the sizes share the nuisances.
-Withholding by label says whether an effect learned under one value exists under another.
-"""
+"""What an intervention changes: the numbers of the named effects under each value of a label."""
 
 from __future__ import annotations
 

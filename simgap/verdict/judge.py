@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Judge effects on a test that is withheld from the fit of their numbers.
-
-Offsets within the tolerance are fitted to the withheld test, with the effect and without.
-"""
+"""Judge effects on a withheld test, to which offsets within the tolerance are fitted."""
 
 from __future__ import annotations
 

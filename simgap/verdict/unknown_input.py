@@ -1,17 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Where an unknown input acts: the part of the machine that a gap sits in, whatever its cause.
-
-An input of any course over time is let into each part in turn: a torque on a shaft, a voltage, a
-wrong reading. The responses of the machine, pulse by pulse, are fitted to what the nuisances leave
-of the gap. The part whose input explains the gap with the least effort is the likeliest. Pulses
-that are far enough apart share a run.
-
-The measure is the evidence (marginal likelihood) of a linear model whose inputs are random, with a
-variance chosen for each place (D. J. C. MacKay, Bayesian interpolation, Neural Computation 4,
-1992, Eq. 2.9 and 3.2). The nuisances, with their priors, are projected out.
-"""
+"""Where an unknown input acts: the part of the machine that a gap sits in, whatever its cause."""
 
 from __future__ import annotations
 

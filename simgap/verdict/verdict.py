@@ -1,15 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-From fitted hypotheses to probabilities, with 'unknown' and 'none' among the answers.
-
-A hypothesis is as probable as exp(-score / temperature); its score is half a chi-square with
-penalties. Such probabilities are right only as far as the models are. Differences of the cost are
-therefore divided by the inflation of the variance, as in QAIC (K. P. Burnham, D. R. Anderson,
-Model Selection and Multimodel Inference, 2nd edition, 2002, section 2.5), see
-`intervals.inflation`. The thresholds were set on trials with an independent machine. 'Unknown' is
-an absolute test of the residual that the best hypothesis leaves.
-"""
+"""From fitted hypotheses to probabilities, with 'unknown' and 'none' among the answers."""
 
 from __future__ import annotations
 

@@ -149,7 +149,8 @@ def test_the_page_begins_with_the_sentence_and_with_what_was_diagnosed(
     browser.open(path.as_uri())
     text = ' '.join(str(browser.tell('document.body.innerText')).replace('\xa0', ' ').split())
     beginning = (
-        'The motors rub 50 percent more. Probability 75 percent. Adding it removes 90 percent of the gap on data that was not fitted (80 to 95). '
+        'The motors rub 50 percent more. Probability 75 percent. Adding it removes 90 '
+        'percent of the gap on data that was not fitted (80 to 95). '
         'Something else acts beside that. Next: run this; look.')
     assert text.startswith(f'{beginning} verdict Partly explained machine {HOSTILE} recordings '
                            'a.csv (2026-01-02) made by it 1.0 ')
