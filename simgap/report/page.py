@@ -15,7 +15,7 @@ from simgap.machine.contract import Experiment, FloatArray
 from simgap.machine.diagram import Diagram, DiagramBlock
 from simgap.report.curves import Panel
 from simgap.verdict.record import share_text, value_lines, Verdict
-from simgap.verdict.sentence import said
+from simgap.verdict.sentence import headline, said
 
 # How many hypotheses are shown, and how probable each has to be.
 _SHOWN, _LEAST = 8, 0.001
@@ -55,6 +55,8 @@ class Contents:
 def contents(verdict: Verdict, facts: Mapping[str, str] = MappingProxyType({})) -> Contents:
     """Return what the page about a diagnosis says; `facts` say what was diagnosed, with what."""
     effects = verdict.machine.catalogue
+    what, sure, then = said(verdict)
+    title, stop, more = what.partition('. ')
     suspicion = dict.fromkeys((effect.component for effect in effects.values()), 0.0)
     for answer in verdict.which:
         for component in {effects[name].component for name in answer.effects if name in effects}:
@@ -68,7 +70,7 @@ def contents(verdict: Verdict, facts: Mapping[str, str] = MappingProxyType({})) 
     fraction = verdict.how_far['explained_fraction']
     explained = '' if fraction['value'] is None else share_text(fraction)
     return Contents(
-        *said(verdict), {'verdict': verdict.word.replace('_', ' ').capitalize(), **facts},
+        title + stop.rstrip(), f'{more} {sure}'.strip(), then, {'verdict': headline(verdict).capitalize(), **facts},
         explained, verdict.as_data(), diagram,
         [(block, min(shares.get(block.component, 0.0), 1.0)) for block in diagram.blocks],
         likely, _panels(verdict), _advice(verdict))

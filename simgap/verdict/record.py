@@ -13,7 +13,7 @@ from simgap.machine.contract import Machine
 from simgap.search.hypothesis import Hypothesis
 from simgap.verdict.interventions import lines as lines_of_labels
 from simgap.verdict.localisation import Located
-from simgap.verdict.sentence import loud, said
+from simgap.verdict.sentence import headline, loud, said
 from simgap.verdict.spoken import quantity
 from simgap.verdict.unknown_input import Place
 
@@ -79,7 +79,7 @@ class Verdict:
 
     def summary(self) -> str:
         """Return the verdict in a few lines."""
-        lines = [f'{self.word.replace("_", " ")}: {said(self)}']
+        lines = [f'{headline(self)}: {said(self)}']
         for answer in self.which[:3]:
             if answer.probability >= 0.01:
                 lines.append(f'  {100.0 * answer.probability:5.1f} %  '

@@ -47,6 +47,12 @@ def said(verdict: Verdict) -> Said:
                 f'Next: {"; ".join(then)}.' if then else '')
 
 
+def headline(verdict: Verdict) -> str:
+    """Return the verdict in two words, which do not contradict a remainder louder than noise."""
+    unsure = verdict.word == 'no_gap' and loud(verdict.remains)
+    return 'no effect named' if unsure else verdict.word.replace('_', ' ')
+
+
 def loud(remains: Mapping[str, Any]) -> list[str]:
     """Return the signals whose remainder matters, or exceeds noise where nobody said which do."""
     judged = {name: item for name, item in remains.items() if 'rms' in item}

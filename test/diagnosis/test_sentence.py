@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from simgap.machine.contract import Effect, Form, Parameter
 from simgap.verdict.record import Named
-from simgap.verdict.sentence import said
+from simgap.verdict.sentence import headline, said
 from simgap.verdict.spoken import number, percent
 
 GAP = Parameter('gearbox.backlash.gap', 'rad', 0.0, 1.0, 0.01)
@@ -68,6 +68,8 @@ def test_agreement_is_not_said_beside_a_remainder_that_is_louder_than_noise() ->
         'Machine and model agree within tolerance and noise.')
     found = str(said(verdict('no_gap', none, remains=LOUD)))
     assert 'agree' not in found
+    assert headline(verdict('no_gap', none, remains=LOUD)) == 'no effect named'
+    assert headline(verdict('no_gap', none)) == 'no gap'
     assert 'what remains of angle is 0.05 rad beyond noise of 0.01 rad' in found
     # what a user says does not matter is no reason to doubt
     asked = {'angle': {**LOUD['angle'], 'matters': False}}
