@@ -105,7 +105,7 @@ def earlier_of(path: Path | None) -> Sequence[Rival]:
 
 def facts(made_by: str, machine: str, configuration: str, paths: Sequence[str]) -> dict[str, str]:
     """Return what was diagnosed, when it was written, and with what, for the page."""
-    called = [Path(sys.argv[0]).name, *sys.argv[1:]]
+    called = [made_by.partition(' ')[0], *sys.argv[1:]]
     found = {'machine': machine, 'configuration': configuration, 'recordings': ', '.join(
         f'{Path(path).name} ({datetime.fromtimestamp(Path(path).stat().st_mtime):%Y-%m-%d})'
         for path in paths), 'made by': made_by,

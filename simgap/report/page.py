@@ -70,8 +70,9 @@ def contents(verdict: Verdict, facts: Mapping[str, str] = MappingProxyType({})) 
     fraction = verdict.how_far['explained_fraction']
     explained = '' if fraction['value'] is None else share_text(fraction)
     return Contents(
-        title + stop.rstrip(), f'{more} {sure}'.strip(), then, {'verdict': headline(verdict).capitalize(), **facts},
-        explained, verdict.as_data(), diagram,
+        title + stop.rstrip(), f'{more} {sure}'.strip(), then,
+        {'verdict': headline(verdict).capitalize(), **facts}, explained,
+        verdict.as_data(), diagram,
         [(block, min(shares.get(block.component, 0.0), 1.0)) for block in diagram.blocks],
         likely, _panels(verdict), _advice(verdict))
 
