@@ -80,15 +80,9 @@ def words(effects: Iterable[Effect], drive: Drive,
     """
     Return what people say of effects, by id.
 
-    Parameters
-    ----------
-    effects
-        of the catalogue
-    drive
-        the configuration, which knows units
-    record
-        of the drive in a test, shape (1,), which has the configured numbers
-
+    effects : of the catalogue
+    drive : the configuration, which knows units
+    record : of the drive in a test, shape (1,), which has the configured numbers
     """
     units = {path: entry.unit for path, entry, _ in values(drive)}
     found: dict[str, Words] = {}
