@@ -9,8 +9,7 @@ from typing import Any
 
 from antenna_drive.calibration.problem import CalibrationProblem
 from antenna_drive.parameters.loading import find
-from simgap.inputs.plain_yaml import read_yaml
-import yaml
+from simgap.inputs.plain_yaml import dump_yaml, read_yaml
 
 # Significant digits: more than any figure determines.
 _DIGITS = 7
@@ -35,8 +34,7 @@ def configuration(problem: CalibrationProblem, shares: Sequence[float], start: s
         body = dict(content.get(section) or {})
         body[entry] = {'value': numbers, 'unit': units[key], 'source': 'fitted'}
         content[section] = body
-    text: str = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=10_000)
-    return text
+    return dump_yaml(content, default_flow_style=None, width=10_000)
 
 
 def _rounded(value: float) -> float:

@@ -10,8 +10,8 @@ from typing import Any
 
 from antenna_drive.emulator.wiring import UNITS
 from simgap.errors import UserError
-from simgap.inputs.schema import nearest
-import yaml
+from simgap.inputs.plain_yaml import parse_yaml
+from simgap.inputs.schema import nearest, ParameterError
 
 
 def add_config_option(parser: argparse.ArgumentParser) -> None:
@@ -43,8 +43,8 @@ def parse_settings(settings: Sequence[str]) -> dict[str, dict[str, Any]]:
             raise UserError(f'--set {text}: {unit}: no such unit{nearest(unit, UNITS)}; '
                             f'allowed are {", ".join(UNITS)}')
         try:
-            given = yaml.safe_load(value)
-        except yaml.YAMLError as error:
+            given = parse_yaml(value)
+        except ParameterError as error:
             raise UserError(f'--set {text}: {value!r} is no value') from error
         # ROS 2 tells whole numbers from others, the drive's parameters are nearly all others
         whole = isinstance(given, int) and not isinstance(given, bool)

@@ -23,10 +23,10 @@ from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.records import place_of, record_of
 from antenna_drive.parameters.sets import changed, Drive, values
 import numpy as np
+from simgap.inputs.plain_yaml import dump_yaml
 from simgap.inputs.schema import Entry
 from simgap.machine.contract import FloatArray
 from simgap.search.hypothesis import Hypothesis
-import yaml
 
 _SHARE = 'torque_share.circuit'
 _POT = f'{_SHARE}.bias_pot'
@@ -212,5 +212,4 @@ def _file(lines: dict[str, list[tuple[str, str, Any]]], hypothesis: Hypothesis) 
 def _plain(value: Any) -> str:
     """Return a value as YAML has it: with a point in each number that is not whole."""
     listed = list(value) if isinstance(value, tuple) else value
-    text: str = yaml.safe_dump([listed], default_flow_style=True, width=10 ** 6)
-    return text.strip()[1:-1]
+    return dump_yaml([listed], default_flow_style=True, width=10 ** 6).strip()[1:-1]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from antenna_drive.recording.bag import MESSAGE_HASH, MESSAGE_TYPE, ROSBAG2_VERSION
-import yaml
+from simgap.inputs.plain_yaml import dump_yaml
 
 
 @dataclass
@@ -47,12 +47,11 @@ def description(signals: Iterable[str], files: Sequence[StorageFile]) -> str:
             'offered_qos_profiles': '', 'type_description_hash': MESSAGE_HASH},
          'message_count': number}
         for name, number in zip(signals, whole.counts, strict=True)]
-    text: str = yaml.safe_dump({'rosbag2_bagfile_information': {
+    return dump_yaml({'rosbag2_bagfile_information': {
         'version': ROSBAG2_VERSION, 'storage_identifier': 'mcap',
         **whole.span(),
         'topics_with_message_count': topics,
         'compression_format': '', 'compression_mode': '',
         'relative_file_paths': [file.name for file in files],
         'files': [{'path': file.name, **file.span()} for file in files],
-        'custom_data': {}, 'ros_distro': 'unknown'}}, sort_keys=False)
-    return text
+        'custom_data': {}, 'ros_distro': 'unknown'}})

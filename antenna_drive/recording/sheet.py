@@ -21,9 +21,8 @@ from antenna_drive.parameters.waveforms import KNOTS_LIMIT, SINES_LIMIT
 from antenna_drive.readings import not_negative, SENSORS, SheetNumber
 from simgap.errors import one_line
 from simgap.inputs.labels import parse_labels, plain_value
-from simgap.inputs.plain_yaml import read_yaml
+from simgap.inputs.plain_yaml import dump_yaml, read_yaml
 from simgap.inputs.schema import Entry, mapping_of, ParameterError
-import yaml
 
 FILE_NAME = 'test_sheet.yaml'
 
@@ -276,8 +275,7 @@ def sheet_tree(sheet: Any) -> dict[str, Any]:
 
 def dump_sheet(sheet: TestSheet) -> str:
     """Return a test sheet as YAML."""
-    text: str = yaml.safe_dump(sheet_tree(sheet), sort_keys=False, default_flow_style=None)
-    return text
+    return dump_yaml(sheet_tree(sheet), default_flow_style=None)
 
 
 def load_sheet(path: Path) -> TestSheet:

@@ -4,19 +4,23 @@
 YAML files that people write: read as plain data, and refused where YAML would guess.
 
 PyYAML keeps the last of two equal keys, and an alias can make a small file a huge one; both are
-refused here, as are files that are no text or too long to be meant.
+refused here, as are files that are no text or too long to be meant. It also takes 8.74e6 and 1e3
+for texts, as YAML 1.1 does; here they are numbers, as in YAML 1.2 and in Python.
 """
 
 from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+import re
 from typing import Any
 
 from simgap.errors import one_line
 from simgap.inputs.schema import ParameterError
 
 LONGEST_FILE = 1_000_000  # bytes; a test sheet has some hundred
+_NUMBER = re.compile(r'[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$', re.ASCII)
+_IS_NUMBER = ('tag:yaml.org,2002:float', _NUMBER, list('-+.0123456789'))
 
 
 @cache
@@ -45,7 +49,26 @@ def _loader() -> Any:
                 seen.add(key.value)
             return super().construct_mapping(node, deep=deep)
 
+    Loader.add_implicit_resolver(*_IS_NUMBER)  # type: ignore[no-untyped-call]
     return Loader
+
+
+@cache
+def _dumper() -> Any:
+    import yaml
+
+    class Dumper(yaml.SafeDumper):
+        """Quotes a text that looks like a number here."""
+
+    Dumper.add_implicit_resolver(*_IS_NUMBER)  # type: ignore[no-untyped-call]
+    return Dumper
+
+
+def dump_yaml(tree: object, **options: Any) -> str:
+    """Write plain data, in the order given, so that `parse_yaml` reads the same."""
+    import yaml
+    text: str = yaml.dump(tree, Dumper=_dumper(), sort_keys=False, **options)
+    return text
 
 
 def parse_yaml(text: str | bytes) -> Any:

@@ -31,6 +31,16 @@ def test_a_plain_file_keeps_its_columns_and_its_gaps(tmp_path: Path) -> None:
     assert log['y'].tolist() == [2.0, 3.0, 4.0]
 
 
+def test_maps_and_sheets_take_numbers_as_people_write_them(tmp_path: Path) -> None:
+    (tmp_path / 'm.yaml').write_text('time: {column: t, offset_s: 1e0}\n'
+                                     'signals: {angle: {column: x, unit: rad, scale: 5E-1}}\n')
+    (tmp_path / 'a.csv').write_text('t,x\n0,1\n1,2\n')
+    (tmp_path / 'a.yaml').write_text('constants: {mass: 8.74e6}\n')
+    [log] = read_logs([tmp_path / 'a.csv'], tmp_path / 'm.yaml')
+    assert log.time.tolist() == [1.0, 2.0] and log['angle'].tolist() == [0.5, 1.0]
+    assert log.constants == {'mass': 8.74e6}
+
+
 @pytest.mark.parametrize('suffix', ['.npz', '.mat'])
 def test_named_arrays_are_columns(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f'a{suffix}'
