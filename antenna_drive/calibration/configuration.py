@@ -9,7 +9,8 @@ from typing import Any
 
 from antenna_drive.calibration.problem import CalibrationProblem
 from antenna_drive.parameters.loading import find
-from simgap.inputs.plain_yaml import dump_yaml, read_yaml
+from antenna_drive.yaml_text import dump_yaml
+from simgap.inputs.plain_yaml import read_yaml
 
 # Significant digits: more than any figure determines.
 _DIGITS = 7

@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Diagnose, and write what was asked for; 0 whatever the verdict."""
+    """Diagnose, and write what was asked for; 0 whatever the verdict, 1 for too few samples."""
     check_options(arguments, jobs=Entry('', 1, whole=True))
     give_back_large_arrays()
     if arguments.model:
@@ -108,4 +108,4 @@ def run(arguments: argparse.Namespace) -> int:
                if correction.recorder else ''))
     give({**diagnosis.as_data(), 'recorder': list(correction.recorder)}, arguments.json,
          '\n'.join(lines))
-    return 0
+    return diagnosis.exit_code

@@ -21,7 +21,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from antenna_drive.cli.reading import add_recording_options, read
+from antenna_drive.cli.reading import add_recording_options, read, refuse_none
 from antenna_drive.recording.amperes import with_real_amperes
 from antenna_drive.recording.csv_format import write_csv
 from antenna_drive.recording.panels import chosen
@@ -48,6 +48,8 @@ def run(args: argparse.Namespace) -> int:
         raise UserError('--real-amperes: does not go with --field, whose columns are fixed')
     recording = read(args)
     names = chosen(recording, args.signals) if args.signals else None
+    if names:
+        refuse_none(', '.join(names), (recording[name] for name in names))
     if args.real_amperes:
         recording, names = with_real_amperes(recording, names or recording.names), None
     for path in write_csv(recording, args.out, field=args.field, names=names):

@@ -25,6 +25,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from antenna_drive.cli.reading import refuse_none
 from antenna_drive.recording.bag_writer import write_bag
 from antenna_drive.recording.csv_format import read_csv
 from antenna_drive.recording.import_map import import_file, load_map
@@ -47,6 +48,7 @@ def run(args: argparse.Namespace) -> int:
     with warnings_in_one_line():
         recording = (import_file(args.csv, load_map(args.map)) if args.map
                      else read_csv(args.csv))
+    refuse_none(args.csv, recording.channels.values())
     write_bag(recording, args.bag)
     for name, channel in recording.channels.items():
         print(f'{name} [{channel.unit}]: {len(channel)} samples')

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 import math
 from pathlib import Path
 
@@ -12,6 +13,8 @@ from antenna_drive.recording.bam import read_bam
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.recording import Recording
 from simgap.command.output import warnings_in_one_line
+from simgap.errors import UserError
+from simgap.logs.channel import Channel
 
 
 def add_recording_options(parser: argparse.ArgumentParser, span: bool = True) -> None:
@@ -27,6 +30,13 @@ def add_recording_options(parser: argparse.ArgumentParser, span: bool = True) ->
                             help='leave out this time [s] and what came after')
 
 
+def refuse_none(name: object, channels: Iterable[Channel]) -> None:
+    """Raise UserError if there is no sample to go on with."""
+    if not any(map(len, channels)):
+        raise UserError(f'{name}: no sample to draw or to write; take a recording with at least '
+                        'one row, and --from and --to, if they are given, within it')
+
+
 def read(args: argparse.Namespace) -> Recording:
     """Read the recording that the options name; UserError says what is wrong with it."""
     with warnings_in_one_line():
@@ -35,4 +45,5 @@ def read(args: argparse.Namespace) -> Recording:
                      else read_recording(args.recording, partial=args.partial))
     if 'start' in args and (args.start > -math.inf or args.end < math.inf):
         recording = recording.between(args.start, args.end)
+    refuse_none(args.recording, recording.channels.values())
     return recording

@@ -22,8 +22,8 @@ from antenna_drive.diagnosis.modifiers import (
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.records import place_of, record_of
 from antenna_drive.parameters.sets import changed, Drive, values
+from antenna_drive.yaml_text import dump_yaml
 import numpy as np
-from simgap.inputs.plain_yaml import dump_yaml
 from simgap.inputs.schema import Entry
 from simgap.machine.contract import FloatArray
 from simgap.search.hypothesis import Hypothesis

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from antenna_drive.recording.bag import MESSAGE_HASH, MESSAGE_TYPE, ROSBAG2_VERSION
-from simgap.inputs.plain_yaml import dump_yaml
+from antenna_drive.yaml_text import dump_yaml
 
 
 @dataclass

@@ -19,9 +19,10 @@ from typing import Any, ClassVar, get_args, get_type_hints
 
 from antenna_drive.parameters.waveforms import KNOTS_LIMIT, SINES_LIMIT
 from antenna_drive.readings import not_negative, SENSORS, SheetNumber
+from antenna_drive.yaml_text import dump_yaml
 from simgap.errors import one_line
 from simgap.inputs.labels import parse_labels, plain_value
-from simgap.inputs.plain_yaml import dump_yaml, read_yaml
+from simgap.inputs.plain_yaml import read_yaml
 from simgap.inputs.schema import Entry, mapping_of, ParameterError
 
 FILE_NAME = 'test_sheet.yaml'

@@ -95,7 +95,7 @@ def diagnosed(name: str, paths: Sequence[str], arguments: argparse.Namespace) ->
             dict(numbers_of('--matters', arguments.matters)), earlier)
     write_report(arguments.report, verdict, facts(f'simgap {__version__}', name, '', paths))
     give(verdict.as_data(), arguments.json, verdict.summary())
-    return 0
+    return verdict.exit_code
 
 
 def earlier_of(path: Path | None) -> Sequence[Rival]:

@@ -82,7 +82,7 @@ def estimated(residuals: Sequence[FloatArray], interval_s: float, slow_limit: fl
         energy = [whitened(z, Colour(pole, gain, 1.0)) for z in clipped]
         return float(np.nanmean(np.concatenate(energy) ** 2))
 
-    white = power(0.0, 0.0)
+    white = max(power(0.0, 0.0), 1e-12)
     poles = [math.exp(-2.0 * math.pi * corner * interval_s) for corner in _CORNERS_HZ]
     best, pole, gain = min((power(pole, gain), pole, gain) for pole in poles for gain in _GAINS)
     if 0.5 * sizes.size * math.log(white / max(best, 1e-12)) < settings.worth_a_colour:

@@ -19,8 +19,8 @@ from simgap.errors import one_line
 from simgap.inputs.schema import ParameterError
 
 LONGEST_FILE = 1_000_000  # bytes; a test sheet has some hundred
-_NUMBER = re.compile(r'[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$', re.ASCII)
-_IS_NUMBER = ('tag:yaml.org,2002:float', _NUMBER, list('-+.0123456789'))
+IS_NUMBER = ('tag:yaml.org,2002:float', re.compile(
+    r'[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$', re.ASCII), list('-+.0123456789'))
 
 
 @cache
@@ -49,26 +49,8 @@ def _loader() -> Any:
                 seen.add(key.value)
             return super().construct_mapping(node, deep=deep)
 
-    Loader.add_implicit_resolver(*_IS_NUMBER)  # type: ignore[no-untyped-call]
+    Loader.add_implicit_resolver(*IS_NUMBER)  # type: ignore[no-untyped-call]
     return Loader
-
-
-@cache
-def _dumper() -> Any:
-    import yaml
-
-    class Dumper(yaml.SafeDumper):
-        """Quotes a text that looks like a number here."""
-
-    Dumper.add_implicit_resolver(*_IS_NUMBER)  # type: ignore[no-untyped-call]
-    return Dumper
-
-
-def dump_yaml(tree: object, **options: Any) -> str:
-    """Write plain data, in the order given, so that `parse_yaml` reads the same."""
-    import yaml
-    text: str = yaml.dump(tree, Dumper=_dumper(), sort_keys=False, **options)
-    return text
 
 
 def parse_yaml(text: str | bytes) -> Any:

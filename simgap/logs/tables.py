@@ -81,8 +81,6 @@ def open_table(path: Path, layout: Layout = Layout()) -> Iterator[Table]:
         raise RecordingError(told if told.startswith(f'{path}') else f'{path}: {told}') from None
 
 
-# -- text ----------------------------------------------------------------------------------------
-
 def _text_table(path: Path, stream: Any, layout: Layout) -> Table:
     try:
         for _ in range(layout.skip_lines):
@@ -111,8 +109,6 @@ def _text_rows(path: Path, stream: Any, layout: Layout) -> Iterator[tuple[int, l
                                  f'the {what} has {count}')
         yield line + layout.skip_lines, row
 
-
-# -- arrays --------------------------------------------------------------------------------------
 
 def _arrays(columns: Mapping[str, Any], names: Sequence[str] | None = None) -> Table:
     """Return arrays as a table: vectors are columns, shape (n, k) is a column of vectors."""
@@ -184,8 +180,6 @@ def _mat(path: Path) -> Table:
     return _arrays(read_mat(path))
 
 
-# -- JSON ----------------------------------------------------------------------------------------
-
 def _json(path: Path) -> Table:
     tree = from_json(read_text(path))
     if isinstance(tree, dict):
@@ -235,8 +229,6 @@ def _records(items: Iterator[tuple[int, Any]], counted: str) -> Table:
     return Table(names, cells(), counted=counted)
 
 
-# -- Parquet -------------------------------------------------------------------------------------
-
 def _parquet(path: Path) -> Table:
     try:
         import pyarrow
@@ -267,8 +259,6 @@ def _parquet_rows(file: Any, pyarrow: Any) -> Iterator[tuple[int, Sequence[Text]
     except pyarrow.ArrowException as error:
         raise RecordingError(f'after row {first - 1}: no Parquet, {one_line(error)}') from None
 
-
-# -- cells ---------------------------------------------------------------------------------------
 
 def _cell(value: Any) -> Text:
     """Return a value of a file as a cell: a vector if it is a list."""

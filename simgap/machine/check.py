@@ -13,7 +13,9 @@ from simgap.machine.effect import Effect, Form, Parameter
 from simgap.machine.experiment import Experiment
 from simgap.machine.machine import Machine
 
+AT_REST = ': at rest, nothing moves; record a test in which the machine moves'
 _RESERVED = ('none', 'unknown')
+_SCATTER = 1.5  # of a reading, as a multiple of its noise, from which it shows a motion
 
 
 class MachineError(UserError):
@@ -41,6 +43,30 @@ def check_machine(machine: Machine) -> None:
     predicted = machine.simulate([{}])[0]
     for experiment, readings in zip(machine.experiments, predicted, strict=True):
         _check_readings(experiment, readings)
+
+
+def check_tests(machine: Machine) -> None:
+    """Refuse tests that tell nothing, too short or at rest; UserError says what to record."""
+    names = ', '.join(item.name for item in machine.experiments)
+    longest = max(float(np.ptp(item.time)) for item in machine.experiments)
+    needed = machine.time_scales.start_s
+    if longest < needed:
+        raise UserError(f'{names}: {longest:.3g} s were recorded, and the machine takes '
+                        f'{needed:.3g} s to settle; record a longer test')
+    if not any(moves(item, item.measured, _SCATTER) or moves(item, readings, 0.1 * _SCATTER)
+               for item, readings in zip(machine.experiments, machine.simulate([{}])[0],
+                                         strict=True)):
+        raise UserError(names + AT_REST)
+
+
+def moves(experiment: Experiment, readings: np.ndarray | None,  # type: ignore[type-arg]
+          scatter: float = _SCATTER, since_s: float = 0.0) -> bool:
+    """Return whether a reading scatters by more than so much of its noise, from a time on [s]."""
+    late = experiment.time >= experiment.time[0] + since_s
+    assert readings is not None
+    return any(np.std(values[there]) > scatter * np.mean(noise[there])
+               for values, noise in zip(readings[late].T, experiment.noise[late].T, strict=True)
+               if (there := np.isfinite(values)).any())
 
 
 def idle_effects(machine: Machine) -> Iterator[str]:

@@ -69,8 +69,6 @@ class Machine(ABC):
         self.nuisances = nuisances if isinstance(nuisances, Nuisances) else Nuisances(nuisances)
         self.catalogue = effects if isinstance(effects, Catalogue) else Catalogue(effects)
 
-    # -- what a machine must give --------------------------------------------------------------
-
     @abstractmethod
     def predict(self, point: Point, experiment: int) -> FloatArray:
         """
@@ -78,8 +76,6 @@ class Machine(ABC):
 
         `point` has values by name. Others are zero; shape parameters not named do nothing.
         """
-
-    # -- what it may override for speed --------------------------------------------------------
 
     def simulate(self, points: Sequence[Point], only: Sequence[int | None] | None = None,
                  until: float = math.inf) -> list[list[FloatArray | None]]:
@@ -108,8 +104,6 @@ class Machine(ABC):
     def low_fidelity(self) -> Machine:
         """Return a faster machine with nearly the same readings, for derivatives."""
         return self
-
-    # -- what it may know better ---------------------------------------------------------------
 
     @property
     def time_scales(self) -> TimeScales:

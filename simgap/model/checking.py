@@ -12,7 +12,7 @@ import time
 import numpy as np
 from simgap.errors import UserError
 from simgap.logs.log import Log, OneTest
-from simgap.machine.check import check_machine, idle_effects
+from simgap.machine.check import check_machine, check_tests, idle_effects
 from simgap.machine.contract import FloatArray, Parameter
 from simgap.model.declared import Model
 from simgap.model.machine import OwnMachine
@@ -48,6 +48,7 @@ def check_model(model: Model, logs: Sequence[Log]) -> Checked:
         before = [{name: log[name].copy() for name in log.columns} for log in machine.logs]
         began = time.monotonic()
         check_machine(machine)
+        check_tests(machine)
         compiling_s = time.monotonic() - began
         faults = [*_unknown_numbers(machine), *_changed_inputs(machine, before),
                   *_differs_in_itself(machine)]

@@ -19,6 +19,7 @@ from simgap.fit.least_squares import LeastSquares
 from simgap.inputs.schema import nearest
 from simgap.logs.log import Log
 from simgap.machine.by_label import ByLabel, without_labels
+from simgap.machine.check import check_tests
 from simgap.machine.contract import Machine, Point
 from simgap.model.declared import Model
 from simgap.model.machine import OwnMachine
@@ -66,6 +67,7 @@ def diagnose_logs(model: Model, logs: Sequence[Log],
     earlier : answers of a verdict on some of the logs, see `diagnosis.diagnose`
     """
     machine = OwnMachine(model, logs)
+    check_tests(machine)
     for effect in without:
         if effect not in machine.catalogue:
             raise UserError(f'{effect}: no such effect{nearest(effect, machine.catalogue)}; there '

@@ -52,8 +52,6 @@ class OwnMachine(Machine):
         self.advice = tuple(((), text) for text in model.advice)
         self.diagram = _diagram(model)
 
-    # -- numbers -------------------------------------------------------------------------------
-
     def numbers(self, point: Point, experiment: int) -> Numbers:
         """Return the numbers of the simulation in one test at a point of the diagnosis."""
         values = dict(self._values)
@@ -87,8 +85,6 @@ class OwnMachine(Machine):
                 found += [_error_of_reading(f'zero of {name}[{log.name}]', item.unit, item.zero,
                                             k) for k, log in enumerate(self.logs)]
         return found
-
-    # -- readings ------------------------------------------------------------------------------
 
     def predict(self, point: Point, experiment: int) -> FloatArray:
         return self.pushed(point, experiment, {})
@@ -149,8 +145,6 @@ class OwnMachine(Machine):
             raise ModelError(f'simulate({test.name}): {_place(error)}{type(error).__name__}: '
                              f'{error}') from error
         return _checked(found, self.model.readings, test)
-
-    # -- what the machine knows better ---------------------------------------------------------
 
     @property
     def time_scales(self) -> TimeScales:

@@ -189,8 +189,6 @@ def _simulator(program: str, path: Path, ports: Ports) -> Simulator:
     return FmuModel(path, ports)
 
 
-# -- numbers -----------------------------------------------------------------------------------
-
 def _number_bodies(top: Mapping[str, Any]) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
     """Yield key, name and body of every number of the file."""
     allowed = (*_KINDS, *_OF_NUMBER, *_ACTS)
@@ -294,8 +292,6 @@ def _kind(key: str, body: Mapping[str, Any], allowed: Collection[str]) -> str:
     return kinds[0]
 
 
-# -- readings and pushes -----------------------------------------------------------------------
-
 def _reading(key: str, body: Mapping[str, Any]) -> Reading:
     if 'noise' not in body and 'digit' not in body:
         raise ModelError(f'{key}: noise: none is given; what would a perfect model leave?')
@@ -310,8 +306,6 @@ def _push(key: str, name: str, body: Mapping[str, Any]) -> Push:
                 _text(f'{key}.label', body.get('label', name)), _unit(key, body),
                 _number(f'{key}.size', body.get('size'), _POSITIVE))
 
-
-# -- plain data --------------------------------------------------------------------------------
 
 def _fields(kind: type) -> tuple[str, ...]:
     return tuple(kind.__dataclass_fields__)  # type: ignore[attr-defined]

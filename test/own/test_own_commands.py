@@ -16,6 +16,8 @@ import simgap.cli
 MODEL = 'from own.swing import swing\nmachine = swing()\n'
 DEAF = ('from own.swing import simulate, swing\n'
         'machine = swing(simulate=lambda n, t: {"angle": t.time, "rate": t.time})\n')
+HANGING = ('from own.swing import known, swing\n'
+           'machine = swing(per_test={"start": known(0.0, "rad")})\n')
 
 
 @pytest.fixture
@@ -23,6 +25,7 @@ def folder(tmp_path: Path) -> Path:
     """Return a folder with a model and two logs of a swing whose sensor drifts."""
     (tmp_path / 'model.py').write_text(MODEL)
     (tmp_path / 'deaf.py').write_text(DEAF)
+    (tmp_path / 'hanging.py').write_text(HANGING)
     for name, start, seed in (('far', 1.0, 1), ('near', 0.4, 2)):
         log = log_of(name, start, seed, {'drift': 0.01})
         names = ['turn', 'angle', 'rate']
@@ -80,6 +83,35 @@ def test_options_that_do_not_go_together(options: list[str], message: str,
                                          capsys: pytest.CaptureFixture[str]) -> None:
     assert main(['diagnose', *options]) == 2
     assert message in capsys.readouterr().err
+
+
+def wrong_logs(folder: Path) -> dict[str, str]:
+    """Write logs that tell nothing; return what is said of each."""
+    head, *lines = (folder / 'far.csv').read_text().splitlines(keepends=True)
+    times = [line.partition(',')[0] for line in lines]
+    noise = np.random.default_rng(1).normal(size=(len(times), 2))
+    texts = {
+        'none': head, 'one': head + lines[0], 'brief': ''.join([head, *lines[:4]]),
+        'still': head + ''.join(f'{time},0,0,0\n' for time in times),
+        'quiet': head + ''.join(f'{time},0,{1e-3 * angle:.9f},{1e-3 * rate:.9f}\n'
+                                for time, (angle, rate) in zip(times, noise, strict=True))}
+    for name, text in texts.items():
+        (folder / f'{name}.csv').write_text(text)
+    needed = 'two or more increasing times are needed'
+    return {'none': needed, 'one': needed, 'brief': 'record a longer test',
+            'still': 'at rest, nothing moves', 'quiet': 'at rest, nothing moves'}
+
+
+@pytest.mark.parametrize('name', ['none', 'one', 'brief', 'still', 'quiet'])
+def test_a_log_that_tells_nothing_is_refused(name: str, folder: Path,
+                                             capsys: pytest.CaptureFixture[str]) -> None:
+    said = wrong_logs(folder)[name]
+    model, log = f'{folder}/hanging.py', f'{folder}/{name}.csv'
+    for program, words in ((simgap.cli.main, ['diagnose']), (simgap.cli.main, ['check']),
+                           (main, ['diagnose', '--model']), (main, ['check-model'])):
+        assert program([*words, model, log]) > 0
+        out, err = capsys.readouterr()
+        assert said in out + err and len((out + err).splitlines()) <= 2
 
 
 def test_check_model_says_yes_or_what_is_wrong(folder: Path,

@@ -11,10 +11,11 @@ from antenna_drive.parameters import load, ParameterError
 from antenna_drive.parameters.loading import find
 from antenna_drive.parameters.records import place_of, record_of
 from antenna_drive.parameters.sets import values
+from antenna_drive.yaml_text import dump_yaml
 from hypothesis import given, HealthCheck, settings, strategies as st
 import numpy as np
 import pytest
-from simgap.inputs.plain_yaml import dump_yaml, parse_yaml
+from simgap.inputs.plain_yaml import parse_yaml
 import yaml
 
 

@@ -69,6 +69,35 @@ def test_a_csv_of_others_comes_in_through_a_map(bag: Path,
         [math.pi / 2, -math.pi / 2])
 
 
+def test_zero_samples_are_never_a_success(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['export', 'run', 'field.csv', '--field']) == 0
+    head = Path('field.csv').read_text().splitlines(keepends=True)[0]
+    Path('none.csv').write_text(head)
+    Path('map.yaml').write_text('time: {column: time_s}\n'
+                                'signals: {plant/encoder: {column: encoder_rad}}\n')
+    capsys.readouterr()
+    for words in (['import', 'none.csv', 'new'],
+                  ['import', 'none.csv', 'new', '--map', 'map.yaml'],
+                  ['export', 'none.csv', 'new'], ['export', 'run', 'new', '--from', '99'],
+                  ['plot', 'run', '--out', 'new.png', '--from', '99'],
+                  ['report', 'run', '-o', 'new', '--from', '99'], ['diagnose', 'none.csv']):
+        assert main(words) == 2, words
+        out, err = capsys.readouterr()
+        assert not out and len(err.splitlines()) == 1 and ' no ' in err
+        assert not list(Path().glob('new*'))
+
+
+@pytest.mark.parametrize(('seconds', 'said'), [
+    (0.05, 'record a longer test'), (3.0, 'at rest, nothing moves')])
+def test_a_recording_that_tells_nothing_is_not_diagnosed(
+        seconds: float, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['run', '--duration', f'{seconds}', '--out', f'{tmp_path}/a']) == 0
+    capsys.readouterr()
+    assert main(['diagnose', f'{tmp_path}/a']) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith('antenna-drive diagnose: a: ') and said in line
+
+
 @pytest.mark.parametrize(('arguments', 'words'), [
     (['export', 'none', 'a.csv'], 'none: no such file or folder'),
     (['export', 'run', 'run/a/b.csv'], 'cannot be written, No such file or directory'),
