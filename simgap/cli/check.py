@@ -8,8 +8,6 @@ numbers that nobody asks for, effects that do nothing, bounds without the neutra
 simulation that is not the same twice, and derivatives that are noise. docs/own-machine.md leads to
 a first model.
 
-For example:
-
   simgap check my_machine.py:machine logs/*.csv
   simgap check my_machine.py logs/*.csv --map map.yaml
   simgap check my_machine.yaml logs/*.csv

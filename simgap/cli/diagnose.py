@@ -6,8 +6,6 @@ Say where a machine and its model part, which effect is behind it, and how far t
 Give a model and the logs of some tests of one machine. The more different the tests, the surer the
 verdict.
 
-For example:
-
   simgap diagnose my_machine.py:machine logs/*.csv
   simgap diagnose my_machine.yaml logs/*.csv --map map.yaml --json verdict.json --report page.html
   simgap diagnose my_machine.py logs/*.csv more.csv --after verdict.json
@@ -95,7 +93,7 @@ def diagnosed(name: str, paths: Sequence[str], arguments: argparse.Namespace) ->
             dict(numbers_of('--matters', arguments.matters)), earlier)
     write_report(arguments.report, verdict, facts(f'simgap {__version__}', name, '', paths))
     give(verdict.as_data(), arguments.json, verdict.summary())
-    return verdict.exit_code
+    return int(verdict.word == 'too_few_to_judge')
 
 
 def earlier_of(path: Path | None) -> Sequence[Rival]:

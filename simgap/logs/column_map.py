@@ -35,7 +35,8 @@ COUNTS = 'counts'
 TIME_UNITS = {'s': NANOSECONDS, 'ms': 1_000_000, 'us': 1_000, 'ns': 1}
 ISO_8601 = 'iso8601'
 _TEXT_ENTRIES = ('delimiter', 'decimal', 'comment', 'encoding')
-_TOP = (*_TEXT_ENTRIES, 'skip_lines', 'header', 'time', 'signals')
+_TOP = (*_TEXT_ENTRIES, 'skip_lines', 'header', 'units_row', 'missing', 'time',
+        'signals')
 _TIME = ('column', 'unit', 'offset_s', 'origin', 'duplicates')
 _NUMBERS = {
     'scale': Entry('1', -1e12, 1e12), 'offset': Entry(''),
@@ -124,7 +125,7 @@ def parse_map(tree: object, known: KnownSignals = NO_SIGNALS) -> ImportMap:
             raise ParameterError(f'{key}: {quoted(texts[key])} given, allowed is one of '
                                  + ' '.join(repr(c) for c in allowed))
     if texts.get('decimal', '.') == texts.get('delimiter', ','):
-        raise ParameterError('decimal: the same as the delimiter')
+        raise ParameterError("decimal: the same as the delimiter; give delimiter: ';'")
     try:
         ''.encode(texts.get('encoding', 'utf-8'))
     except (LookupError, ValueError, UnicodeError):
@@ -133,10 +134,15 @@ def parse_map(tree: object, known: KnownSignals = NO_SIGNALS) -> ImportMap:
                              'knows, such as utf-8 or latin-1') from None
     skip = int(_SKIP_LINES.check('skip_lines', plain_value(  # type: ignore[arg-type]
         top.get('skip_lines', 0))))
-    header = top.get('header', True)
-    if not isinstance(header, bool):
-        raise ParameterError(f'header: {quoted(plain_value(header))} given, allowed is true or '
-                             'false')
+    rows = {'header': top.get('header', True), 'units_row': top.get('units_row', False)}
+    for key, value in rows.items():
+        if not isinstance(value, bool):
+            raise ParameterError(f'{key}: {quoted(plain_value(value))} given, allowed is true or '
+                                 'false')
+    missing = top.get('missing', [])
+    if not isinstance(missing, list) or not all(isinstance(text, str) for text in missing):
+        raise ParameterError(f'missing: {quoted(plain_value(missing))} given, allowed is a list '
+                             'of texts in quotes')
     signals = {}
     own = mapping_of('signals', top.get('signals'))
     for name, body in own.items():
@@ -147,7 +153,8 @@ def parse_map(tree: object, known: KnownSignals = NO_SIGNALS) -> ImportMap:
     if not signals:
         raise ParameterError('signals: none is given')
     return ImportMap(_time(top.get('time')), signals,
-                     Layout(**texts, skip_lines=skip, header=header), top)
+                     Layout(**texts, **rows,  # type: ignore[arg-type]
+                            skip_lines=skip, missing=tuple(missing)), top)
 
 
 def _text(key: str, value: object, choices: tuple[str, ...] | None = None) -> str:
@@ -219,7 +226,8 @@ def _signal(key: str, name: str, body: object, known: KnownSignals) -> SignalMap
         _expression(key, entries), si, factor,
         float(sign) * numbers.get('scale', 1.0), numbers.get('offset', 0.0),
         None if own_time is None else _column(f'{key}.time_column', own_time),
-        nanoseconds(numbers.get('clock_offset_s', 0.0)), _sign_bit(key, entries))
+        nanoseconds(numbers.get('clock_offset_s', 0.0)),
+        (1 << (_whole(key, 'sign_magnitude_bits', entries) or 0)) >> 1)
 
 
 def _expression(key: str, entries: Mapping[str, Any]) -> Expression:
@@ -244,8 +252,3 @@ def _whole(key: str, entry: str, entries: Mapping[str, Any]) -> int | None:
         return None
     return int(_WHOLE_NUMBERS[entry].check(  # type: ignore[arg-type]
         f'{key}.{entry}', plain_value(entries[entry])))
-
-
-def _sign_bit(key: str, entries: Mapping[str, Any]) -> int:
-    bits = _whole(key, 'sign_magnitude_bits', entries)
-    return 0 if bits is None else 1 << (bits - 1)

@@ -90,7 +90,7 @@ class _Samples:
         signal = self._signal
         numbers = []
         for reference, place in self._places:
-            cell = self._cell(line, reference)
+            cell = Cell(self._path, line, str(reference), self._counted)
             text = _element(row[place], reference, cell, self._decimal)
             if not text:
                 return
@@ -107,9 +107,6 @@ class _Samples:
         _append(self.stamps, self.values, stamp + signal.clock_offset_ns, value, cell,
                 self._duplicates)
 
-    def _cell(self, line: int, reference: Reference) -> Cell:
-        return Cell(self._path, line, str(reference), self._counted)
-
 
 def _element(given: Text, reference: Reference, cell: Cell, decimal: str) -> str:
     """Return the text of a number: the cell's, or that of one number of its vector."""
@@ -123,6 +120,9 @@ def _element(given: Text, reference: Reference, cell: Cell, decimal: str) -> str
             return ''
         if text[0] + text[-1] not in ('[]', '()'):
             raise cell.refuse(f'{one_line(repr(text), 40)} is no vector; [0.1, 0.2] is one')
+        if decimal == '.' and ',' in text and ';' in text:
+            raise cell.refuse(f"{one_line(repr(text), 40)} has ',' and ';'; decimal: ',' in the "
+                              'map reads a decimal comma')
         between = _BETWEEN if decimal == '.' else _BETWEEN_DECIMAL_COMMAS
         given = between.split(text[1:-1].strip())
     if reference.index >= len(given):

@@ -40,12 +40,14 @@ _DAMAGE = (ValueError, TypeError, BadZipFile, EOFError, zlib.error, ArithmeticEr
 class Layout:
     """How text is laid out; other kinds of files need no such help."""
 
-    delimiter: str = ','  # between cells
+    delimiter: str = ''  # between cells; '' for the one that the header has
     decimal: str = '.'  # in numbers
     comment: str = ''  # rows that begin with it are left out; '' for none
     encoding: str = 'utf-8-sig'
     skip_lines: int = 0  # lines before the header
     header: bool = True  # False if the columns have no names
+    units_row: bool = False  # whether a row behind the header is left out
+    missing: tuple[str, ...] = ()  # cells that hold no sample, such as NaN
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,8 @@ def _text_table(path: Path, stream: Any, layout: Layout) -> Table:
     table = _text_rows(path, stream, layout)
     line, first = next(table, (layout.skip_lines + 1, []))
     start = f'line {line}: '
+    if layout.units_row:
+        next(table, None)
     if layout.header:
         return Table([cell.strip() for cell in first], table, start, 'line', is_text=True)
     again = [(line, first)] if first else []
@@ -106,8 +110,9 @@ def _text_rows(path: Path, stream: Any, layout: Layout) -> Iterator[tuple[int, l
         if len(row) != count:
             what = 'header' if layout.header else 'first row'
             raise RecordingError(f'{path}: line {line + layout.skip_lines}: {len(row)} cells, but '
-                                 f'the {what} has {count}')
-        yield line + layout.skip_lines, row
+                                 f"the {what} has {count}; a decimal comma needs delimiter: ';'")
+        yield line + layout.skip_lines, ['' if cell.strip() in layout.missing else cell
+                                         for cell in row]
 
 
 def _arrays(columns: Mapping[str, Any], names: Sequence[str] | None = None) -> Table:
@@ -174,10 +179,6 @@ def _npy_header(stream: Any) -> tuple[int, Any]:
 def _within(room: int) -> None:
     if room < 0:
         raise RecordingError(SAMPLES.exceeded())
-
-
-def _mat(path: Path) -> Table:
-    return _arrays(read_mat(path))
 
 
 def _json(path: Path) -> Table:
@@ -295,6 +296,6 @@ def _refusing(read: Callable[[Path], Table]) -> Callable[[Path], Table]:
 
 _READERS: Mapping[str, Callable[[Path], Table]] = {
     suffix: _refusing(read) for suffixes, read in (
-        ('.npy', _npy), ('.npz', _npz), ('.mat', _mat), ('.json', _json),
-        ('.jsonl .ndjson', _json_lines), ('.parquet .pq', _parquet))
+        ('.npy', _npy), ('.npz', _npz), ('.mat', lambda path: _arrays(read_mat(path))),
+        ('.json', _json), ('.jsonl .ndjson', _json_lines), ('.parquet .pq', _parquet))
     for suffix in suffixes.split()}

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 import csv
 from decimal import Decimal
+import itertools
 import math
 from pathlib import Path
 import re
@@ -39,8 +40,10 @@ class Cell(NamedTuple):
 def parse_number(text: str, cell: Cell) -> float:
     """Read one finite number; RecordingError names file, line and column."""
     if not _NUMBER.fullmatch(text):
-        raise cell.refuse(f'{one_line(repr(text), 40)} is no number; leave the cell empty where '
-                          'there is no sample')
+        raise cell.refuse(f'{one_line(repr(text), 40)} is no number; ' + (
+            "a map with decimal: ',' reads a decimal comma" if ',' in text else
+            'leave the cell empty where there is no sample, or let a map say missing: [NaN, N/A]; '
+            'units_row: true in a map leaves out a row of units'))
     value = float(text)
     if not math.isfinite(value):
         raise cell.refuse(f'{one_line(repr(text), 40)} is too large a number')
@@ -55,27 +58,34 @@ def parse_nanoseconds(text: str, cell: Cell, per_unit: int = NANOSECONDS) -> int
     return int((Decimal(text) * per_unit).to_integral_value())
 
 
-def rows(path: Path, stream: TextIO, delimiter: str = ',') -> Iterator[tuple[int, list[str]]]:
+def rows(path: Path, stream: TextIO, delimiter: str = '') -> Iterator[tuple[int, list[str]]]:
     """
     Yield the rows of a CSV file with the number of the line that each ends on.
 
-    Empty lines are left out. Warns if the last line is not ended: it may have been cut. Raises
-    RecordingError, with file and line, if it is not CSV or text, or a line is too long.
+    Without a delimiter it is that of the first line. Empty lines are left out. Warns if the last
+    line is not ended: it may have been cut. Raises RecordingError, with file and line, if it is
+    not CSV or text, or a line is too long.
     """
-    last = ''
-
-    longest = CSV_LINE.value()
+    last, longest = '', CSV_LINE.value()
+    try:
+        first = stream.readline(longest + 1)
+    except UnicodeDecodeError:
+        raise RecordingError(f'{path}: after line 0: no text in {stream.encoding}') from None
+    found = [c for c in ',;\t' if c in first] or [',']
+    if not delimiter and len(found) > 1:
+        raise RecordingError(f'{path}: line 1: {" and ".join(map(repr, found))} are there; let a '
+                             'map say which is the delimiter, and decimal')
 
     def lines() -> Iterator[str]:
         nonlocal last
-        while line := stream.readline(longest + 1):
+        for line in itertools.chain([first], iter(lambda: stream.readline(longest + 1), '')):
             if len(line) > longest:
                 raise RecordingError(f'{path}: line {reader.line_num + 1}: '
                                      f'{CSV_LINE.exceeded()}')
             last = line
             yield line
 
-    reader = csv.reader(lines(), delimiter=delimiter, strict=True)
+    reader = csv.reader(lines(), delimiter=delimiter or found[0], strict=True)
     while True:
         try:
             row = next(reader)
@@ -96,6 +106,9 @@ def rows(path: Path, stream: TextIO, delimiter: str = ',') -> Iterator[tuple[int
 def open_text(path: Path, encoding: str = 'utf-8-sig') -> TextIO:
     """Open a file for the csv module. Raises RecordingError if it cannot be opened."""
     try:
+        with open(path, 'rb') as file:
+            if file.read(2) in (b'\xff\xfe', b'\xfe\xff') and encoding == 'utf-8-sig':
+                encoding = 'utf-16'
         return open(path, encoding=encoding, newline='')
     except OSError as error:
         raise RecordingError(f'{path}: {error.strerror}') from error

@@ -58,11 +58,6 @@ class Verdict:
     none: Hypothesis  # the hypothesis without effects
     best: Hypothesis  # the one with the likeliest effects
 
-    @property
-    def exit_code(self) -> int:
-        """Return that of a command: 1 if nothing could be judged."""
-        return int(self.word == 'too_few_to_judge')
-
     def __repr__(self) -> str:
         """Return the verdict and its first answer, in a line."""
         first = self.which[0]

@@ -136,3 +136,67 @@ def test_a_model_is_loaded_by_its_name(tmp_path: Path) -> None:
     path = tmp_path / 'model.py'
     path.write_text(GOOD)
     assert load_model(f'{path}:drive').base['a'].value == 1.0
+
+
+TABLE = [['t', 'x', 'y'], ['0', '1.5', '2'], ['0.5', '2.5', '-3']]
+
+
+@pytest.mark.parametrize('encoding', ['utf-8', 'utf-8-sig', 'utf-16'])
+@pytest.mark.parametrize('delimiter', [',', ';', '\t'])
+def test_the_delimiter_and_the_encoding_are_seen(tmp_path: Path, delimiter: str,
+                                                 encoding: str) -> None:
+    path = tmp_path / 'a.csv'
+    path.write_text('\n'.join(map(delimiter.join, TABLE)) + '\n', encoding=encoding)
+    log = read_log(path)
+    assert log.time.tolist() == [0.0, 0.5]
+    assert log['x'].tolist() == [1.5, 2.5] and log['y'].tolist() == [2.0, -3.0]
+
+
+@pytest.mark.parametrize(('text', 'remedy'), [
+    ('t;x\n0;1,5\n1;2,5\n', "decimal: ','"), ('t\tx\n0\t1,5\n', "decimal: ','"),
+    ('t,x\n0,5,1,5\n', "delimiter: ';'"), ('t;x,y\n0;1\n', 'map say which is the delimiter'),
+    ('t;x\ns;mm\n0;1\n', 'units_row: true'), ('t,x\n0,NaN\n1,2\n', 'missing: [NaN, N/A]'),
+    ('t,x\n0,N/A\n1,2\n', 'missing: [NaN, N/A]')])
+def test_a_refusal_names_the_remedy(tmp_path: Path, text: str, remedy: str) -> None:
+    path = tmp_path / 'a.csv'
+    path.write_text(text)
+    with pytest.raises(UserError) as caught:
+        read_log(path)
+    assert remedy in str(caught.value) and '\n' not in str(caught.value)
+
+
+@pytest.mark.parametrize('delimiter', [';', '\t'])
+def test_a_map_reads_decimal_commas_units_and_what_is_missing(tmp_path: Path,
+                                                              delimiter: str) -> None:
+    (tmp_path / 'm.yaml').write_text(f"""
+delimiter: "{delimiter}"
+decimal: ','
+units_row: true
+missing: [NaN, N/A]
+time: {{column: t}}
+signals:
+  x: {{column: x, unit: mm}}
+  y: {{column: y, unit: '1'}}
+  z: {{column: z, unit: '1'}}
+""".replace('\t', '\\t'))
+    lines = ['t;x;y;z', 's;mm;1;1', '0;1,5;NaN;1', '0,5;N/A;2;1', '1;2,5;3;1']
+    (tmp_path / 'a.csv').write_text('\n'.join(lines).replace(';', delimiter) + '\n')
+    [log] = read_logs([tmp_path / 'a.csv'], tmp_path / 'm.yaml')
+    assert log.time.tolist() == [0.0, 0.5, 1.0]
+    assert log.columns['x'] == pytest.approx([1.5e-3, np.nan, 2.5e-3], nan_ok=True)
+    assert log.columns['y'] == pytest.approx([np.nan, 2.0, 3.0], nan_ok=True)
+
+
+@pytest.mark.parametrize('entry', ['missing: NaN', 'missing: [1]', 'units_row: 1'])
+def test_a_map_with_a_wrong_entry_is_refused(tmp_path: Path, entry: str) -> None:
+    (tmp_path / 'm.yaml').write_text(f'{entry}\n{MAP}')
+    with pytest.raises(UserError, match=entry.partition(':')[0]):
+        read_logs([], tmp_path / 'm.yaml')
+
+
+def test_a_vector_with_decimal_commas_is_not_read_as_ten_times_the_value(tmp_path: Path) -> None:
+    (tmp_path / 'm.yaml').write_text('delimiter: "|"\ntime: {column: t}\n'
+                                     'signals: {x: {column: v, index: 1, unit: rad}}\n')
+    (tmp_path / 'a.csv').write_text('t|v\n0|[0,1; 0,2]\n1|[0,1; 0,2]\n')
+    with pytest.raises(UserError, match="decimal: ','"):
+        read_logs([tmp_path / 'a.csv'], tmp_path / 'm.yaml')
