@@ -185,9 +185,11 @@ def _with_time(path: Path, columns: dict[str, FloatArray],
 
 
 def _mapped(path: Path, import_map: ImportMap) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Read a file with a map; the signal with most samples gives the times."""
+    """Read a file with a map; of several clocks that with most samples gives the times."""
     channels = read_mapped(path, import_map)
-    stamps = max((channel.time_ns for channel in channels.values()), key=len)
+    every = [channel.time_ns for channel in channels.values()]
+    one_clock = len({(s.time_column, s.clock_offset_ns) for s in import_map.signals.values()}) == 1
+    stamps = np.unique(np.concatenate(every)) if one_clock else max(every, key=len)
     if len(stamps) < _LEAST_SAMPLES:
         raise LogError(f'{path}: fewer than {_LEAST_SAMPLES} samples')
     columns = {}

@@ -177,9 +177,8 @@ time: {{column: t}}
 signals:
   x: {{column: x, unit: mm}}
   y: {{column: y, unit: '1'}}
-  z: {{column: z, unit: '1'}}
 """.replace('\t', '\\t'))
-    lines = ['t;x;y;z', 's;mm;1;1', '0;1,5;NaN;1', '0,5;N/A;2;1', '1;2,5;3;1']
+    lines = ['t;x;y', 's;mm;1', '0;1,5;NaN', '0,5;N/A;2', '1;2,5;3']
     (tmp_path / 'a.csv').write_text('\n'.join(lines).replace(';', delimiter) + '\n')
     [log] = read_logs([tmp_path / 'a.csv'], tmp_path / 'm.yaml')
     assert log.time.tolist() == [0.0, 0.5, 1.0]
