@@ -57,8 +57,7 @@ def parse_yaml(text: str | bytes) -> Any:
     """
     Read YAML as plain data.
 
-    Raises ParameterError, with the place, if it is no YAML, or has an alias or a key given twice;
-    ModuleNotFoundError if PyYAML is not installed.
+    ParameterError names the place; ModuleNotFoundError: PyYAML is not installed.
     """
     import yaml
     try:

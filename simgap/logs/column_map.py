@@ -102,12 +102,7 @@ NO_SIGNALS = KnownSignals()
 
 
 def load_map(path: str | Path, known: KnownSignals = NO_SIGNALS) -> ImportMap:
-    """
-    Read a map; the units of known signals need not be stated.
-
-    Raises ParameterError if the file cannot be read or an entry is not allowed; one line names the
-    file, the key and what is allowed.
-    """
+    """Read a map; ParameterError names file, key and what is allowed; known units may lack."""
     path = Path(path)
     tree = read_yaml(path)
     try:

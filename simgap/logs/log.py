@@ -118,8 +118,6 @@ def read_log(path: str | Path, import_map: ImportMap | None = None) -> Log:
 
     path : a file of any kind that `tables` knows; without a map, time_s, time or t is the time
     import_map : which column is which, and how it is written
-
-    Raises LogError or RecordingError, in one line, if a cell, a row or a column cannot be read.
     """
     path = Path(path)
     time, columns = _mapped(path, import_map) if import_map else _plain(path)

@@ -33,9 +33,8 @@ def read_mapped(path: str | Path, import_map: ImportMap) -> dict[str, Channel]:
     """
     Return the signals that a map finds in a file, by name.
 
-    Raises RecordingError if a cell, a row or the header cannot be read as the map says, or a time
-    stamp is not later than the one before; one line names file, line and column. Warns with
-    RecordingWarning if the last line is not ended, or repeated rows were left out.
+    RecordingError names file, line and column of what the map does not allow. Warns if the
+    last line is not ended, or repeated rows were left out.
     """
     path = Path(path)
     room = SAMPLES.value()

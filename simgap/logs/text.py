@@ -60,11 +60,9 @@ def parse_nanoseconds(text: str, cell: Cell, per_unit: int = NANOSECONDS) -> int
 
 def rows(path: Path, stream: TextIO, delimiter: str = '') -> Iterator[tuple[int, list[str]]]:
     """
-    Yield the rows of a CSV file with the number of the line that each ends on.
+    Yield the rows of a CSV file, but for empty ones, with the number of the line each ends on.
 
-    Without a delimiter it is that of the first line. Empty lines are left out. Warns if the last
-    line is not ended: it may have been cut. Raises RecordingError, with file and line, if it is
-    not CSV or text, or a line is too long.
+    Without a delimiter it is that of the first line. Warns if the last line may have been cut.
     """
     last, longest = '', CSV_LINE.value()
     try:
