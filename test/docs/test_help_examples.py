@@ -134,6 +134,7 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
         shutil.copy(path, folder / 'antennas' / 'north')
     (folder / 'my_drive.yaml').write_text('gearbox: {half_gap: 0.16}\n')
     (folder / 'my_antenna.yaml').write_text('gearbox: {half_gap: 0.15}\n')
+    shutil.copy(ROOT / 'examples' / 'data_sheet.yaml', folder)
     sheet = ('waveform: {type: multisine, amplitude_deg_s: 0.2, frequencies_hz: [1.0, 3.0],\n'
              '           weights: [0.5, 0.5], phases: [0.0, 1.0], start_s: 0.05}\n')
     for name in ('next', 'my_sheet', 'planned'):
@@ -216,7 +217,8 @@ def test_it_runs(example: str, prepared: Path, tmp_path: Path, fresh_domain: int
     folder = tmp_path / 'here'
     shutil.copytree(prepared, folder)
     server = next((said for begin, said in SERVERS.items() if example.startswith(begin)), '')
-    for target in re.findall(r'--out (\S+)', example) + re.findall(r'export \S+ (\S+)', example):
+    for target in re.findall(r'--out (\S+)', example) + re.findall(
+            r'(?:export|import) \S+ (\S+)', example):
         for path in folder.glob(f'{Path(target).stem}.*' if '.' in target else target):
             shutil.rmtree(path) if path.is_dir() else path.unlink()
     variables = {**environment(tmp_path), 'ROS_DOMAIN_ID': str(fresh_domain)}

@@ -24,7 +24,8 @@ def played(history: History, name: str, run: int, seconds: float | None = None,
     experiment = experiments()[name]
     result = simulate(experiment.drive(), seconds or experiment.duration)
     count = len(result.steps)
-    header = np.column_stack([np.full(count, float(run)), result.steps, np.full(count, 1e-3)])
+    header = np.column_stack([np.full(count, float(run)), result.steps, np.full(count, 1e-3),
+                              np.full(count, 1.0)])
     for unit in (TEST_SIGNAL, *(unit for unit in OUTPUTS if unit != TEST_SIGNAL)):
         columns = [result.names.index(f'{unit}/{signal.name}') for signal in OUTPUTS[unit]]
         frames = np.hstack([header, result.samples[:, columns].reshape(count, -1)])

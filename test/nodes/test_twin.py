@@ -157,7 +157,7 @@ def test_twin_learns_tells_the_gap_and_then_that_the_drive_has_stopped(
                          'learning the quiet record', 'ok', 'gap', 'stale input']
         gap = next(item for item in listener.said if item[0].startswith('gap'))
         assert 'motor_2/ammeter' in gap[0]
-        assert ' A instead of ' in gap[0]
+        assert ' article A instead of ' in gap[0]
         assert 'sigma' in gap[0]
         assert gap[1]['tuning'] == 'tuned to the quiet record'
         assert gap[1]['behind'].endswith(' s')
