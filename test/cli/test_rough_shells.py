@@ -35,7 +35,8 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a recording whose name and folder are not UTF-8."""
     folder = tmp_path_factory.mktemp('rough') / BAD
     folder.mkdir()
-    assert main(['run', '--duration', '0.5', '--out', f'{folder / BAD}.csv']) == 0
+    assert main(['run', '--duration', '4', '--set', 'test_signal.waveform=square',
+                 'test_signal.amplitude=0.005', '--out', f'{folder / BAD}.csv']) == 0
     return folder / f'{BAD}.csv'
 
 
