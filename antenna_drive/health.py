@@ -10,6 +10,7 @@ message is sent and received.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+import csv
 from dataclasses import dataclass
 import importlib
 from importlib import metadata
@@ -112,10 +113,11 @@ def _library(part: str, module: str, bounds: Mapping[str, str]) -> Finding:
 def _lacks_files(name: str) -> bool:
     """Tell whether code that pip has installed with a distribution is no longer there."""
     distribution = metadata.distribution(name)
-    if distribution.read_text('RECORD') is None:  # not of pip
-        return False
-    return any(path.suffix == '.py' or '.so' in path.suffixes
-               for path in distribution.files or () if not Path(path.locate()).exists())
+    # `files` of Python 3.12 leaves out those that are not there
+    rows = csv.reader((distribution.read_text('RECORD') or '').splitlines())  # not of pip: none
+    paths = [Path(row[0]) for row in rows if row]
+    return any(path.suffix == '.py' or '.so' in path.suffixes for path in paths
+               if not Path(str(distribution.locate_file(path))).exists())
 
 
 def _bounds() -> Mapping[str, str]:
