@@ -10,7 +10,7 @@ import warnings
 
 from antenna_drive.emulator.wiring import signal_names
 from antenna_drive.recording.bag import CONFIGURATION, METADATA, NOTES
-from antenna_drive.recording.bag_storage import DamageError, read_storage, Storage
+from antenna_drive.recording.bag_storage import DamageError, PACKED, read_storage, Storage
 from antenna_drive.recording.csv_format import parse_known
 from antenna_drive.recording.recording import Recording, unit_of
 from antenna_drive.recording.sheet import FILE_NAME, parse_sheet
@@ -35,7 +35,7 @@ def read_bag(path: str | Path, *, partial: bool = False) -> Recording:
     Parameters
     ----------
     path
-        the folder, or a file NAME.mcap
+        the folder, or a file NAME.mcap or NAME.mcap.zstd
     partial
         read what can be read of a bag that was cut off or damaged, and warn how far
 
@@ -57,8 +57,13 @@ def read_bag(path: str | Path, *, partial: bool = False) -> Recording:
     try:
         files, counts = _files(path)
         for file in files:
-            read_storage(file, storage)
-        _check_counts(storage, counts)
+            # a part that is missing or damaged does not keep others from being read
+            try:
+                read_storage(file, storage)
+            except DamageError as error:
+                damage = damage or str(error)
+        if damage is None:
+            _check_counts(storage, counts)
     except DamageError as error:
         damage = str(error)
     except RecordingError as error:
@@ -95,7 +100,8 @@ def _files(path: Path) -> tuple[list[Path], dict[str, int] | None]:
     if path.is_file():
         return [path], None
     if not (path / METADATA).is_file():
-        found = sorted(path.glob('*.mcap'), key=lambda file: (len(file.name), file.name))
+        found = sorted((*path.glob('*.mcap'), *path.glob(f'*.mcap{PACKED}')),
+                       key=lambda file: (len(file.name), file.name))
         if not found:
             raise RecordingError(f'{path}: no bag, there is neither {METADATA} nor a file .mcap')
         return found, {}
@@ -106,6 +112,7 @@ def _files(path: Path) -> tuple[list[Path], dict[str, int] | None]:
     try:
         info = tree['rosbag2_bagfile_information']
         storage, compression = info['storage_identifier'], info.get('compression_mode', '')
+        packed = (str(compression).lower(), info.get('compression_format'))
         names = info['relative_file_paths']
         counts = {topic['topic_metadata']['name']: topic['message_count']
                   for topic in info['topics_with_message_count']}
@@ -117,9 +124,10 @@ def _files(path: Path) -> tuple[list[Path], dict[str, int] | None]:
     if storage != 'mcap':
         raise RecordingError(f'{path}: storage {one_line(repr(storage), 30)}, but only mcap is '
                              'read here; ros2 bag convert changes it')
-    if compression not in ('', 'none', None):
+    if compression not in ('', 'none', None) and packed != ('file', 'zstd'):
         raise RecordingError(f'{path}: compressed by {one_line(repr(compression), 30)}, which is '
-                             'not read here; MCAP compresses its own chunks')
+                             'not read here; MCAP compresses its own chunks, and files as a whole '
+                             'may be packed by zstd')
     for name in names:
         if len(name) > LONGEST_NAME:
             raise RecordingError(f'{path / METADATA}: {one_line(name, 60)} is no name of a file')

@@ -10,7 +10,8 @@ import io
 import os
 from pathlib import Path
 import struct
-from typing import Any, BinaryIO
+import tempfile
+from typing import Any, BinaryIO, cast
 import zlib
 
 from antenna_drive.limits import BAG, BAG_RECORD
@@ -35,6 +36,7 @@ _MESSAGE = np.dtype([
 _MESSAGE_LENGTH = _MESSAGE.itemsize - 9
 _FEW = 1024  # messages that are looked at at first
 _FOOTER_TAIL = 12  # the summary's checksum and the magic
+PACKED = '.zstd'  # ending of a storage file that is packed as a whole
 
 
 class DamageError(Exception):
@@ -240,10 +242,32 @@ def _records(file: BinaryIO, size: int) -> Iterator[object]:
         yield record
 
 
+def _opened(path: Path) -> BinaryIO:
+    """Open a storage file; one that is packed as a whole is unpacked to a file without a name."""
+    file: BinaryIO = path.open('rb')
+    if path.suffix != PACKED:
+        return file
+    import zstandard
+    unpacked: Any = tempfile.TemporaryFile()
+    with file:
+        try:
+            for part in zstandard.ZstdDecompressor().read_to_iter(file):
+                if unpacked.tell() + len(part) > BAG.value():
+                    raise RecordingError(BAG.exceeded())
+                unpacked.write(part)
+        except zstandard.ZstdError:
+            pass  # what was unpacked ends early, and is read up to there
+    unpacked.flush()
+    unpacked.seek(0)
+    return cast(BinaryIO, unpacked)
+
+
 def read_storage(path: Path, storage: Storage) -> None:
     """Read one storage file to its end, and check that it is all there."""
     try:
-        file = path.open('rb')
+        file = _opened(path)
+    except FileNotFoundError as error:  # a part of a split bag
+        raise DamageError(f'{path}: {error.strerror}') from error
     except OSError as error:
         raise RecordingError(f'{path}: {error.strerror}') from error
     storage.begin_file()

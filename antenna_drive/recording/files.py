@@ -13,7 +13,7 @@ from simgap.logs.channel import RecordingError
 
 def read_recording(path: str | Path, *, partial: bool = False) -> Recording:
     """
-    Read a rosbag2 folder, or a file .mcap or .csv.
+    Read a rosbag2 folder, or a file .mcap, .mcap.zstd or .csv.
 
     path : the folder or file
     partial : read what can be read of a bag that was cut off or damaged
@@ -24,11 +24,11 @@ def read_recording(path: str | Path, *, partial: bool = False) -> Recording:
     path = Path(path)
     if not path.exists():
         raise RecordingError(f'{path}: no such file or folder')
-    if path.is_dir() or path.suffix == '.mcap':
+    if path.is_dir() or path.name.endswith(('.mcap', '.mcap.zstd')):
         # CSV needs no library: the one for MCAP is asked for only where it is used
         from antenna_drive.recording.bag_reader import read_bag
         return read_bag(path, partial=partial)
     if path.suffix != '.csv':
-        raise RecordingError(f'{path}: no recording; allowed are a bag (a folder, or .mcap) '
-                             'and .csv')
+        raise RecordingError(f'{path}: no recording; allowed are a bag (a folder, .mcap or '
+                             '.mcap.zstd) and .csv')
     return read_csv(path)

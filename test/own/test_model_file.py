@@ -130,7 +130,7 @@ def test_a_push_is_fed_in(tmp_path: Path, stand_in: list[StandIn]) -> None:
     ('inputs:', 'input:', 'input: no such entry, did you mean inputs'),
     ('share: 0.1, ', '', 'base.level: nothing given, allowed is one of known, share, by, free'),
     ('share: 0.1, ', 'share: 0.1, known: 2.0, ', 'base.level: known and share given'),
-    ('share: 0.1', 'share: 1e-1', "base.level.share: '1e-1' given, allowed is a number"),
+    ('share: 0.1', 'share: 1e-', "base.level.share: '1e-' given, allowed is a number"),
     (', sets: stiffness', '', 'base.level: give one of sets'),
     ('known: 0.5, adds: begin', 'known: 0.5, sets: left', 'per_test.offset.sets: left: '
      'base.free_one.sets sets it'),

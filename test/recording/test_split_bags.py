@@ -10,12 +10,14 @@ from typing import Any
 
 from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.bag_writer import BagWriter
+from antenna_drive.recording.files import read_recording
 import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer as RosbagsWriter
 from rosbags.typesys import get_typestore, Stores
-from simgap.logs.channel import RecordingWarning
+from simgap.logs.channel import RecordingError, RecordingWarning
 import yaml
+import zstandard
 
 STEP_NS = 1_000_000
 SIGNALS = {'motor_1/current': 'A', 'plant/encoder': 'rad'}
@@ -128,3 +130,51 @@ def test_topics_have_numbers_of_their_own_in_each_file(tmp_path: Path) -> None:
     recording = read_bag(tmp_path / 'run')
     assert recording['a'].values.tolist() == [1.0, 1.0]
     assert recording['b'].values.tolist() == [2.0, 2.0]
+
+
+def packed_bag(path: Path) -> Path:
+    """Write a bag in three files, each packed as a whole, as `ros2 bag record` does on demand."""
+    with BagWriter(path, SIGNALS, split_s=SPLIT_S) as bag:
+        write_all(bag, 6.0)
+    tree = yaml.safe_load((path / 'metadata.yaml').read_text())
+    info = tree['rosbag2_bagfile_information']
+    for name in info['relative_file_paths']:
+        (path / f'{name}.zstd').write_bytes(zstandard.compress((path / name).read_bytes()))
+        (path / name).unlink()
+    info.update(compression_mode='FILE', compression_format='zstd',
+                relative_file_paths=[f'{name}.zstd' for name in info['relative_file_paths']])
+    (path / 'metadata.yaml').write_text(yaml.safe_dump(tree))
+    return path
+
+
+def test_a_bag_whose_files_are_packed_is_read(tmp_path: Path) -> None:
+    path = packed_bag(tmp_path / 'run')
+    current = read_bag(path)['motor_1/current']
+    assert current.values.tolist() == [float(k) for k in range(6000)]
+    alone = read_recording(path / 'run_1.mcap.zstd')['motor_1/current']
+    assert set(alone.values) < set(current.values)
+
+
+def test_a_packed_file_that_was_cut_off_is_read_up_to_there(tmp_path: Path) -> None:
+    path = packed_bag(tmp_path / 'run')
+    last = path / 'run_2.mcap.zstd'
+    last.write_bytes(last.read_bytes()[:-40])
+    with pytest.raises(RecordingError, match='--partial'):
+        read_bag(path)
+    with pytest.warns(RecordingWarning, match='cut off or damaged'):
+        current = read_bag(path, partial=True)['motor_1/current']
+    assert len(current.values) >= 4000
+
+
+@pytest.mark.parametrize('gone', [0, 1, 2])
+def test_what_is_there_is_read_where_a_part_is_missing(gone: int, tmp_path: Path) -> None:
+    with BagWriter(tmp_path / 'run', SIGNALS, split_s=SPLIT_S) as bag:
+        write_all(bag, 6.0)
+    whole = read_bag(tmp_path / 'run')['motor_1/current'].values
+    (tmp_path / 'run' / f'run_{gone}.mcap').unlink()
+    with pytest.raises(RecordingError, match=rf'run_{gone}\.mcap: No such file.*--partial'):
+        read_bag(tmp_path / 'run')
+    with pytest.warns(RecordingWarning, match=rf'run_{gone}\.mcap: No such file'):
+        left = read_bag(tmp_path / 'run', partial=True)['motor_1/current'].values
+    missing = set(whole) - set(left)
+    assert set(left) < set(whole) and max(missing) - min(missing) == len(missing) - 1
