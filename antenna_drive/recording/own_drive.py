@@ -12,8 +12,6 @@ from typing import Any
 from antenna_drive.emulator.units import build
 from antenna_drive.emulator.wiring import UNITS
 from antenna_drive.lockstep.entry import SHEET
-from antenna_drive.lockstep.namespaces import AnotherDrive
-from antenna_drive.lockstep.node_parameters import OWN_PARAMETERS
 from antenna_drive.parameters import load
 from antenna_drive.recording.bag_reader import message_counts
 from antenna_drive.recording.sheet_signal import settings_of
@@ -52,6 +50,9 @@ def check_settings(path: Path, told: Mapping[str, Any],
     Raises AnotherDrive: a unit has others.
     Raises IncompleteRecording: a unit has said nothing.
     """
+    # the nodes' own parameters need ROS 2, and the room of recordings does not
+    from antenna_drive.lockstep.namespaces import AnotherDrive
+    from antenna_drive.lockstep.node_parameters import OWN_PARAMETERS
     drive = load(*config)
     for unit in UNITS:
         if unit not in told:
