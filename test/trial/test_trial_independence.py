@@ -17,7 +17,8 @@ HOUSES = ('antenna_drive', 'lab', 'simgap')
 ANTENNA = ('lab.antenna', 'simgap.errors')
 # what starts processes and reports errors knows nothing of any drive
 ALLOWED = (*ANTENNA, 'lab.joints', 'lab.trials', 'antenna_drive.workers',
-           'antenna_drive.programs', 'antenna_drive.remedies', 'antenna_drive.subcommand',
+           'antenna_drive.programs', 'antenna_drive.remedies', 'antenna_drive.ros_releases',
+           'antenna_drive.subcommand',
            'simgap.command.programs', 'simgap.command.remedies')
 # models that diagnose, which only a diagnosis loads
 MODELS = LAB / 'joints' / 'models'
