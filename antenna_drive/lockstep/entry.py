@@ -9,6 +9,7 @@ the first moment, and a machine without ROS 2 gets one line that says so.
 
 from __future__ import annotations
 
+from _thread import start_new_thread
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 import faulthandler
@@ -250,8 +251,10 @@ def _init_ros(name: str, arguments: Sequence[str], example: str) -> None:
 def stopped_by_signals() -> Event:
     """Return an event that SIGINT and SIGTERM set from now on."""
     stop = Event()
+    # A handler runs within whatever the main thread is doing, so also while that holds the lock of
+    # the event, in `wait`. Another thread gets the lock as soon as it is free.
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda number, frame: stop.set())
+        signal.signal(number, lambda number, frame: start_new_thread(stop.set, ()))
     return stop
 
 
