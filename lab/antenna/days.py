@@ -19,7 +19,7 @@ from lab.antenna.real_antenna import FloatArray, TrueSignals
 import numpy as np
 from scipy.signal import lfilter
 
-# Share of its level by which a friction differs, a third of it also between days.
+# Largest share of its level by which a friction differs from recording to recording.
 FRICTION = 0.08
 WIND = (0.01, 0.02)             # rms, as a share of the axis' Coulomb friction
 WIND_CORNER_HZ = (0.05, 0.3)
