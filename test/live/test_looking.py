@@ -33,6 +33,11 @@ def shown(page: Page, title: str) -> list[str]:
     return found
 
 
+def half_a_digit(text: str) -> float:
+    """Return what a printed number may differ from the one that was rounded to it."""
+    return 0.501 * 10.0 ** -len(text.partition('.')[2])
+
+
 def held(page: Page, name: str, time: float) -> tuple[float, float]:
     """Return the least and the greatest value that the page holds of a signal at a time."""
     low, high = page.tell(f"""(() => {{ const s = {SAMPLES}, n = Math.floor({time} / s.interval);
@@ -81,11 +86,12 @@ def test_what_is_at_the_cursor_stands_beside_the_names_of_all_charts(paused: Pag
     for title, name, factor, line in (
             ('Torque bias', BIAS, 1.0, 0), ('Axis rate', 'plant/axis_rate', 180 / math.pi, 1),
             ('Motor current', 'motor_2/current', 1.0, 1)):
-        ends = [float(text) for text in shown(paused, title)[line].split(' to ')]
+        texts = shown(paused, title)[line].split(' to ')
+        ends, printed = [float(text) for text in texts], max(half_a_digit(text) for text in texts)
         near = [held(paused, name, float(said) + shift) for shift in (-0.01, 0.0, 0.01)]
         least = factor * min(low for low, _ in near)
         most = factor * max(high for _, high in near)
-        assert least - 1e-3 <= min(ends) <= max(ends) <= most + 1e-3, title
+        assert least - printed <= min(ends) <= max(ends) <= most + printed, title
     paused.mouse('mouseMoved', 1, 1)
     paused.until('!document.getElementById("at").textContent.startsWith("values")')
     assert shown(paused, 'Torque bias') == latest
