@@ -4,9 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-import math
 from types import MappingProxyType
 from typing import Any
 
@@ -47,8 +46,11 @@ class Contents:
     # those of the diagram, each with the probability that an effect is there
     blocks: Sequence[tuple[DiagramBlock, float]]
     likely: Sequence[Likely]  # the likeliest hypotheses
-    # the channel of each experiment that gains most: measured, simulated and difference
+    # every channel of each experiment, that which gains most first: measured, simulated, difference
     panels: Sequence[Panel]
+    signals: Sequence[str]  # of the panels
+    # by how much the effects alone move each channel, all else as fitted: rms, in its unit
+    alone: Mapping[str, float]
     advice: Sequence[str]  # tests that would settle what is open
 
 
@@ -74,32 +76,43 @@ def contents(verdict: Verdict, facts: Mapping[str, str] = MappingProxyType({})) 
         {'verdict': headline(verdict).capitalize(), **facts}, explained,
         verdict.as_data(), diagram,
         [(block, min(shares.get(block.component, 0.0), 1.0)) for block in diagram.blocks],
-        likely, _panels(verdict), _advice(verdict))
+        likely, *_curves(verdict), _advice(verdict))
 
 
-def _panels(verdict: Verdict) -> list[Panel]:
-    machine = verdict.machine
-    before, after = machine.simulate([verdict.none.state.point(), verdict.best.state.point()])
-    panels: list[Panel] = []
+def _curves(verdict: Verdict) -> tuple[list[Panel], list[str], dict[str, float]]:
+    """Return the panels with their signals, and what the effects alone move."""
+    machine, fitted = verdict.machine, verdict.best.state.point()
+    off = {p.name: 0.0 for form in verdict.best.forms for p in form.sizes}
+    before, after, bare = machine.simulate(
+        [verdict.none.state.point(), fitted, {**fitted, **off}])
+    panels, signals = [], []
     for experiment, first, second in zip(machine.experiments, before, after, strict=True):
         assert first is not None and second is not None
-        panels += _of_experiment(experiment, first, second)
-    return panels
+        for channel, pair in _of_experiment(experiment, first, second):
+            panels += pair
+            signals += [channel] * len(pair)
+    moved = np.concatenate([np.subtract(*pair) for pair in zip(after, bare, strict=True)])
+    alone = dict(zip(machine.experiments[0].channels,
+                     np.sqrt(np.nanmean(moved ** 2, axis=0)).tolist(), strict=True)) if off else {}
+    return panels, signals, alone
 
 
 def _of_experiment(experiment: Experiment, before: FloatArray,
-                   after: FloatArray) -> tuple[Panel, Panel]:
+                   after: FloatArray) -> Iterator[tuple[str, tuple[Panel, Panel]]]:
+    """Yield the channels that were read, that which gains most first, each with its panels."""
     gain = np.nansum(((experiment.measured - before) / experiment.noise) ** 2
                      - ((experiment.measured - after) / experiment.noise) ** 2, axis=0)
-    gain[~np.isfinite(experiment.measured).any(axis=0)] = -math.inf
-    channel = int(np.argmax(gain))
-    name, unit, time = experiment.channels[channel], experiment.units[channel], experiment.time
-    measured = experiment.measured[:, channel]
-    simulated = {'before': before[:, channel], 'after': after[:, channel]}
-    return ((experiment.name, name, unit,
-             [(key, time, values) for key, values in {'measured': measured, **simulated}.items()]),
-            (experiment.name, 'measured less simulated', unit,
-             [(key, time, measured - values) for key, values in simulated.items()]))
+    for channel in np.argsort(-gain, kind='stable').tolist():
+        name, unit, time = experiment.channels[channel], experiment.units[channel], experiment.time
+        measured = experiment.measured[:, channel]
+        simulated = {'before': before[:, channel], 'after': after[:, channel]}
+        if np.isfinite(measured).any():
+            yield name, (
+                (experiment.name, name, unit, [
+                    (key, time, values)
+                    for key, values in {'measured': measured, **simulated}.items()]),
+                (experiment.name, 'measured less simulated', unit, [
+                    (key, time, measured - values) for key, values in simulated.items()]))
 
 
 def _advice(verdict: Verdict) -> list[str]:

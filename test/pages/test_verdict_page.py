@@ -77,9 +77,9 @@ def diagnosis(result: dict[str, Any], **machine: Any) -> Verdict:
                                 np.full_like(true, 0.1)) for name in (HOSTILE, 'second')],
         catalogue={'motors.friction': Effect('motors.friction', 'motors', HOSTILE, '', ()),
                    'dial.gain': Effect('dial.gain', 'dial', 'a bent needle', '', ())},
-        simulate=lambda points: [[true - 1.0] * 2, [true] * 2],
+        simulate=lambda points: [[true - 1.0] * 2, [true] * 2, [true] * 2],
         **{'diagram': None, 'advice': (), 'words': {}, **machine})
-    fit: Any = SimpleNamespace(state=SimpleNamespace(point=dict))
+    fit: Any = SimpleNamespace(state=SimpleNamespace(point=dict), forms=())
     entries = {'statements': {}, 'fits': [], 'planning': {}, 'labels': None, **result}
     return Verdict(**{
         **{key: value for key, value in entries.items() if key != 'verdict'},
