@@ -46,7 +46,7 @@ class Contents:
     # those of the diagram, each with the probability that an effect is there
     blocks: Sequence[tuple[DiagramBlock, float]]
     likely: Sequence[Likely]  # the likeliest hypotheses
-    # every channel of each experiment, that which gains most first: measured, simulated, difference
+    # each channel of each experiment, that which gains most first: measured, simulated, difference
     panels: Sequence[Panel]
     signals: Sequence[str]  # of the panels
     # by how much the effects alone move each channel, all else as fitted: rms, in its unit
@@ -73,10 +73,24 @@ def contents(verdict: Verdict, facts: Mapping[str, str] = MappingProxyType({})) 
     explained = '' if fraction['value'] is None else share_text(fraction)
     return Contents(
         title + stop.rstrip(), f'{more} {sure}'.strip(), then,
-        {'verdict': headline(verdict).capitalize(), **facts}, explained,
+        {'verdict': headline(verdict).capitalize(), **facts,
+         **_compared(verdict.machine.experiments)}, explained,
         verdict.as_data(), diagram,
         [(block, min(shares.get(block.component, 0.0), 1.0)) for block in diagram.blocks],
         likely, *_curves(verdict), _advice(verdict))
+
+
+def _compared(experiments: Sequence[Experiment]) -> dict[str, str]:
+    """Return how much of the recordings is compared, if some are compared in part."""
+    compared: dict[str, tuple[float, float]] = {}
+    for experiment in experiments:
+        if experiment.excerpt:
+            name, whole = experiment.excerpt.recording, experiment.excerpt.of_s
+            before = compared.get(name, (0.0, 0.0))[0]
+            compared[name] = before + float(experiment.time[-1] - experiment.time[0]), whole
+    told = [f'{name} {some:.0f} of {whole:.0f} s ({100.0 * min(some / whole, 1.0):.0f} percent)'
+            for name, (some, whole) in compared.items() if whole > 0.0]
+    return {'compared': ', '.join(told)} if told else {}
 
 
 def _curves(verdict: Verdict) -> tuple[list[Panel], list[str], dict[str, float]]:
@@ -103,7 +117,8 @@ def _of_experiment(experiment: Experiment, before: FloatArray,
     gain = np.nansum(((experiment.measured - before) / experiment.noise) ** 2
                      - ((experiment.measured - after) / experiment.noise) ** 2, axis=0)
     for channel in np.argsort(-gain, kind='stable').tolist():
-        name, unit, time = experiment.channels[channel], experiment.units[channel], experiment.time
+        name, unit = experiment.channels[channel], experiment.units[channel]
+        time = experiment.recorded_time
         measured = experiment.measured[:, channel]
         simulated = {'before': before[:, channel], 'after': after[:, channel]}
         if np.isfinite(measured).any():

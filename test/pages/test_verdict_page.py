@@ -230,7 +230,8 @@ def test_a_phone_shows_all_of_a_fleet(browser: Page, tmp_path: Path) -> None:
     row = {'machine': 'a-drive-with-a-rather-long-name-of-its-own', 'page': None, 'failure': None,
            'recordings': ['a', 'b', 'c'], 'verdict': 'partly_explained', 'probability': 0.93,
            'effects': ['motors.load_dependent_friction', 'torque_share.fade_out_voltage'],
-           'confusable': [['axis.gravity_imbalance', 'axis.wind_steady']]}
+           'confusable': [['axis.gravity_imbalance', 'axis.wind_steady']],
+           'sentence': f'Each motor {HOSTILE}. Next: run `it`.'}
     path = tmp_path / 'fleet.html'
     path.write_text(render(
         'fleet.html', title='Fleet', lead='two', share=lambda row: '90 %',
@@ -240,3 +241,6 @@ def test_a_phone_shows_all_of_a_fleet(browser: Page, tmp_path: Path) -> None:
     browser.open(path.as_uri())
     assert browser.tell('[...document.querySelectorAll("body *")]'
                         '.every(e => e.getBoundingClientRect().right <= 390)') is True
+    said = browser.tell('[...document.querySelectorAll("td[colspan=\\"6\\"]")].map(e =>'
+                        ' [e.innerText, e.querySelector("code").innerText])')
+    assert said == [[f'Each motor {HOSTILE}. Next: run it.', 'it']], 'a failure has none'
