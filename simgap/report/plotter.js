@@ -154,7 +154,8 @@
     group.point = share => {
       const { plot } = group.panels[0], width = plot.over.clientWidth;
       const left = plot.cursor.left < 0 ? width / 2 : plot.cursor.left + share * width;
-      plot.setCursor({ left: Math.min(Math.max(left, 0), width - 1), top: 1 });
+      const at = Math.min(Math.max(left, 0), width - 1);
+      for (const panel of group.panels) panel.plot.setCursor({ left: at, top: 1 });
     };
     group.show(...spans.get(name) || [first, last]);
     return group;

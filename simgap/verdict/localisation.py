@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.state import FitState
 from simgap.machine.contract import FloatArray
@@ -15,6 +16,9 @@ from simgap.verdict import unknown_input
 from simgap.verdict.verdict import Answer, LackOfFit
 
 Located = dict[str, Any]
+# A residual is loud where its variance is so many times that of the rest; each is this share of
+# a test at least; and its ends are sought at so many places.
+_LOUDER, _LEAST_SHARE, _PLACES = 9.0, 0.1, 800
 
 
 def of_effects(problem: LeastSquares, answers: Sequence[Answer], none: FitState,
@@ -51,7 +55,53 @@ def parts_of_the_unknown(problem: LeastSquares, none: FitState, lack: LackOfFit,
 def of_the_unknown(problem: LeastSquares, none: FitState,
                    parts: Mapping[str, float]) -> list[Located]:
     """Return where something lies that no effect names, given how likely each part is."""
-    return _located(problem, parts, lambda k: problem.residuals_of(none, k) ** 2 - 1.0)
+    found = _located(problem, parts, lambda k: problem.residuals_of(none, k) ** 2 - 1.0)
+    acts = {signal: list(_acts(problem, none, signal))
+            for signal in dict.fromkeys(item['signal'] for item in found)}
+    return [{**item, 'acts': acts[item['signal']]} for item in found]
+
+
+def _acts(problem: LeastSquares, none: FitState, signal: str) -> Iterator[dict[str, Any]]:
+    """Yield when a signal's residual is loud, of tests in which that begins or ends."""
+    for k, experiment in enumerate(problem.experiments):
+        c = experiment.channels.index(signal)
+        residual = problem.residuals_of(none, k)[:, c]
+        there = np.flatnonzero(np.isfinite(residual))
+        regimes = problem.machine.motion(k).regimes()
+        # where it stands still, most things do not act
+        still = regimes.labels[there] == (regimes.names.index('stick')
+                                          if 'stick' in regimes.names else -1)
+        span = loud_span(residual[there], ~still)
+        if span is not None:
+            time = experiment.recorded_time[there]
+            yield {'test': experiment.name,
+                   'from_s': float(time[span[0]]) if span[0] > 0 else None,
+                   'until_s': float(time[span[1]]) if span[1] < len(time) else None}
+
+
+def loud_span(residual: FloatArray, counts: NDArray[np.bool_]) -> tuple[int, int] | None:
+    """
+    Return where a residual, shape (n,), begins to be loud and where it ends; None for nowhere.
+
+    It maximises the likelihood of two variances (C. Inclan, G. C. Tiao, Use of cumulative sums of
+    squares for retrospective detection of changes of variance, JASA 89, 1994, with both ends at
+    once). `counts` has True where something could act: enough of such samples have to be quiet.
+    """
+    width = -(-len(residual) // _PLACES) or 1
+    edges = np.append(np.arange(0, len(residual), width), len(residual))
+    energy, able = (np.append(0.0, np.cumsum(x))[edges] for x in (residual ** 2, counts))
+    inside, loud = (np.subtract.outer(x, x).T for x in (edges, energy))  # from row to column
+    outside, quiet = edges[-1] - inside, energy[-1] - loud
+    unheard = able[-1] - np.subtract.outer(able, able).T
+    possible = ((inside > _LEAST_SHARE * edges[-1]) & (unheard > _LEAST_SHARE * edges[-1])
+                & (loud * outside > _LOUDER * quiet * inside))
+    if not possible.any():
+        return None
+    with np.errstate(divide='ignore', invalid='ignore'):
+        cost = np.where(possible, inside * np.log(loud / inside)
+                        + outside * np.log(np.maximum(quiet, 1e-30) / outside), np.inf)
+    first, last = np.unravel_index(np.argmin(cost), cost.shape)
+    return int(edges[first]), int(edges[last])
 
 
 def _located(problem: LeastSquares, parts: Mapping[str, float],

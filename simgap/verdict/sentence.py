@@ -160,7 +160,32 @@ def _unknown(verdict: Verdict) -> str:
     if verdict.may_enter_at:
         place = verdict.may_enter_at[0]
         lines.append(f'As {place.name} it could explain {percent(place.explained)} of the gap.')
-    return ' '.join(lines)
+    return ' '.join([*lines, *_when(verdict), *_law(verdict)])
+
+
+def _when(verdict: Verdict) -> Iterator[str]:
+    """Yield when something unknown acts, where it begins or ends in a test."""
+    # a declared model has places that are pushed, with sizes
+    spans = getattr(verdict, 'pushes', ()) or [
+        span for item in verdict.where[:1] for span in item.get('acts', ())]
+    for span in spans[:1]:
+        size_of_it = f', with {quantity(span["size"], span["unit"])}' if 'size' in span else ''
+        more = f', and {len(spans) - 1} times more' if spans[1:] else ''
+        yield f'It acts {_from_to(span)} of {span["test"]}{size_of_it}{more}.'
+
+
+def _from_to(span: Mapping[str, Any]) -> str:
+    begin, end = span['from_s'], span['until_s']
+    if begin is None:
+        return f'until {end:.2f} s'
+    return f'from {begin:.2f} s on' if end is None else f'from {begin:.2f} to {end:.2f} s'
+
+
+def _law(verdict: Verdict) -> Iterator[str]:
+    """Yield what the greatest remainder goes with, if with anything."""
+    for item in verdict.residual_tests['depends_on'][:1]:
+        yield (f'What is left of {item["signal"]} goes with {item["depends_on"]} '
+               f'({percent(item["share"])} of it).')
 
 
 def _effect(verdict: Verdict, effect: str,

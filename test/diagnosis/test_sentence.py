@@ -29,7 +29,7 @@ LOUD = {'angle': {**QUIET['angle'], 'beyond_noise': 0.05}}
 def verdict(word: str, top: Named = FOUND, **entries: Any) -> Any:
     return SimpleNamespace(**{
         'word': word, 'which': [top], 'where': [], 'confusable': [], 'may_enter_at': [],
-        'remains': QUIET, 'planning': {}, 'machine': SimpleNamespace(catalogue=EFFECTS, words={}),
+        'remains': QUIET, 'planning': {}, 'residual_tests': {'depends_on': []}, 'machine': SimpleNamespace(catalogue=EFFECTS, words={}),
         'how_far': {'judged': top.effects, 'per_signal': {},
                     'explained_fraction': {'value': 0.99, 'ci95': [0.97, 0.996]}}, **entries})
 
@@ -139,6 +139,25 @@ def test_unknown_says_place_size_and_when_and_what_would_settle_it() -> None:
         'angle (reversal). The model misses angle by 0.0432 rad rms. As force on the carriage it '
         'could explain 83 percent of the gap.')
     assert 'one test is not enough' in found.then and '`propose`' in found.then
+
+
+@pytest.mark.parametrize('begin, end, text', [
+    (2.0, 3.5, 'from 2.00 to 3.50 s'), (2.0, None, 'from 2.00 s on'), (None, 3.5, 'until 3.50 s')])
+def test_unknown_says_when_it_acts_and_by_which_law(
+        begin: float | None, end: float | None, text: str) -> None:
+    span = {'test': 'far', 'from_s': begin, 'until_s': end}
+    where = {'component': 'carriage', 'signal': 'angle', 'regime': 'stick', 'share': 0.6}
+    unknown: Any = {
+        'top': Named(['unknown'], 0.9, {}), 'how_far': {'per_signal': {}},
+        'residual_tests': {'depends_on': [
+            {'signal': 'angle', 'depends_on': 'rate', 'share': 0.62}]}}
+    found = said(verdict('unknown_effect', where=[{**where, 'acts': [span]}], **unknown))
+    assert found.what.endswith(f'It acts {text} of far. What is left of angle goes with rate '
+                               '(62 percent of it).')
+    # a declared model knows what is pushed, and how strongly
+    pushed = {**span, 'size': 3.0, 'unit': 'N'}
+    found = said(verdict('unknown_effect', where=[where], pushes=[pushed] * 3, **unknown))
+    assert f'It acts {text} of far, with 3 N, and 2 times more.' in found.what
 
 
 @pytest.mark.parametrize('text, expected', [
