@@ -26,19 +26,21 @@ Panel = tuple[str, str, str, Sequence[Curve]]
 
 
 def plotted(panels: Sequence[Panel], colours: Mapping[str, str] = MappingProxyType({}),
-            signals: Sequence[str] = ()) -> dict[str, Any]:
+            signals: Sequence[str] = (), wide: str = '') -> dict[str, Any]:
     """
     Return panels as the plain data that plotter.js reads, in the order in which they are drawn.
 
     What is not finite is left out, be it a sample, a curve or a panel. `colours` are those of
     curves by name; the others take theirs from COLOURS in turn. `signals` are those of the panels,
-    if the reader chooses among them; the first of a group is shown at first.
+    if the reader chooses among them; the first of a group is shown at first. `wide` is a curve that
+    others cover.
     """
     count = sum(len(curves) for *_, curves in panels) or 1
     most = min(MOST_SAMPLES, max(_MOST_OF_A_PAGE // count, _LEAST_SAMPLES))
     found = [{
         'group': group, 'title': title, 'unit': unit, 'signal': signal,
         'curves': [_packed(name, time[there], values[there], colours.get(name, colour), most)
+                   | {'width': 3.0 if name == wide else 1.4}
                    for (name, time, values), colour in zip(curves, COLOURS * len(curves))
                    if (there := np.isfinite(values)).any()],
     } for (group, title, unit, curves), signal in zip(panels, signals or [''] * len(panels))]

@@ -63,6 +63,9 @@ def contents(verdict: Verdict, facts: Mapping[str, str] = MappingProxyType({})) 
     for answer in verdict.which:
         for component in {effects[name].component for name in answer.effects if name in effects}:
             suspicion[component] += answer.probability
+    if verdict.word == 'unknown_effect':
+        for part, share in verdict.planning.get('unnamed', {}).items():
+            suspicion[part] = suspicion.get(part, 0.0) + share
     diagram = verdict.machine.diagram or Diagram.of(suspicion)
     shares = diagram.shares(suspicion)
     likely = [Likely(answer.effects, answer.probability,
@@ -73,24 +76,23 @@ def contents(verdict: Verdict, facts: Mapping[str, str] = MappingProxyType({})) 
     explained = '' if fraction['value'] is None else share_text(fraction)
     return Contents(
         title + stop.rstrip(), f'{more} {sure}'.strip(), then,
-        {'verdict': headline(verdict).capitalize(), **facts,
-         **_compared(verdict.machine.experiments)}, explained,
+        {'verdict': headline(verdict).capitalize(),
+         **dict.fromkeys(('machine', 'configuration', 'recordings'), ''),
+         'compared': _compared(verdict.machine.experiments), **facts}, explained,
         verdict.as_data(), diagram,
         [(block, min(shares.get(block.component, 0.0), 1.0)) for block in diagram.blocks],
         likely, *_curves(verdict), _advice(verdict))
 
 
-def _compared(experiments: Sequence[Experiment]) -> dict[str, str]:
-    """Return how much of the recordings is compared, if some are compared in part."""
-    compared: dict[str, tuple[float, float]] = {}
+def _compared(experiments: Sequence[Experiment]) -> str:
+    """Return how much of each recording is compared, as far as that is known."""
+    some: dict[tuple[str, float], float] = {}
     for experiment in experiments:
         if experiment.excerpt:
-            name, whole = experiment.excerpt.recording, experiment.excerpt.of_s
-            before = compared.get(name, (0.0, 0.0))[0]
-            compared[name] = before + float(experiment.time[-1] - experiment.time[0]), whole
-    told = [f'{name} {some:.0f} of {whole:.0f} s ({100.0 * min(some / whole, 1.0):.0f} percent)'
-            for name, (some, whole) in compared.items() if whole > 0.0]
-    return {'compared': ', '.join(told)} if told else {}
+            key = experiment.excerpt.recording, experiment.excerpt.of_s
+            some[key] = some.get(key, 0.0) + float(np.ptp(experiment.time))
+    return ', '.join(f'{name} {compared:.0f} of {whole:.0f} s ({100.0 * compared / whole:.0f} '
+                     'percent)' for (name, whole), compared in some.items() if whole > 0.0)
 
 
 def _curves(verdict: Verdict) -> tuple[list[Panel], list[str], dict[str, float]]:

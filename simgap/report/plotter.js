@@ -80,7 +80,7 @@
       axes: [{ ...axis, size: 22, gap: 4, space: spread,
                ...(isLast && { label: 'time [s]', labelSize: 18 }) },
              { ...axis, size: LEFT, gap: 6, space: 26 }],
-      series: [{}, ...curves.map(curve => ({ stroke: curve.colour, width: 1.4, spanGaps: true,
+      series: [{}, ...curves.map(curve => ({ stroke: curve.colour, width: curve.width, spanGaps: true,
                                              points: { size: 4, fill: curve.colour } }))],
       cursor: { y: false, points: { show: false }, sync: { key: group.name },
                 drag: { x: false, y: false, setScale: false },

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -66,12 +66,12 @@ BARE: dict[str, Any] = {
 TIME = np.linspace(0.0, 1.99, 200)
 
 
-def diagnosis(result: dict[str, Any], **machine: Any) -> Verdict:
-    """Return a diagnosis of a machine with two tests and two effects."""
+def diagnosis(result: dict[str, Any], read: Sequence[int] = (1,), **machine: Any) -> Verdict:
+    """Return a diagnosis of a machine with two tests, two effects and some channels read."""
     true = np.column_stack([np.sin(TIME), np.cos(TIME)])
-    measured = true.copy()
+    measured = np.full_like(true, np.nan)
+    measured[:, read] = true[:, read]
     measured[:20, 1] = np.nan
-    measured[:, 0] = np.nan   # never read
     model = SimpleNamespace(
         experiments=[Experiment(name, TIME, ('speed', HOSTILE), ('m/s', 'V'), measured,
                                 np.full_like(true, 0.1)) for name in (HOSTILE, 'second')],
@@ -184,6 +184,122 @@ def test_the_tests_are_zoomed_apart(browser: Page, tmp_path: Path) -> None:
     browser.key('+')
     after = pictures(browser)
     assert [a == b for a, b in zip(before, after, strict=True)] == [False, False, True, True]
+
+
+TITLES = '[...document.querySelectorAll(".head b")].map(e => e.textContent)'
+VALUES = '[...document.querySelectorAll("samp")].map(e => e.textContent)'
+AT = '[...document.querySelectorAll(".tools output")].map(e => e.textContent)'
+SPAN = '[document.documentElement.dataset.from, document.documentElement.dataset.to].map(Number)'
+
+
+def moment(browser: Page, group: int) -> float:
+    """Return the time at the cursor."""
+    return float(browser.tell(AT)[group].split()[2])
+
+
+def choose(browser: Page, which: int, option: int) -> None:
+    browser.tell(f'(() => {{ const list = document.querySelectorAll("#choice select")[{which}];'
+                 f' list.selectedIndex = {option}; list.dispatchEvent(new Event("change")); }})()')
+
+
+@needs_browser
+def test_recording_and_signal_are_chosen(browser: Page, tmp_path: Path) -> None:
+    show(browser, tmp_path, FULL, read=(0, 1))
+    assert browser.tell('[...document.querySelectorAll("#choice label")].map(e =>'
+                        ' [e.firstChild.data, ...[...e.lastChild].map(o => o.text)])') == [
+        ['Recording ', 'all', HOSTILE, 'second'],
+        ['Signal ', 'the one that tells most', 'all', 'speed', HOSTILE]]
+    least = 'measured less simulated [{}]'.format
+    own = [f'{HOSTILE} [V]', least('V')], ['speed [m/s]', least('m/s')]
+    # of both the model is off by 1; a tenth of the samples of one is missing
+    assert browser.tell(TITLES) == own[1] * 2
+    browser.key('+')
+    browser.tell('document.querySelectorAll(".group")[1].focus()')
+    browser.key('+')
+    span = browser.tell(SPAN)
+    choose(browser, 0, 2)
+    choose(browser, 1, 1)
+    assert browser.tell(TITLES) == own[1] + own[0]
+    assert browser.tell('[...document.querySelectorAll("h3")].map(e => e.textContent)') == [
+        'second']
+    assert browser.tell(SPAN) == span, 'the span outlives a choice'
+    choose(browser, 1, 3)
+    assert browser.tell(TITLES) == own[0]
+    choose(browser, 0, 0)
+    assert browser.tell(TITLES) == own[0] * 2
+    assert browser.complaints == []
+
+
+@needs_browser
+def test_values_at_the_cursor_are_those_of_the_samples(browser: Page, tmp_path: Path) -> None:
+    show(browser, tmp_path, FULL, read=(0, 1))
+    x, y = browser.place('.u-over', 0.25)
+    browser.mouse('mouseMoved', x, y)
+    said = browser.until(f'{AT}[0] && {AT}')
+    time = float(said[0].split()[2])
+    assert said == [f'values at {time:.3f} s', ''] and time == pytest.approx(0.5, abs=0.01)
+    measured = np.sin(TIME[np.argmin(np.abs(TIME - time))])
+    shown = [float(text) for text in browser.tell(VALUES)[:5]]
+    assert shown == pytest.approx([measured, measured - 1.0, measured, 1.0, 0.0], abs=0.02)
+    browser.mouse('mouseMoved', 1, 1)
+    browser.until(f'{AT}[0] === ""')
+    assert set(browser.tell(VALUES)) == {''}
+
+
+@needs_browser
+def test_a_phone_is_touched(browser: Page, tmp_path: Path) -> None:
+    browser.look(390, 800, dark=True)
+    browser.fingers()
+    show(browser, tmp_path, FULL)
+    sizes = browser.tell(
+        '[...document.querySelectorAll(".tools button, label:not([hidden]) select")].map(e => '
+        'Math.min(e.clientHeight, e.clientWidth))')
+    assert min(sizes) >= 40, 'as wide as a finger'
+    browser.tap('.u-over', 0.5)
+    browser.until(f'{AT}[0]')
+    assert moment(browser, 0) == pytest.approx(0.995, abs=0.01)
+    for title, span in (('zoom in', [0.4975, 1.4925]), ('later', [0.6965, 1.6915]),
+                        ('earlier', [0.4975, 1.4925]), ('zoom out', [0.0, 1.99]),
+                        ('zoom in', [0.4975, 1.4925]), ('everything', [0.0, 1.99])):
+        browser.tap(f'[aria-label="{title}"]')
+        browser.until(f'Math.abs({SPAN}[0] - {span[0]}) < 2e-3'
+                      f' && Math.abs({SPAN}[1] - {span[1]}) < 2e-3')
+
+
+@needs_browser
+def test_keys_reach_everything(browser: Page, tmp_path: Path) -> None:
+    show(browser, tmp_path, FULL, read=(0, 1))
+    reached = []
+    for _ in range(40):
+        browser.key('Tab')
+        reached.append(browser.tell('(e => e.ariaLabel || e.textContent.slice(0, 9) || e.tagName)'
+                                    '(document.activeElement)'))
+    for name in ('zoom in', 'later', 'measured', 'second', 'curves over time'):
+        assert name in reached
+    assert browser.tell('[...document.querySelectorAll("select")].every(e => e.tabIndex === 0)')
+    # keys act on the recording in which the focus is
+    browser.tell('document.querySelectorAll(".group")[1].focus()')
+    browser.key('ArrowRight', modifiers=8)
+    browser.until(f'{AT}[1]')
+    assert browser.tell(f'{AT}[0]') == ''
+    first = moment(browser, 1)
+    assert first == pytest.approx(0.995, abs=0.01)
+    before, after = browser.tell(VALUES)[-2:]
+    assert float(before) == pytest.approx(1.0) and abs(float(after)) < 1e-6
+    browser.key('ArrowLeft', modifiers=8)
+    assert first - moment(browser, 1) == pytest.approx(0.01 * 1.99, abs=0.005)
+
+
+@needs_browser
+def test_curves_follow_the_colours_of_day_and_night(browser: Page, tmp_path: Path) -> None:
+    show(browser, tmp_path, FULL)
+    told = []
+    for dark in (False, True):
+        browser.look(390, 800, dark)
+        told.append([*pictures(browser), *browser.tell(
+            '[".tools", ".tools button", "select", "body"].map(e => (s => s.color + s.background)'
+            '(getComputedStyle(document.querySelector(e))))')])
+    assert all(day != night for day, night in zip(*told, strict=True))
 
 
 def pictures(browser: Page) -> list[str]:
