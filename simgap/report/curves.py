@@ -31,9 +31,8 @@ def plotted(panels: Sequence[Panel], colours: Mapping[str, str] = MappingProxyTy
     Return panels as the plain data that plotter.js reads, in the order in which they are drawn.
 
     What is not finite is left out, be it a sample, a curve or a panel. `colours` are those of
-    curves by name; the others take theirs from COLOURS in turn. `signals` are those of the panels,
-    if the reader chooses among them; the first of a group is shown at first. `wide` is a curve that
-    others cover.
+    curves by name; the others take theirs from COLOURS in turn. `signals` are those of the panels
+    to choose from; the first of a group is shown at first. `wide` is a curve that others cover.
     """
     count = sum(len(curves) for *_, curves in panels) or 1
     most = min(MOST_SAMPLES, max(_MOST_OF_A_PAGE // count, _LEAST_SAMPLES))

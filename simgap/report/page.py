@@ -14,7 +14,7 @@ from simgap.machine.contract import Experiment, FloatArray
 from simgap.machine.diagram import Diagram, DiagramBlock
 from simgap.report.curves import Panel
 from simgap.verdict.record import share_text, value_lines, Verdict
-from simgap.verdict.sentence import headline, said
+from simgap.verdict.sentence import headline, is_open, said
 
 # How many hypotheses are shown, and how probable each has to be.
 _SHOWN, _LEAST = 8, 0.001
@@ -134,12 +134,12 @@ def _of_experiment(experiment: Experiment, before: FloatArray,
 
 def _advice(verdict: Verdict) -> list[str]:
     """Return which tests would settle what is open, as the machine knows them."""
+    if verdict.word in ('explained', 'no_gap') and not is_open(verdict):
+        return []
     names = {name for group in verdict.confusable for name in group}
     for answer in verdict.which:
         if answer.probability > _OPEN:
             names |= {name for name in answer.effects if name in verdict.machine.catalogue}
-    if len(names) < 2 and verdict.word in ('explained', 'no_gap'):
-        return []
     kinds = {name.partition('.')[2] for name in names}
     return [text for effects, text in verdict.machine.advice
             if not effects or kinds & set(effects)]

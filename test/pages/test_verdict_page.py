@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,7 +17,7 @@ from antenna_drive.pages import render
 from chromium import EXECUTABLE, Page
 import numpy as np
 import pytest
-from simgap.machine.contract import Effect, Experiment
+from simgap.machine.contract import Effect, Excerpt, Experiment, Form, Parameter
 from simgap.machine.diagram import Diagram, DiagramBlock
 from simgap.report.page import contents
 from simgap.verdict.record import Named, Verdict
@@ -77,8 +78,8 @@ def diagnosis(result: dict[str, Any], read: Sequence[int] = (1,), **machine: Any
                                 np.full_like(true, 0.1)) for name in (HOSTILE, 'second')],
         catalogue={'motors.friction': Effect('motors.friction', 'motors', HOSTILE, '', ()),
                    'dial.gain': Effect('dial.gain', 'dial', 'a bent needle', '', ())},
-        simulate=lambda points: [[true - 1.0] * 2, [true] * 2, [true] * 2],
-        **{'diagram': None, 'advice': (), 'words': {}, **machine})
+        **{'diagram': None, 'advice': (), 'words': {},
+           'simulate': lambda points: [[true - 1.0] * 2, [true] * 2, [true] * 2], **machine})
     fit: Any = SimpleNamespace(state=SimpleNamespace(point=dict), forms=())
     entries = {'statements': {}, 'fits': [], 'planning': {}, 'labels': None, **result}
     return Verdict(**{
@@ -306,6 +307,44 @@ def pictures(browser: Page) -> list[str]:
     found = browser.tell('[...document.querySelectorAll("canvas")].map(c => c.toDataURL())')
     assert isinstance(found, list)
     return found
+
+
+def test_the_page_says_how_much_is_compared_and_counts_time_as_the_recording() -> None:
+    verdict = diagnosis(FULL)
+    verdict.machine.experiments = [replace(experiment, excerpt=Excerpt('far', 20.0, zero))
+                                   for experiment, zero in zip(
+                                       verdict.machine.experiments, (5.0, 15.0), strict=True)]
+    found = contents(verdict, {'recordings': 'far.csv', 'made by': 'it 1.0'})
+    assert found.facts['compared'] == 'far 4 of 20 s (20 percent)'
+    assert list(found.facts)[-2:] == ['compared', 'made by'], 'beside the recordings'
+    begins = {time[0] for _, _, _, curves in found.panels for _, time, _ in curves}
+    assert begins == {5.0, 15.0}
+
+
+def test_the_table_tells_the_effect_from_what_is_fitted_beside_it() -> None:
+    """The effect lifts one signal by 3; a tolerance lifts the other by 1."""
+    size = Parameter('motors.friction.size', 'V', -9.0, 9.0, 0.1)
+    verdict = diagnosis(FULL, read=(0, 1), simulate=lambda points: [[np.column_stack([
+        np.full_like(TIME, point.get('zero', 0.0)),
+        np.full_like(TIME, point.get(size.name, 0.0))])] * 2 for point in points])
+    fitted = SimpleNamespace(point=lambda: {size.name: 3.0, 'zero': 1.0})
+    best: Any = SimpleNamespace(state=fitted, forms=(Form('', (size,)),))
+    assert contents(replace(verdict, best=best)).alone == pytest.approx(
+        {'speed': 0.0, HOSTILE: 3.0})
+
+
+@needs_browser
+def test_an_unknown_is_told_with_its_times(browser: Page, tmp_path: Path) -> None:
+    text = show(browser, tmp_path, {
+        **FULL, 'verdict': 'unknown_effect', 'planning': {'unnamed': {'dial': 0.85}},
+        'which': [FULL['which'][2], FULL['which'][0]],
+        'where': [{**FULL['where'][0], 'acts': [
+            {'test': HOSTILE, 'from_s': 0.5, 'until_s': None}]}]})
+    assert f'It acts from 0.50 s on of {HOSTILE}.' in text
+    assert f'it acts in from until size {HOSTILE} 0.50 s the end –' in text
+    assert browser.tell('[...document.querySelectorAll(".diagram text")]'
+                        '.map(e => e.textContent.replace(/\\s+/g, " "))') == [
+        'motors 75 %', 'dial 85 %'], 'the suspected part is marked'
 
 
 @needs_browser
