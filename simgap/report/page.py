@@ -16,20 +16,8 @@ from simgap.report.curves import Panel
 from simgap.verdict.record import share_text, value_lines, Verdict
 from simgap.verdict.sentence import headline, is_open, said
 
-# How many hypotheses are shown, and how probable each has to be.
-_SHOWN, _LEAST = 8, 0.001
 # An effect so probable is still open.
 _OPEN = 0.05
-
-
-@dataclass(frozen=True)
-class Likely:
-    """A hypothesis."""
-
-    effects: Sequence[str]  # their ids
-    probability: float  # 0 to 1
-    causes: Sequence[str]  # the physical cause of each effect that the catalogue knows
-    values: list[str]  # of the parameters, a line each
 
 
 @dataclass(frozen=True)
@@ -40,12 +28,13 @@ class Contents:
     lead: str  # how sure it is
     then: str  # what to do next
     facts: Mapping[str, str]  # what was diagnosed, with what
-    explained: str  # how much of the gap its effects explain; empty if it names none
     result: Mapping[str, Any]  # the JSON of docs/diagnosis.md, which holds the tables and notes
     diagram: Diagram  # of the machine
     # those of the diagram, each with the probability that an effect is there
     blocks: Sequence[tuple[DiagramBlock, float]]
-    likely: Sequence[Likely]  # the likeliest hypotheses
+    causes: Mapping[str, str]  # the physical cause of each effect of the catalogue
+    numbers: Sequence[Sequence[str]]  # of each answer, a line each
+    explained: str  # how much of the gap its effects explain; empty if it names none
     # each channel of each experiment, that which gains most first: measured, simulated, difference
     panels: Sequence[Panel]
     signals: Sequence[str]  # of the panels
@@ -66,22 +55,20 @@ def contents(verdict: Verdict, facts: Mapping[str, str] = MappingProxyType({})) 
     if verdict.word == 'unknown_effect':
         for part, share in verdict.planning.get('unnamed', {}).items():
             suspicion[part] = suspicion.get(part, 0.0) + share
+    fraction = verdict.how_far['explained_fraction']
     diagram = verdict.machine.diagram or Diagram.of(suspicion)
     shares = diagram.shares(suspicion)
-    likely = [Likely(answer.effects, answer.probability,
-                     [effects[name].cause for name in answer.effects if name in effects],
-                     value_lines(answer.parameters))
-              for answer in verdict.which[:_SHOWN] if answer.probability >= _LEAST]
-    fraction = verdict.how_far['explained_fraction']
-    explained = '' if fraction['value'] is None else share_text(fraction)
     return Contents(
         title + stop.rstrip(), f'{more} {sure}'.strip(), then,
         {'verdict': headline(verdict).capitalize(),
          **dict.fromkeys(('machine', 'configuration', 'recordings'), ''),
-         'compared': _compared(verdict.machine.experiments), **facts}, explained,
+         'compared': _compared(verdict.machine.experiments), **facts},
         verdict.as_data(), diagram,
         [(block, min(shares.get(block.component, 0.0), 1.0)) for block in diagram.blocks],
-        likely, *_curves(verdict), _advice(verdict))
+        {name: effect.cause for name, effect in effects.items()},
+        [value_lines(answer.parameters) for answer in verdict.which],
+        '' if fraction['value'] is None else share_text(fraction), *_curves(verdict),
+        _advice(verdict))
 
 
 def _compared(experiments: Sequence[Experiment]) -> str:

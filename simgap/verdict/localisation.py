@@ -16,8 +16,8 @@ from simgap.verdict import unknown_input
 from simgap.verdict.verdict import Answer, LackOfFit
 
 Located = dict[str, Any]
-# A residual is loud where its variance is so many times that of the rest; each is this share of
-# a test at least; and its ends are sought at so many places.
+# A loud residual has so many times the variance of the rest; each is at least this share of a
+# test; its ends are sought at so many places.
 _LOUDER, _LEAST_SHARE, _PLACES = 9.0, 0.1, 800
 
 
@@ -64,42 +64,34 @@ def of_the_unknown(problem: LeastSquares, none: FitState,
 def _acts(problem: LeastSquares, none: FitState, signal: str) -> Iterator[dict[str, Any]]:
     """Yield when a signal's residual is loud, of tests in which that begins or ends."""
     for k, experiment in enumerate(problem.experiments):
-        c = experiment.channels.index(signal)
-        residual = problem.residuals_of(none, k)[:, c]
-        there = np.flatnonzero(np.isfinite(residual))
-        regimes = problem.machine.motion(k).regimes()
-        # where it stands still, most things do not act
-        still = regimes.labels[there] == (regimes.names.index('stick')
-                                          if 'stick' in regimes.names else -1)
-        span = loud_span(residual[there], ~still)
-        if span is not None:
-            time = experiment.recorded_time[there]
-            yield {'test': experiment.name,
-                   'from_s': float(time[span[0]]) if span[0] > 0 else None,
-                   'until_s': float(time[span[1]]) if span[1] < len(time) else None}
+        residual = problem.residuals_of(none, k)[:, experiment.channels.index(signal)]
+        there, regimes = np.isfinite(residual), problem.machine.motion(k).regimes()
+        moves = np.array([name != 'stick' for name in regimes.names])[regimes.labels]
+        if span := loud_span(residual[there], moves[there]):
+            time, (first, last) = experiment.recorded_time[there], span
+            yield {'test': experiment.name, 'from_s': float(time[first]) if first else None,
+                   'until_s': float(time[last]) if last < time.size else None}
 
 
-def loud_span(residual: FloatArray, counts: NDArray[np.bool_]) -> tuple[int, int] | None:
+def loud_span(residual: FloatArray, able: NDArray[np.bool_]) -> tuple[int, int] | None:
     """
-    Return where a residual, shape (n,), begins to be loud and where it ends; None for nowhere.
+    Return where a residual, shape (n,), begins to be loud and where that ends; None for nowhere.
 
-    It maximises the likelihood of two variances (C. Inclan, G. C. Tiao, Use of cumulative sums of
-    squares for retrospective detection of changes of variance, JASA 89, 1994, with both ends at
-    once). `counts` has True where something could act: enough of such samples have to be quiet.
+    It maximises the likelihood of two variances, in the span and outside (C. Inclan, G. C. Tiao,
+    JASA 89, 1994, with both ends at once). Enough of what is quiet has to be `able` to be loud.
     """
-    width = -(-len(residual) // _PLACES) or 1
-    edges = np.append(np.arange(0, len(residual), width), len(residual))
-    energy, able = (np.append(0.0, np.cumsum(x))[edges] for x in (residual ** 2, counts))
-    inside, loud = (np.subtract.outer(x, x).T for x in (edges, energy))  # from row to column
-    outside, quiet = edges[-1] - inside, energy[-1] - loud
-    unheard = able[-1] - np.subtract.outer(able, able).T
-    possible = ((inside > _LEAST_SHARE * edges[-1]) & (unheard > _LEAST_SHARE * edges[-1])
-                & (loud * outside > _LOUDER * quiet * inside))
-    if not possible.any():
+    count = residual.size
+    edges = np.append(np.arange(0, count, max(-(-count // _PLACES), 1)), count)
+    inside, loud, busy = (np.subtract.outer(x, x).T for x in (
+        edges, *(np.append(0.0, np.cumsum(y))[edges] for y in (residual ** 2, able))))
+    outside, quiet, idle = (x[0, -1] - x for x in (inside, loud, busy))
+    fits = ((np.minimum(inside, idle) > _LEAST_SHARE * count)
+            & (loud * outside > _LOUDER * quiet * inside))
+    if not fits.any():
         return None
-    with np.errstate(divide='ignore', invalid='ignore'):
-        cost = np.where(possible, inside * np.log(loud / inside)
-                        + outside * np.log(np.maximum(quiet, 1e-30) / outside), np.inf)
+    cost = np.full(fits.shape, np.inf)
+    cost[fits] = (inside[fits] * np.log(loud[fits] / inside[fits])
+                  + outside[fits] * np.log(np.maximum(quiet[fits], 1e-30) / outside[fits]))
     first, last = np.unravel_index(np.argmin(cost), cost.shape)
     return int(edges[first]), int(edges[last])
 

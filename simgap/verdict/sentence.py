@@ -57,19 +57,18 @@ def said(verdict: Verdict) -> Said:
 
 def is_open(verdict: Verdict) -> bool:
     """Return whether several answers are left, which a further test has to tell apart."""
-    return bool(verdict.confusable) or _proposed(verdict) == SEPARATE
+    return bool(verdict.confusable) or _separates(verdict)
 
 
-def _proposed(verdict: Verdict) -> str:
-    """Return what the test is for that `propose` designs if it is told nothing else."""
-    known = 'rivals' in verdict.planning
-    return objective_for(Findings.of_data(verdict.planning) if known else Findings())
+def _separates(verdict: Verdict) -> bool:
+    """Return whether that is what `propose` does if it is told nothing else."""
+    known = Findings.of_data(verdict.planning) if verdict.planning else Findings()
+    return objective_for(known) == SEPARATE
 
 
 def _designed(verdict: Verdict) -> str:
-    asked = is_open(verdict) and _proposed(verdict) != SEPARATE
-    return (f'the test that `propose{" --objective separate" * asked}` designs from what '
-            '`diagnose --json` writes')
+    asked = ' --objective separate' if is_open(verdict) and not _separates(verdict) else ''
+    return f'the test that `propose{asked}` designs from what `diagnose --json` writes'
 
 
 def headline(verdict: Verdict) -> str:
@@ -169,16 +168,12 @@ def _when(verdict: Verdict) -> Iterator[str]:
     spans = getattr(verdict, 'pushes', ()) or [
         span for item in verdict.where[:1] for span in item.get('acts', ())]
     for span in spans[:1]:
-        size_of_it = f', with {quantity(span["size"], span["unit"])}' if 'size' in span else ''
+        begin, end = span['from_s'], span['until_s']
+        when = (f'until {end:.2f} s' if begin is None else f'from {begin:.2f} s on' if end is None
+                else f'from {begin:.2f} to {end:.2f} s')
+        force = f', with {quantity(span["size"], span["unit"])}' if 'size' in span else ''
         more = f', and {len(spans) - 1} times more' if spans[1:] else ''
-        yield f'It acts {_from_to(span)} of {span["test"]}{size_of_it}{more}.'
-
-
-def _from_to(span: Mapping[str, Any]) -> str:
-    begin, end = span['from_s'], span['until_s']
-    if begin is None:
-        return f'until {end:.2f} s'
-    return f'from {begin:.2f} s on' if end is None else f'from {begin:.2f} to {end:.2f} s'
+        yield f'It acts {when} of {span["test"]}{force}{more}.'
 
 
 def _law(verdict: Verdict) -> Iterator[str]:

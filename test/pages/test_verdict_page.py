@@ -336,7 +336,8 @@ def test_the_table_tells_the_effect_from_what_is_fitted_beside_it() -> None:
 @needs_browser
 def test_an_unknown_is_told_with_its_times(browser: Page, tmp_path: Path) -> None:
     text = show(browser, tmp_path, {
-        **FULL, 'verdict': 'unknown_effect', 'planning': {'unnamed': {'dial': 0.85}},
+        **FULL, 'verdict': 'unknown_effect', 'planning': {
+            'unnamed': {'dial': 0.85}, 'rivals': [], 'inflation': 1.0},
         'which': [FULL['which'][2], FULL['which'][0]],
         'where': [{**FULL['where'][0], 'acts': [
             {'test': HOSTILE, 'from_s': 0.5, 'until_s': None}]}]})
