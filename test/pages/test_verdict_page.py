@@ -334,6 +334,27 @@ def test_the_table_tells_the_effect_from_what_is_fitted_beside_it() -> None:
 
 
 @needs_browser
+def test_a_phone_shows_every_number_of_a_wide_table(browser: Page, tmp_path: Path) -> None:
+    numbers = {name: 6.32e-05 for name in ('before', 'after', 'before_in_unit', 'after_in_unit')}
+    size = Parameter('motors.friction.size', 'V', -9.0, 9.0, 0.1)
+    verdict = diagnosis({
+        **FULL, 'how_far': {**FULL['how_far'], 'per_signal': {
+            HOSTILE: {**numbers, 'unit': 'article A'}}},
+        'remains': {HOSTILE: {**FULL['remains'][HOSTILE], 'noise': 1.75e-06}}})
+    best: Any = SimpleNamespace(state=SimpleNamespace(point=dict), forms=(Form('', (size,)),))
+    path = tmp_path / 'verdict.html'
+    path.write_text(render('verdict.html', **vars(contents(replace(verdict, best=best)))))
+    browser.look(390, 800)
+    browser.open(path.as_uri())
+    assert browser.tell('[...document.querySelectorAll(".stack td")].map(e => [e.textContent,'
+                        ' getComputedStyle(e, "::before").content])') == [
+        ['6.32e-05', '"before "'], ['6.32e-05', '"after "'], ['1.75e-06', '"noise "'],
+        ['0', '"moved by the effect alone "']]
+    assert browser.tell('[...document.querySelectorAll("body *")]'
+                        '.every(e => e.getBoundingClientRect().right <= 390)') is True
+
+
+@needs_browser
 def test_an_unknown_is_told_with_its_times(browser: Page, tmp_path: Path) -> None:
     text = show(browser, tmp_path, {
         **FULL, 'verdict': 'unknown_effect', 'planning': {
