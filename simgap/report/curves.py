@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 # Colours that stay apart for colour-blind readers and in print (Okabe and Ito).
 COLOURS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9')
-# A curve of more samples is thinned to the lowest and the highest of as many runs as needed; so
-# are all curves of a page of many, that it stays a few megabytes.
-MOST_SAMPLES, _MOST_OF_A_PAGE, _LEAST_SAMPLES = 40_000, 600_000, 2_000
+# A curve of more samples is thinned to the lowest and the highest of as many runs as needed. Where
+# one chooses among signals, all panels share so many, but each has the least at least.
+MOST_SAMPLES, _LEAST_SAMPLES = 40_000, 4_000
 
 # Name, times as floats [s] or as whole numbers [ns], and values; both arrays of shape (n,).
 Curve = tuple[str, NDArray[Any], NDArray[np.float64]]
@@ -34,8 +34,7 @@ def plotted(panels: Sequence[Panel], colours: Mapping[str, str] = MappingProxyTy
     curves by name; the others take theirs from COLOURS in turn. `signals` are those of the panels
     to choose from; the first of a group is shown at first. `wide` is a curve that others cover.
     """
-    count = sum(len(curves) for *_, curves in panels) or 1
-    most = min(MOST_SAMPLES, max(_MOST_OF_A_PAGE // count, _LEAST_SAMPLES))
+    most = max(MOST_SAMPLES // len(panels), _LEAST_SAMPLES) if signals else MOST_SAMPLES
     found = [{
         'group': group, 'title': title, 'unit': unit, 'signal': signal,
         'curves': [_packed(name, time[there], values[there], colours.get(name, colour), most)
