@@ -335,7 +335,7 @@ def test_the_table_tells_the_effect_from_what_is_fitted_beside_it() -> None:
 
 @needs_browser
 def test_a_phone_shows_every_number_of_a_wide_table(browser: Page, tmp_path: Path) -> None:
-    numbers = {name: 6.32e-05 for name in ('before', 'after', 'before_in_unit', 'after_in_unit')}
+    numbers = dict.fromkeys(('before', 'after', 'before_in_unit', 'after_in_unit'), 6.32e-05)
     size = Parameter('motors.friction.size', 'V', -9.0, 9.0, 0.1)
     verdict = diagnosis({
         **FULL, 'how_far': {**FULL['how_far'], 'per_signal': {
