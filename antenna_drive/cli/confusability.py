@@ -96,4 +96,4 @@ def _size(size: float, unit: str) -> str:
     """Return a detectable size as people say it."""
     if not np.isfinite(size):
         return 'does not show'
-    return spoken.size(size, unit)
+    return spoken.size(size, unit, ' %')

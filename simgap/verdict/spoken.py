@@ -24,9 +24,9 @@ def quantity(value: float, unit: str) -> str:
     return number(value) + ('' if unit in ('1', '') else f' {unit}')
 
 
-def size(value: float, unit: str) -> str:
+def size(value: float, unit: str, word: str = ' percent') -> str:
     """Return the size of an effect with its unit; one of unit 1 is a share, and in percent."""
-    return f'{number(100.0 * value)} percent' if unit == '1' else quantity(value, unit)
+    return f'{number(100.0 * value)}{word}' if unit == '1' else quantity(value, unit)
 
 
 def percent(share: float, word: str = ' percent') -> str:
