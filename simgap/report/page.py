@@ -88,15 +88,18 @@ def _curves(verdict: Verdict) -> tuple[list[Panel], list[str], dict[str, float]]
     off = {p.name: 0.0 for form in verdict.best.forms for p in form.sizes}
     before, after, bare = machine.simulate(
         [verdict.none.state.point(), fitted, {**fitted, **off}])
-    panels, signals = [], []
-    for experiment, first, second in zip(machine.experiments, before, after, strict=True):
-        assert first is not None and second is not None
+    panels: list[Panel] = []
+    signals: list[str] = []
+    moved: list[FloatArray] = []
+    for experiment, first, second, third in zip(machine.experiments, before, after, bare,
+                                                strict=True):
+        assert first is not None and second is not None and third is not None
+        moved.append(second - third)
         for channel, pair in _of_experiment(experiment, first, second):
             panels += pair
             signals += [channel] * len(pair)
-    moved = np.concatenate([np.subtract(*pair) for pair in zip(after, bare, strict=True)])
-    alone = dict(zip(machine.experiments[0].channels,
-                     np.sqrt(np.nanmean(moved ** 2, axis=0)).tolist(), strict=True)) if off else {}
+    rms = np.sqrt(np.nanmean(np.concatenate(moved) ** 2, axis=0)).tolist()
+    alone = dict(zip(machine.experiments[0].channels, rms, strict=True)) if off else {}
     return panels, signals, alone
 
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 from simgap.next_test.design import objective_for, SEPARATE
 from simgap.next_test.rivals import Findings
-from simgap.verdict.intervals import jackknife, same_number, TWO_SIDED_95
+from simgap.verdict.intervals import jackknife, TWO_SIDED_95
 from simgap.verdict.spoken import percent, quantity, size, with_interval
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def _why_wide(verdict: Verdict) -> Iterator[str]:
         if TWO_SIDED_95 * jackknife(turns) >= _HALF * half:
             why = ('the recordings differ: without one or another it is '
                    f'{size(min(turns), item["unit"])} to {size(max(turns), item["unit"])}')
-        elif TWO_SIDED_95 * same_number(sizes[name], item['value']) >= _HALF * half:
+        elif sizes[name].tolerance >= _HALF * half:
             why = ('a healthy machine may have up to '
                    f'{size(sizes[name].tolerance, item["unit"])} of it')
         else:
