@@ -230,6 +230,7 @@ def row_of(machine: FleetMachine, verdict: Mapping[str, Any]) -> dict[str, Any]:
     return {'machine': machine.name,
             'recordings': [path.name for path in machine.recordings],
             'verdict': verdict['verdict'],
+            'sentence': verdict.get('sentence', ''),
             'effects': first['effects'],
             'probability': first['probability'],
             'explained': explained['value'],
@@ -271,6 +272,7 @@ def text(rows: Sequence[Mapping[str, Any]]) -> str:
         lines.append(f'{row["machine"]:{width}}  {row["verdict"]:18}{share(row):>9}  '
                      + (' + '.join(row['effects']) + f' ({100.0 * row["probability"]:.0f} %)'
                         if row['effects'] else ''))
+        lines += [f'{"":{width}}  {row["sentence"]}'] if row['sentence'] else []
     found = summary(rows)
     lines.append('')
     lines.append(f'{found["machines"]} machines: ' + ', '.join(
@@ -352,7 +354,7 @@ def _keep(folder: Path, machine: FleetMachine, key: str, found: Files) -> dict[s
 def _failed(machine: FleetMachine, said: str) -> dict[str, Any]:
     lines = said.strip().splitlines() or ['nothing said']
     return {'machine': machine.name, 'recordings': [path.name for path in machine.recordings],
-            'verdict': None, 'effects': [], 'probability': None, 'explained': None,
+            'verdict': None, 'sentence': '', 'effects': [], 'probability': None, 'explained': None,
             'explained_ci95': None, 'confusable': [], 'notes': [], 'seconds': None, 'page': None,
             'failure': one_line(lines[-1].removeprefix('antenna-drive diagnose: '), 200)}
 

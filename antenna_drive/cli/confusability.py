@@ -23,7 +23,7 @@ import numpy as np
 from simgap.command.output import add_json_option, check_options, give, Progress
 from simgap.errors import UserError
 from simgap.inputs.schema import Entry
-from simgap.verdict.spoken import number, quantity
+from simgap.verdict import spoken
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -96,4 +96,4 @@ def _size(size: float, unit: str) -> str:
     """Return a detectable size as people say it."""
     if not np.isfinite(size):
         return 'does not show'
-    return f'{number(100.0 * size)} %' if unit == '1' else quantity(size, unit)
+    return spoken.size(size, unit, ' %')

@@ -29,7 +29,7 @@ from antenna_drive.readings import AT, of, TACHOMETER
 from antenna_drive.recording import sheet as sheets
 from antenna_drive.recording.recording import Recording
 import numpy as np
-from simgap.machine.contract import FloatArray
+from simgap.machine.contract import Excerpt, FloatArray
 
 # This many recordings tell different things: one window of each is enough. Of fewer, two are
 # taken.
@@ -67,6 +67,7 @@ class FieldTest:
     start_angle : of the axis at the beginning of the window, since that of the recording [rad];
         waves go on where they were
     labels : what was different in this test, by its sheet
+    excerpt : of the recording
     """
 
     name: str
@@ -83,6 +84,7 @@ class FieldTest:
     known_start: bool = True
     start_angle: float = 0.0
     labels: Mapping[str, str] = field(default_factory=dict)
+    excerpt: Excerpt | None = None
 
     @property
     def tolerances(self) -> sheets.Tolerances:
@@ -177,7 +179,7 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
         bias.later(window.begin), time - window.begin, measured, slope,
         sensors, jitter_of(recording.command, recording.rates.time_s, recording.rates.values),
         recording.period, recording.sheet, window.known_start, angle,
-        dict(recording.sheet.labels or ()))
+        dict(recording.sheet.labels or ()), Excerpt(recording.name, recording.end, window.begin))
     if not window.known_start:
         off = (measured - test.simulated(_STEP_S))[:, AT['encoder']]
         if np.isfinite(off).any():

@@ -130,7 +130,7 @@ class AntennaMachine(Machine):
             noise = test.sensors.noise(out[:, :, 0], slope, test.jitter)
             found.append(Experiment(
                 test.name, test.time, tuple(AT), tuple(reading.unit for reading in READINGS),
-                test.measured, noise, labels=test.labels,
+                test.measured, noise, labels=test.labels, excerpt=test.excerpt,
                 quantised=tuple(r.name for r in READINGS if r.sensor.is_counter)))
         return tuple(found)
 

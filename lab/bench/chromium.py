@@ -153,7 +153,18 @@ class Page:
         """Move, press, release or turn the wheel of the mouse, as a person does."""
         self._ask('Input.dispatchMouseEvent', type=kind, x=x, y=y, **more)
 
-    def key(self, key: str) -> None:
-        """Press a key."""
-        self._ask('Input.dispatchKeyEvent', type='keyDown', key=key, text=key)
-        self._ask('Input.dispatchKeyEvent', type='keyUp', key=key)
+    def fingers(self) -> None:
+        """Make the window one that is touched."""
+        self._ask('Emulation.setTouchEmulationEnabled', enabled=True)
+
+    def tap(self, selector: str, across: float = 0.5) -> None:
+        """Touch an element with a finger, at a place from its left 0 to its right 1."""
+        x, y = self.place(selector, across)
+        for kind, points in (('touchStart', [{'x': x, 'y': y}]), ('touchEnd', [])):
+            self._ask('Input.dispatchTouchEvent', type=kind, touchPoints=points)
+
+    def key(self, key: str, **more: Any) -> None:
+        """Press a key; `more` may have modifiers, 8 for Shift."""
+        text = {'text': key} if len(key) == 1 else {}
+        self._ask('Input.dispatchKeyEvent', type='keyDown', key=key, **text, **more)
+        self._ask('Input.dispatchKeyEvent', type='keyUp', key=key, **more)

@@ -104,11 +104,10 @@ def earlier_of(path: Path | None) -> Sequence[Rival]:
 def facts(made_by: str, machine: str, configuration: str, paths: Sequence[str]) -> dict[str, str]:
     """Return what was diagnosed, when it was written, and with what, for the page."""
     called = [made_by.partition(' ')[0], *sys.argv[1:]]
-    found = {'machine': machine, 'configuration': configuration, 'recordings': ', '.join(
+    return {'machine': machine, 'configuration': configuration, 'recordings': ', '.join(
         f'{Path(path).name} ({datetime.fromtimestamp(Path(path).stat().st_mtime):%Y-%m-%d})'
         for path in paths), 'made by': made_by,
         'command': shlex.join(called) if called[1:] and 'diagnose' in called[1] else ''}
-    return {name: text for name, text in found.items() if text}
 
 
 def write_report(path: str | None, verdict: Verdict, about: Mapping[str, str]) -> None:

@@ -112,11 +112,20 @@ def proposed(arguments: argparse.Namespace, tests: Callable[[dict[str, Any]], Te
         with replaced(arguments.report) as stream:
             shown = contents(found, space)
             stream.write(render('proposal.html', **{**vars(shown), 'data': data}).encode())
-    told = lines(data)
+    told = lines(in_percent(data))
     if objective == 'detect' and not arguments.objective:
-        told.insert(0, 'no answers to tell apart: this test looks for other effects')
+        told.insert(0, 'no answers to tell apart: this test looks for other effects; what to do '
+                       "about what was found stands in the verdict's sentence, after 'Next'")
     give(data, arguments.json, '\n'.join(told))
     return 0 if found.tests else 1
+
+
+def in_percent(data: dict[str, Any]) -> dict[str, Any]:
+    """Return a proposal for people: the sizes of unit 1 in percent."""
+    return {**data, **({'smallest_sizes': {
+        name: item if item['unit'] != '1' or item['size'] is None else
+        {'size': 100.0 * item['size'], 'unit': '%'}
+        for name, item in data['smallest_sizes'].items()}} if 'smallest_sizes' in data else {})}
 
 
 def _planning(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -134,7 +143,7 @@ def _write(path: Path, found: Proposal, space: TestSpace, data: dict[str, Any]) 
     from simgap.next_test.proposal import lines
     best = found.tests[0]
     heading = [f'{data["duration_s"]:g} s, at least {data["sample_rate_hz"]:g} samples per second',
-               *(line.strip() for line in lines(data))]
+               *(line.strip() for line in lines(in_percent(data)))]
     if data.get('channels'):
         shares = sorted(data['channels'].items(), key=lambda item: -item[1])
         heading.append('what tells: ' + ', '.join(

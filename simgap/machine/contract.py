@@ -7,11 +7,11 @@ from __future__ import annotations
 from simgap.machine.arrays import Course, FloatArray, Point
 from simgap.machine.catalogue import Catalogue
 from simgap.machine.effect import Effect, Form, Parameter
-from simgap.machine.experiment import Colour, Experiment
+from simgap.machine.experiment import Colour, Excerpt, Experiment
 from simgap.machine.machine import DisturbanceInput, Machine
 from simgap.machine.motion import Motion, Regimes, TimeScales
 from simgap.machine.nuisances import Nuisances
 
-__all__ = ['Catalogue', 'Colour', 'Course', 'DisturbanceInput', 'Effect', 'Experiment',
-           'FloatArray', 'Form', 'Machine', 'Motion', 'Nuisances', 'Parameter', 'Point', 'Regimes',
-           'TimeScales']
+__all__ = ['Catalogue', 'Colour', 'Course', 'DisturbanceInput', 'Effect', 'Excerpt', 'Experiment',
+           'FloatArray', 'Form', 'Machine', 'Motion', 'Nuisances', 'Parameter', 'Point',
+           'Regimes', 'TimeScales']

@@ -21,6 +21,15 @@ class Colour:
 
 
 @dataclass(frozen=True)
+class Excerpt:
+    """Of which recording, how long that is, and when in it the test's time is zero [s]."""
+
+    recording: str
+    of_s: float
+    zero_s: float = 0.0
+
+
+@dataclass(frozen=True)
 class Experiment:
     """
     What was measured in one test.
@@ -33,6 +42,7 @@ class Experiment:
     model_error : slow error of a right model, shape (c,), as read; None for a usual share
     colours : of the noise of each signal, as a diagnosis finds it; empty for white noise
     labels : what was different in this test, such as load: A; see `interventions`
+    excerpt : of which recording it is; None if that is not known
     """
 
     name: str
@@ -45,6 +55,12 @@ class Experiment:
     model_error: FloatArray | None = None
     colours: tuple[Colour, ...] = ()
     labels: Mapping[str, str] = field(default_factory=dict)
+    excerpt: Excerpt | None = None
+
+    @property
+    def recorded_time(self) -> FloatArray:
+        """Return the time of the recording, shape (n,) [s]."""
+        return self.time + (self.excerpt.zero_s if self.excerpt else 0.0)
 
     def model_error_of(self, channel: int, share: float) -> float:
         """Return the model's error in a signal; by default a share of the signal's spread."""

@@ -18,6 +18,7 @@ from simgap.model.declared import Model
 from simgap.model.machine import OwnMachine
 from simgap.model.named_numbers import Numbers
 from simgap.model.response import NO_RESPONSE, StepResponse, tests_of, where_it_acts
+from simgap.verdict.spoken import quantity
 
 # Two difference quotients with a step and twice the step differ by less than this where the
 # simulation is smooth.
@@ -129,9 +130,9 @@ def _rough_effects(machine: OwnMachine) -> Iterator[str]:
         for parameter in form.sizes:
             if not any(StepResponse.at(machine, parameter, k, form.start).acts
                        for k in tests_of(machine, parameter)):
-                yield (f'{parameter.name}: a step of {parameter.step:g} {parameter.unit} from 0 '
-                       'changes no reading, and a search begins there; let it act from 0 on, or '
-                       'give a larger step=')
+                yield (f'{parameter.name}: a step of {quantity(parameter.step, parameter.unit)} '
+                       'from 0 changes no reading, and a search begins there; let it act from 0 '
+                       'on, or give a larger step=')
             here = where_it_acts(form, parameter)
             yield from _told(parameter, [StepResponse.at(machine, parameter, k, here)
                                          for k in tests_of(machine, parameter)])
@@ -141,9 +142,9 @@ def _told(parameter: Parameter, responses: Sequence[StepResponse]) -> Iterator[s
     worst = max((item.roughness for item in responses), default=0.0)
     if worst > _ROUGH:
         yield (f'{parameter.name}: the derivative of the readings by it is noise: it changes by '
-               f'{100.0 * min(worst, 9.99):.0f} % where the step of {parameter.step:g} '
-               f'{parameter.unit} is doubled; leave digits out of the simulation, let it switch '
-               'between samples, or give a larger step=')
+               f'{100.0 * min(worst, 9.99):.0f} % where the step of '
+               f'{quantity(parameter.step, parameter.unit)} is doubled; leave digits out of the '
+               'simulation, let it switch between samples, or give a larger step=')
 
 
 def _rms(change: FloatArray, noise: FloatArray) -> float:

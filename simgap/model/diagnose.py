@@ -29,6 +29,7 @@ from simgap.next_test.rivals import Rival
 from simgap.settings import DEFAULT, Settings
 from simgap.verdict.diagnosis import diagnose, Progress
 from simgap.verdict.record import Verdict
+from simgap.verdict.spoken import quantity
 
 # Pushes that the summary lists.
 _PUSHES = 6
@@ -136,7 +137,7 @@ def pushes_found(verdict: Verdict, settings: Settings = DEFAULT) -> list[dict[st
 
 def _pushed(pushes: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return what pushes and when."""
-    lines = [f'  {item["test"]}: {item["place"]} {item["size"]:.3g} {item["unit"]} from '
+    lines = [f'  {item["test"]}: {item["place"]} {quantity(item["size"], item["unit"])} from '
              f'{item["from_s"]:.2f} to {item["until_s"]:.2f} s' for item in pushes[:_PUSHES]]
     more = len(pushes) - _PUSHES
     return lines + [f'  and {more} more, see the JSON'] if more > 0 else lines

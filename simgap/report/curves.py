@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 # Colours that stay apart for colour-blind readers and in print (Okabe and Ito).
 COLOURS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9')
-# A curve of more samples is thinned to the lowest and the highest of as many runs as needed.
-MOST_SAMPLES = 40_000
+# A curve of more samples is thinned to the lowest and the highest of as many runs as needed. Where
+# one chooses among signals, all panels share so many, but each has the least at least.
+MOST_SAMPLES, _LEAST_SAMPLES = 40_000, 4_000
 
 # Name, times as floats [s] or as whole numbers [ns], and values; both arrays of shape (n,).
 Curve = tuple[str, NDArray[Any], NDArray[np.float64]]
@@ -24,20 +25,23 @@ Curve = tuple[str, NDArray[Any], NDArray[np.float64]]
 Panel = tuple[str, str, str, Sequence[Curve]]
 
 
-def plotted(panels: Sequence[Panel],
-            colours: Mapping[str, str] = MappingProxyType({})) -> dict[str, Any]:
+def plotted(panels: Sequence[Panel], colours: Mapping[str, str] = MappingProxyType({}),
+            signals: Sequence[str] = (), wide: str = '') -> dict[str, Any]:
     """
     Return panels as the plain data that plotter.js reads, in the order in which they are drawn.
 
     What is not finite is left out, be it a sample, a curve or a panel. `colours` are those of
-    curves by name; the others take theirs from COLOURS in turn.
+    curves by name; the others take theirs from COLOURS in turn. `signals` are those of the panels
+    to choose from; the first of a group is shown at first. `wide` is a curve that others cover.
     """
+    most = max(MOST_SAMPLES // len(panels), _LEAST_SAMPLES) if signals else MOST_SAMPLES
     found = [{
-        'group': group, 'title': title, 'unit': unit,
-        'curves': [_packed(name, time[there], values[there], colours.get(name, colour))
+        'group': group, 'title': title, 'unit': unit, 'signal': signal,
+        'curves': [_packed(name, time[there], values[there], colours.get(name, colour), most)
+                   | {'width': 3.0 if name == wide else 1.4}
                    for (name, time, values), colour in zip(curves, COLOURS * len(curves))
                    if (there := np.isfinite(values)).any()],
-    } for group, title, unit, curves in panels]
+    } for (group, title, unit, curves), signal in zip(panels, signals or [''] * len(panels))]
     return {'panels': [panel for panel in found if panel['curves']]}
 
 
@@ -61,9 +65,9 @@ def kept(values: NDArray[np.float64], most: int = MOST_SAMPLES) -> tuple[NDArray
 
 
 def _packed(name: str, time: NDArray[Any], values: NDArray[np.float64],
-            colour: str) -> dict[str, Any]:
+            colour: str, most: int) -> dict[str, Any]:
     stamps = time if time.dtype.kind == 'i' else np.rint(1e9 * time).astype(np.int64)
-    chosen, width = kept(values)
+    chosen, width = kept(values, most)
     stamps, values = stamps[chosen], values[chosen]
     # shares of the widest difference from the first value: four bytes are then enough
     base = float(values[0])

@@ -4,9 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-import math
 from types import MappingProxyType
 from typing import Any
 
@@ -15,22 +14,10 @@ from simgap.machine.contract import Experiment, FloatArray
 from simgap.machine.diagram import Diagram, DiagramBlock
 from simgap.report.curves import Panel
 from simgap.verdict.record import share_text, value_lines, Verdict
-from simgap.verdict.sentence import headline, said
+from simgap.verdict.sentence import headline, is_open, said
 
-# How many hypotheses are shown, and how probable each has to be.
-_SHOWN, _LEAST = 8, 0.001
 # An effect so probable is still open.
 _OPEN = 0.05
-
-
-@dataclass(frozen=True)
-class Likely:
-    """A hypothesis."""
-
-    effects: Sequence[str]  # their ids
-    probability: float  # 0 to 1
-    causes: Sequence[str]  # the physical cause of each effect that the catalogue knows
-    values: list[str]  # of the parameters, a line each
 
 
 @dataclass(frozen=True)
@@ -41,14 +28,18 @@ class Contents:
     lead: str  # how sure it is
     then: str  # what to do next
     facts: Mapping[str, str]  # what was diagnosed, with what
-    explained: str  # how much of the gap its effects explain; empty if it names none
     result: Mapping[str, Any]  # the JSON of docs/diagnosis.md, which holds the tables and notes
     diagram: Diagram  # of the machine
     # those of the diagram, each with the probability that an effect is there
     blocks: Sequence[tuple[DiagramBlock, float]]
-    likely: Sequence[Likely]  # the likeliest hypotheses
-    # the channel of each experiment that gains most: measured, simulated and difference
+    causes: Mapping[str, str]  # the physical cause of each effect of the catalogue
+    numbers: Sequence[Sequence[str]]  # of each answer, a line each
+    explained: str  # how much of the gap its effects explain; empty if it names none
+    # each channel of each experiment, that which gains most first: measured, simulated, difference
     panels: Sequence[Panel]
+    signals: Sequence[str]  # of the panels
+    # by how much the effects alone move each channel, all else as fitted: rms, in its unit
+    alone: Mapping[str, float]
     advice: Sequence[str]  # tests that would settle what is open
 
 
@@ -61,55 +52,84 @@ def contents(verdict: Verdict, facts: Mapping[str, str] = MappingProxyType({})) 
     for answer in verdict.which:
         for component in {effects[name].component for name in answer.effects if name in effects}:
             suspicion[component] += answer.probability
+    if verdict.word == 'unknown_effect':
+        for part, share in verdict.planning.get('unnamed', {}).items():
+            suspicion[part] = suspicion.get(part, 0.0) + share
+    fraction = verdict.how_far['explained_fraction']
     diagram = verdict.machine.diagram or Diagram.of(suspicion)
     shares = diagram.shares(suspicion)
-    likely = [Likely(answer.effects, answer.probability,
-                     [effects[name].cause for name in answer.effects if name in effects],
-                     value_lines(answer.parameters))
-              for answer in verdict.which[:_SHOWN] if answer.probability >= _LEAST]
-    fraction = verdict.how_far['explained_fraction']
-    explained = '' if fraction['value'] is None else share_text(fraction)
     return Contents(
         title + stop.rstrip(), f'{more} {sure}'.strip(), then,
-        {'verdict': headline(verdict).capitalize(), **facts}, explained,
+        {'verdict': headline(verdict).capitalize(),
+         **dict.fromkeys(('machine', 'configuration', 'recordings'), ''),
+         'compared': _compared(verdict.machine.experiments), **facts},
         verdict.as_data(), diagram,
         [(block, min(shares.get(block.component, 0.0), 1.0)) for block in diagram.blocks],
-        likely, _panels(verdict), _advice(verdict))
+        {name: effect.cause for name, effect in effects.items()},
+        [value_lines(answer.parameters) for answer in verdict.which],
+        '' if fraction['value'] is None else share_text(fraction), *_curves(verdict),
+        _advice(verdict))
 
 
-def _panels(verdict: Verdict) -> list[Panel]:
-    machine = verdict.machine
-    before, after = machine.simulate([verdict.none.state.point(), verdict.best.state.point()])
+def _compared(experiments: Sequence[Experiment]) -> str:
+    """Return how much of each recording is compared, as far as that is known."""
+    some: dict[tuple[str, float], float] = {}
+    for experiment in experiments:
+        if experiment.excerpt:
+            key = experiment.excerpt.recording, experiment.excerpt.of_s
+            some[key] = some.get(key, 0.0) + float(np.ptp(experiment.time))
+    return ', '.join(f'{name} {compared:.0f} of {whole:.0f} s ({100.0 * compared / whole:.0f} '
+                     'percent)' for (name, whole), compared in some.items() if whole > 0.0)
+
+
+def _curves(verdict: Verdict) -> tuple[list[Panel], list[str], dict[str, float]]:
+    """Return the panels with their signals, and what the effects alone move."""
+    machine, fitted = verdict.machine, verdict.best.state.point()
+    off = {p.name: 0.0 for form in verdict.best.forms for p in form.sizes}
+    before, after, bare = machine.simulate(
+        [verdict.none.state.point(), fitted, {**fitted, **off}])
     panels: list[Panel] = []
-    for experiment, first, second in zip(machine.experiments, before, after, strict=True):
-        assert first is not None and second is not None
-        panels += _of_experiment(experiment, first, second)
-    return panels
+    signals: list[str] = []
+    moved: list[FloatArray] = []
+    for experiment, first, second, third in zip(machine.experiments, before, after, bare,
+                                                strict=True):
+        assert first is not None and second is not None and third is not None
+        moved.append(second - third)
+        for channel, pair in _of_experiment(experiment, first, second):
+            panels += pair
+            signals += [channel] * len(pair)
+    rms = np.sqrt(np.nanmean(np.concatenate(moved) ** 2, axis=0)).tolist()
+    alone = dict(zip(machine.experiments[0].channels, rms, strict=True)) if off else {}
+    return panels, signals, alone
 
 
 def _of_experiment(experiment: Experiment, before: FloatArray,
-                   after: FloatArray) -> tuple[Panel, Panel]:
+                   after: FloatArray) -> Iterator[tuple[str, tuple[Panel, Panel]]]:
+    """Yield the channels that were read, that which gains most first, each with its panels."""
     gain = np.nansum(((experiment.measured - before) / experiment.noise) ** 2
                      - ((experiment.measured - after) / experiment.noise) ** 2, axis=0)
-    gain[~np.isfinite(experiment.measured).any(axis=0)] = -math.inf
-    channel = int(np.argmax(gain))
-    name, unit, time = experiment.channels[channel], experiment.units[channel], experiment.time
-    measured = experiment.measured[:, channel]
-    simulated = {'before': before[:, channel], 'after': after[:, channel]}
-    return ((experiment.name, name, unit,
-             [(key, time, values) for key, values in {'measured': measured, **simulated}.items()]),
-            (experiment.name, 'measured less simulated', unit,
-             [(key, time, measured - values) for key, values in simulated.items()]))
+    for channel in np.argsort(-gain, kind='stable').tolist():
+        name, unit = experiment.channels[channel], experiment.units[channel]
+        time = experiment.recorded_time
+        measured = experiment.measured[:, channel]
+        simulated = {'before': before[:, channel], 'after': after[:, channel]}
+        if np.isfinite(measured).any():
+            yield name, (
+                (experiment.name, name, unit, [
+                    (key, time, values)
+                    for key, values in {'measured': measured, **simulated}.items()]),
+                (experiment.name, 'measured less simulated', unit, [
+                    (key, time, measured - values) for key, values in simulated.items()]))
 
 
 def _advice(verdict: Verdict) -> list[str]:
     """Return which tests would settle what is open, as the machine knows them."""
+    if verdict.word in ('explained', 'no_gap') and not is_open(verdict):
+        return []
     names = {name for group in verdict.confusable for name in group}
     for answer in verdict.which:
         if answer.probability > _OPEN:
             names |= {name for name in answer.effects if name in verdict.machine.catalogue}
-    if len(names) < 2 and verdict.word in ('explained', 'no_gap'):
-        return []
     kinds = {name.partition('.')[2] for name in names}
     return [text for effects, text in verdict.machine.advice
             if not effects or kinds & set(effects)]

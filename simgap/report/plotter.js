@@ -1,9 +1,14 @@
-// Draws the panels of #data into #panels with uPlot. The panels of a group show one span of time,
-// which wheel, mouse and keys zoom and move.
+// Draws the panels of #data into #panels with uPlot: of each group, which shows one span of time,
+// those of a signal. Wheel, mouse, finger, keys and buttons zoom and move; what is at the cursor
+// stands beside the names. Where there are signals or several groups to choose from, #choice asks.
 'use strict';
 (() => {
   const LEFT = 64, RIGHT = 12, HEIGHT = 176;   // of a panel, margins and height [px]
   const FINEST = 1e-6;                         // shortest span of time shown [s]
+  const BUTTONS = [   // sign, name and key
+    ['←', 'earlier', 'ArrowLeft'], ['−', 'zoom out', '-'], ['+', 'zoom in', '+'],
+    ['→', 'later', 'ArrowRight'], ['all', 'everything', '0'],
+  ];
   const root = document.documentElement;
   const holder = document.getElementById('panels');
   const colour = name => () => getComputedStyle(root).getPropertyValue(name);
@@ -45,14 +50,15 @@
   }
 
   function makePanel(given, group, isLast) {
-    const element = make('section', holder);
+    const element = make('section', group.element);
     element.className = 'panel';
     const head = make('div', element);
     head.className = 'head';
-    make('b', head, `${given.title} [${given.unit}]`);
+    make('b', head, given.unit === '1' ? given.title : `${given.title} [${given.unit}]`);
     const curves = given.curves.map(makeCurve);
-    const labels = curves.map((curve, number) => {
+    const values = curves.map((curve, number) => {
       const button = make('button', head);
+      button.type = 'button';
       button.setAttribute('aria-pressed', 'true');
       make('i', button).style.background = curve.colour;
       button.addEventListener('click', () => {
@@ -60,7 +66,8 @@
         button.setAttribute('aria-pressed', String(shown));
         plot.setSeries(number + 1, { show: shown });
       });
-      return make('span', button, curve.name);
+      make('span', button, curve.name);
+      return make('samp', button);
     });
     const axis = { stroke: colour('--faint'), font: '11px system-ui, sans-serif', values: numbers,
                    labelFont: '11px system-ui, sans-serif', ticks: { show: false },
@@ -73,7 +80,7 @@
       axes: [{ ...axis, size: 22, gap: 4, space: spread,
                ...(isLast && { label: 'time [s]', labelSize: 18 }) },
              { ...axis, size: LEFT, gap: 6, space: 26 }],
-      series: [{}, ...curves.map(curve => ({ stroke: curve.colour, width: 1.4, spanGaps: true,
+      series: [{}, ...curves.map(curve => ({ stroke: curve.colour, width: curve.width, spanGaps: true,
                                              points: { size: 4, fill: curve.colour } }))],
       cursor: { y: false, points: { show: false }, sync: { key: group.name },
                 drag: { x: false, y: false, setScale: false },
@@ -88,19 +95,19 @@
     function tell(plot) {
       const left = plot.cursor.left, t = left < 0 ? null : plot.posToVal(left, 'x');
       curves.forEach((curve, number) => {
-        const i = t === null ? -1 : closest(t, curve.times);
-        labels[number].textContent = i < 0 ? curve.name
-          : `${curve.name} ${curve.values[i].toPrecision(5)} at ${curve.times[i].toFixed(4)} s`;
+        values[number].textContent =
+          t === null ? '' : curve.values[closest(t, curve.times)].toPrecision(5);
       });
+      group.at.textContent = t === null ? '' : `values at ${t.toFixed(digitsOf(group.span))} s`;
     }
 
     listenTo(plot, group, () => { active = group; });
-    window.addEventListener('resize',
-      () => plot.setSize({ width: element.clientWidth, height }));
-    for (const medium of ['(prefers-color-scheme: dark)', 'print']) {
-      matchMedia(medium).addEventListener('change', () => plot.redraw());
-    }
-    return { plot, curves };
+    return { plot, curves, resize: () => plot.setSize({ width: element.clientWidth, height }) };
+  }
+
+  // decimals that tell a thousandth of a span apart
+  function digitsOf([from, to]) {
+    return Math.min(Math.max(3 - Math.floor(Math.log10(to - from)), 0), 9);
   }
 
   function closest(t, times) {
@@ -113,10 +120,24 @@
   }
 
   function makeGroup(name, given) {
-    if (name) make('h3', holder, name);
-    const group = { name: name || 'all', span: [0, 1] };
-    const panels = given.map((panel, i) => makePanel(panel, group, i === given.length - 1));
-    const times = panels.flatMap(panel => panel.curves).map(curve => curve.times);
+    const element = make('section', holder);
+    const group = { name: name || 'all', element, span: [0, 1] };
+    element.className = 'group';
+    element.setAttribute('aria-label', name || 'curves');
+    if (names.length > 1) element.tabIndex = 0;
+    element.addEventListener('focusin', () => { active = group; });
+    if (name) make('h3', element, name);
+    const tools = make('div', element);
+    tools.className = 'tools';
+    for (const [sign, title, key] of BUTTONS) {
+      const button = make('button', tools, sign);
+      Object.assign(button, { type: 'button', title });
+      button.setAttribute('aria-label', title);
+      button.addEventListener('click', () => keyOn(group, key));
+    }
+    group.at = make('output', tools);
+    group.panels = given.map((panel, i) => makePanel(panel, group, i === given.length - 1));
+    const times = group.panels.flatMap(panel => panel.curves).map(curve => curve.times);
     let first = Math.min(...times.map(t => t[0]));
     let last = Math.max(...times.map(t => t[t.length - 1]));
     if (!(last > first)) { first -= 0.5; last += 0.5; }
@@ -125,27 +146,75 @@
       const span = Math.min(Math.max(to - from, FINEST), last - first);
       const start = Math.min(Math.max(from, first), last - span);
       group.span = [start, start + span];
-      for (const { plot } of panels) plot.setScale('x', { min: start, max: start + span });
+      spans.set(name, group.span);
+      for (const { plot } of group.panels) plot.setScale('x', { min: start, max: start + span });
       [root.dataset.from, root.dataset.to] = group.span;
     };
-    group.all();
+    // moves the cursor by a share of the width, from the middle if it is nowhere
+    group.point = share => {
+      const { plot } = group.panels[0], width = plot.over.clientWidth;
+      const left = plot.cursor.left < 0 ? width / 2 : plot.cursor.left + share * width;
+      const at = Math.min(Math.max(left, 0), width - 1);
+      for (const panel of group.panels) panel.plot.setCursor({ left: at, top: 1 });
+    };
+    group.show(...spans.get(name) || [first, last]);
     return group;
   }
 
-  let active = null;   // the group that the keys act on
   const data = JSON.parse(document.getElementById('data').textContent).panels;
   const names = [...new Set(data.map(panel => panel.group))];
-  const groups = names.map(name => makeGroup(name, data.filter(panel => panel.group === name)));
-  active = groups[0];
+  const signals = [...new Set(data.map(panel => panel.signal))];
+  const spans = new Map();   // of the groups by name, which outlive a choice
+  let active = null;         // the group that the keys act on
+  let groups = [];
 
-  const thinned = Math.max(...data.flatMap(panel => panel.curves).map(curve => curve.thinned));
-  if (thinned > 1) {
-    document.getElementById('thinned').textContent =
-      `Of every ${thinned} samples of the longest curves the lowest and the highest are shown.`;
+  // A list to choose from: what stands for several, and each name.
+  function choice(title, several, found) {
+    const label = make('label', document.getElementById('choice'), `${title} `);
+    const select = make('select', label);
+    for (const text of [...several, ...found]) make('option', select, text);
+    select.addEventListener('change', draw);
+    label.hidden = found.length < 2;
+    return { several: () => several[select.selectedIndex],
+             one: () => found[select.selectedIndex - several.length] };
   }
 
+  const recording = choice('Recording', ['all'], names);
+  const signal = choice('Signal', ['the one that tells most', 'all'], signals);
+
+  // Draws what is chosen.
+  function draw() {
+    for (const { panels } of groups) panels.forEach(({ plot }) => plot.destroy());
+    holder.replaceChildren();
+    groups = names.filter(name => recording.several() || name === recording.one()).map(name => {
+      const own = data.filter(panel => panel.group === name);
+      const wanted = signal.several() ? own[0].signal : signal.one();
+      const shown = own.filter(panel => signal.several() === 'all' || panel.signal === wanted);
+      return shown.length && makeGroup(name, shown);
+    }).filter(group => group);
+    active = groups[0];
+    if (!active) make('p', holder, 'There is no sample of this signal here.');
+    const thinned = Math.max(1, ...groups.flatMap(group => group.panels)
+      .flatMap(panel => panel.curves).map(curve => curve.thinned));
+    document.getElementById('thinned').textContent = thinned === 1 ? '' :
+      `Of every ${thinned} samples of the longest curves the lowest and the highest are shown.`;
+  }
+  draw();
+
+  addEventListener('resize', () => {
+    for (const { panels } of groups) panels.forEach(panel => panel.resize());
+  });
+  for (const medium of ['(prefers-color-scheme: dark)', 'print']) {
+    matchMedia(medium).addEventListener('change', () => {
+      for (const { panels } of groups) for (const { plot } of panels) plot.redraw();
+    });
+  }
   holder.addEventListener('keydown', event => {
-    if (keyOn(active, event.key)) event.preventDefault();
+    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    const step = { ArrowLeft: -0.01, ArrowRight: 0.01 }[event.key];
+    if (event.shiftKey && step) active?.point(step);
+    else if (!active || !keyOn(active, event.key)) return;
+    event.preventDefault();
   });
   root.dataset.state = 'drawn';
 })();

@@ -15,6 +15,7 @@ from pathlib import Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 from simgap.report.curves import plotted
+from simgap.verdict.spoken import size
 
 FOLDER = Path(__file__).parent
 TEMPLATES = FOLDER / 'templates'
@@ -37,7 +38,7 @@ def _environment(folder: Path) -> Environment:
     environment = Environment(
         loader=FileSystemLoader([folder, TEMPLATES]), undefined=StrictUndefined, autoescape=True,
         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
-    environment.globals.update(file=_file, plotted=plotted)
+    environment.globals.update(file=_file, plotted=plotted, size=size)
     environment.policies['json.dumps_kwargs'] = {'allow_nan': False}
     return environment
 

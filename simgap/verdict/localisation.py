@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from simgap.fit.least_squares import LeastSquares
 from simgap.fit.state import FitState
 from simgap.machine.contract import FloatArray
@@ -15,6 +16,9 @@ from simgap.verdict import unknown_input
 from simgap.verdict.verdict import Answer, LackOfFit
 
 Located = dict[str, Any]
+# A loud residual has so many times the variance of the rest; each is at least this share of a
+# test; its ends are sought at so many places.
+_LOUDER, _LEAST_SHARE, _PLACES = 9.0, 0.1, 800
 
 
 def of_effects(problem: LeastSquares, answers: Sequence[Answer], none: FitState,
@@ -51,7 +55,45 @@ def parts_of_the_unknown(problem: LeastSquares, none: FitState, lack: LackOfFit,
 def of_the_unknown(problem: LeastSquares, none: FitState,
                    parts: Mapping[str, float]) -> list[Located]:
     """Return where something lies that no effect names, given how likely each part is."""
-    return _located(problem, parts, lambda k: problem.residuals_of(none, k) ** 2 - 1.0)
+    found = _located(problem, parts, lambda k: problem.residuals_of(none, k) ** 2 - 1.0)
+    acts = {signal: list(_acts(problem, none, signal))
+            for signal in dict.fromkeys(item['signal'] for item in found)}
+    return [{**item, 'acts': acts[item['signal']]} for item in found]
+
+
+def _acts(problem: LeastSquares, none: FitState, signal: str) -> Iterator[dict[str, Any]]:
+    """Yield when a signal's residual is loud, of tests in which that begins or ends."""
+    for k, experiment in enumerate(problem.experiments):
+        residual = problem.residuals_of(none, k)[:, experiment.channels.index(signal)]
+        there, regimes = np.isfinite(residual), problem.machine.motion(k).regimes()
+        moves = np.array([name != 'stick' for name in regimes.names])[regimes.labels]
+        if span := loud_span(residual[there], moves[there]):
+            time, (first, last) = experiment.recorded_time[there], span
+            yield {'test': experiment.name, 'from_s': float(time[first]) if first else None,
+                   'until_s': float(time[last]) if last < time.size else None}
+
+
+def loud_span(residual: FloatArray, able: NDArray[np.bool_]) -> tuple[int, int] | None:
+    """
+    Return where a residual, shape (n,), begins to be loud and where that ends; None for nowhere.
+
+    It maximises the likelihood of two variances, in the span and outside (C. Inclan, G. C. Tiao,
+    JASA 89, 1994, with both ends at once). Enough of what is quiet has to be `able` to be loud.
+    """
+    count = residual.size
+    edges = np.append(np.arange(0, count, max(-(-count // _PLACES), 1)), count)
+    inside, loud, busy = (np.subtract.outer(x, x).T for x in (
+        edges, *(np.append(0.0, np.cumsum(y))[edges] for y in (residual ** 2, able))))
+    outside, quiet, idle = (x[0, -1] - x for x in (inside, loud, busy))
+    fits = ((np.minimum(inside, idle) > _LEAST_SHARE * count)
+            & (loud * outside > _LOUDER * quiet * inside))
+    if not fits.any():
+        return None
+    cost = np.full(fits.shape, np.inf)
+    cost[fits] = (inside[fits] * np.log(loud[fits] / inside[fits])
+                  + outside[fits] * np.log(np.maximum(quiet[fits], 1e-30) / outside[fits]))
+    first, last = np.unravel_index(np.argmin(cost), cost.shape)
+    return int(edges[first]), int(edges[last])
 
 
 def _located(problem: LeastSquares, parts: Mapping[str, float],

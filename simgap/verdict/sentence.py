@@ -4,17 +4,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, TYPE_CHECKING
 
-from simgap.verdict.spoken import percent, quantity, with_interval
+from simgap.next_test.design import objective_for, SEPARATE
+from simgap.next_test.rivals import Findings
+from simgap.verdict.intervals import jackknife, TWO_SIDED_95
+from simgap.verdict.spoken import percent, quantity, size, with_interval
 
 if TYPE_CHECKING:
     from simgap.verdict.record import Verdict
 
 # A machine without words of its own has so many numbers of an effect listed.
 _LISTED = 4
-_DESIGNED = 'the test that `propose` designs from the JSON of this verdict'
+# An interval is wide from this share of its number to each side; what makes half of it is why.
+_WIDE, _HALF = 0.4, 0.5
 
 
 class Said(NamedTuple):
@@ -34,17 +38,37 @@ def said(verdict: Verdict) -> Said:
     top = verdict.which[0]
     if verdict.word == 'unknown_effect':
         what, then = _unknown(verdict), [
-            f'record {_DESIGNED}; one test is not enough for a name, so diagnose all recordings '
-            'together, and repeat']
+            f'record {_designed(verdict)}; one test is not enough for a name, so diagnose all '
+            'recordings together, and repeat']
     elif verdict.word in ('no_gap', 'too_few_to_judge'):
         what, then = _nothing(verdict)
     else:
         found = [_effect(verdict, effect, top.parameters) for effect in top.effects]
         what = ' '.join(f'{text[0].upper()}{text[1:]}.' for text, _ in found)
         then = list(dict.fromkeys(step for _, steps in found for step in steps))
+        if is_open(verdict):
+            # a test that tells the answers apart comes before any that repeats what was found
+            then = [f'record {_designed(verdict)}, to tell the answers apart',
+                    *(step for step in then if not step.startswith('repeat '))]
     sure = f'Probability {percent(top.probability)}.'
     return Said(what, ' '.join([sure, *_how_sure(verdict)]),
                 f'Next: {"; ".join(then)}.' if then else '')
+
+
+def is_open(verdict: Verdict) -> bool:
+    """Return whether several answers are left, which a further test has to tell apart."""
+    return bool(verdict.confusable) or _separates(verdict)
+
+
+def _separates(verdict: Verdict) -> bool:
+    """Return whether that is what `propose` does if it is told nothing else."""
+    known = Findings.of_data(verdict.planning) if verdict.planning else Findings()
+    return objective_for(known) == SEPARATE
+
+
+def _designed(verdict: Verdict) -> str:
+    asked = ' --objective separate' if is_open(verdict) and not _separates(verdict) else ''
+    return f'the test that `propose{asked}` designs from what `diagnose --json` writes'
 
 
 def headline(verdict: Verdict) -> str:
@@ -75,9 +99,31 @@ def _how_sure(verdict: Verdict) -> list[str]:
         lines.append(f'Adding {them} makes the gap wider on data that was not fitted.')
     if verdict.word == 'partly_explained':
         lines.append('Something else acts beside that.')
-    lines += [f'These data cannot tell {group[0]} from {" or ".join(group[1:])}: record '
-              f'{_DESIGNED}.' for group in verdict.confusable if group[1:]]
-    return lines
+    lines += [f'These data cannot tell {group[0]} from {" or ".join(group[1:])}.'
+              for group in verdict.confusable if group[1:]]
+    return lines + list(_why_wide(verdict))
+
+
+def _why_wide(verdict: Verdict) -> Iterator[str]:
+    """Yield why the intervals of numbers are wide, where they are."""
+    top, folds = verdict.which[0], verdict.how_far.get('folds', ())
+    sizes = {p.name: p for effect in top.effects if effect in verdict.machine.catalogue
+             for form in verdict.machine.catalogue[effect].forms
+             if not (form.is_course or form.is_wave) for p in form.sizes}
+    for name, item in top.parameters.items():
+        half = 0.5 * (item['ci95'][1] - item['ci95'][0])
+        if name not in sizes or half <= _WIDE * abs(item['value']):
+            continue
+        turns = [fold['values'][name] for fold in folds if name in fold['values']]
+        if TWO_SIDED_95 * jackknife(turns) >= _HALF * half:
+            why = ('the recordings differ: without one or another it is '
+                   f'{size(min(turns), item["unit"])} to {size(max(turns), item["unit"])}')
+        elif sizes[name].tolerance >= _HALF * half:
+            why = ('a healthy machine may have up to '
+                   f'{size(sizes[name].tolerance, item["unit"])} of it')
+        else:
+            why = 'these recordings hardly show it'
+        yield f'The interval of {name.rpartition(".")[2].replace("_", " ")} is wide: {why}.'
 
 
 def _nothing(verdict: Verdict) -> tuple[str, list[str]]:
@@ -88,8 +134,8 @@ def _nothing(verdict: Verdict) -> tuple[str, list[str]]:
     if not rest:
         return 'Machine and model agree within tolerance and noise.', []
     return (f'No known effect shows, but not all is noise: what remains of {"; of ".join(rest)}.',
-            [f'compare the noise that is assumed with a recording at rest, and record '
-             f'{_DESIGNED}'])
+            ['compare the noise that is assumed with a recording at rest, and record '
+             f'{_designed(verdict)}'])
 
 
 def _beyond(name: str, item: Mapping[str, Any]) -> str:
@@ -113,7 +159,28 @@ def _unknown(verdict: Verdict) -> str:
     if verdict.may_enter_at:
         place = verdict.may_enter_at[0]
         lines.append(f'As {place.name} it could explain {percent(place.explained)} of the gap.')
-    return ' '.join(lines)
+    return ' '.join([*lines, *_when(verdict), *_law(verdict)])
+
+
+def _when(verdict: Verdict) -> Iterator[str]:
+    """Yield when something unknown acts, where it begins or ends in a test."""
+    # a declared model has places that are pushed, with sizes
+    spans = getattr(verdict, 'pushes', ()) or [
+        span for item in verdict.where[:1] for span in item.get('acts', ())]
+    for span in spans[:1]:
+        begin, end = span['from_s'], span['until_s']
+        when = (f'until {end:.2f} s' if begin is None else f'from {begin:.2f} s on' if end is None
+                else f'from {begin:.2f} to {end:.2f} s')
+        force = f', with {quantity(span["size"], span["unit"])}' if 'size' in span else ''
+        more = f', and {len(spans) - 1} times more' if spans[1:] else ''
+        yield f'It acts {when} of {span["test"]}{force}{more}.'
+
+
+def _law(verdict: Verdict) -> Iterator[str]:
+    """Yield what the greatest remainder goes with, if with anything."""
+    for item in verdict.residual_tests['depends_on'][:1]:
+        yield (f'What is left of {item["signal"]} goes with {item["depends_on"]} '
+               f'({percent(item["share"])} of it).')
 
 
 def _effect(verdict: Verdict, effect: str,

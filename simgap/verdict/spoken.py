@@ -24,6 +24,11 @@ def quantity(value: float, unit: str) -> str:
     return number(value) + ('' if unit in ('1', '') else f' {unit}')
 
 
+def size(value: float, unit: str, word: str = ' percent') -> str:
+    """Return the size of an effect with its unit; one of unit 1 is a share, and in percent."""
+    return f'{number(100.0 * value)}{word}' if unit == '1' else quantity(value, unit)
+
+
 def percent(share: float, word: str = ' percent') -> str:
     """Return a share from 0 to 1 in percent; 100 means all of it and 0 nothing."""
     if 0.995 <= share < 1.0:

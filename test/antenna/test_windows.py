@@ -20,7 +20,7 @@ from antenna_drive.recording.sheet import CircuitBias, FixedStepBias, TestSheet,
 from field_runs import FAST_TRIANGLE, field_run, NOISE, SLOW_SQUARE
 import numpy as np
 import pytest
-from simgap.machine.contract import FloatArray
+from simgap.machine.contract import Excerpt, FloatArray
 
 # No jumps, whose times a recording tells to half a macro-step only.
 SLOW_SINE: dict[str, Any] = {'waveform': 'sine', 'amplitude': 8.7e-4, 'period': 6.3}
@@ -91,6 +91,7 @@ def test_a_window_in_the_middle_of_a_motion_agrees_once_it_has_settled() -> None
     assert test.name == 'rec 90-120 s'
     assert test.time[0] == pytest.approx(15.0, abs=0.01)
     assert test.time[-1] == pytest.approx(45.0, abs=0.02)
+    assert test.excerpt == Excerpt('rec', pytest.approx(140.0, abs=0.01), 75.0)
     assert misfit(test).max() < 2.0
     # the elevation goes on from the angle that was reached
     angle = recording['plant/encoder'].values[75 * 200]

@@ -31,7 +31,7 @@ def what(effect: str, **numbers: dict[str, Any]) -> str:
 
 def told(effect: str, parameters: dict[str, Any]) -> str:
     verdict: Any = SimpleNamespace(
-        word='explained', which=[Named([effect], 0.95, parameters)], confusable=[],
+        word='explained', which=[Named([effect], 0.95, parameters)], confusable=[], planning={},
         machine=SimpleNamespace(catalogue=EFFECTS, words=WORDS),
         how_far={'judged': [], 'explained_fraction': {'value': None}})
     return said(verdict).what

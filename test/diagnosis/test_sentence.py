@@ -4,11 +4,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from simgap.machine.contract import Effect, Form, Parameter
+from simgap.next_test.design import objective_for, SEPARATE
+from simgap.next_test.rivals import Findings
 from simgap.verdict.record import Named
 from simgap.verdict.sentence import headline, said
 from simgap.verdict.spoken import number, percent
@@ -26,7 +29,8 @@ LOUD = {'angle': {**QUIET['angle'], 'beyond_noise': 0.05}}
 def verdict(word: str, top: Named = FOUND, **entries: Any) -> Any:
     return SimpleNamespace(**{
         'word': word, 'which': [top], 'where': [], 'confusable': [], 'may_enter_at': [],
-        'remains': QUIET, 'machine': SimpleNamespace(catalogue=EFFECTS, words={}),
+        'remains': QUIET, 'planning': {}, 'residual_tests': {'depends_on': []},
+        'machine': SimpleNamespace(catalogue=EFFECTS, words={}),
         'how_far': {'judged': top.effects, 'per_signal': {},
                     'explained_fraction': {'value': 0.99, 'ci95': [0.97, 0.996]}}, **entries})
 
@@ -51,8 +55,53 @@ def test_a_machine_may_have_words_of_its_own() -> None:
 def test_what_cannot_be_told_apart_is_said_with_what_would_settle_it() -> None:
     found = said(verdict('partly_explained', confusable=[['gearbox.backlash', 'shaft.twist']]))
     assert 'Something else acts beside that.' in found.sure
-    assert 'cannot tell gearbox.backlash from shaft.twist: record the test that `propose`' in (
-        found.sure)
+    assert 'cannot tell gearbox.backlash from shaft.twist.' in found.sure
+    assert found.then.startswith('Next: record the test that `propose --objective separate`')
+
+
+def rival(effect: str, probability: float) -> dict[str, Any]:
+    return {'named': [effect], 'effects': [effect], 'forms': [''], 'probability': probability,
+            'names': [], 'values': [], 'covariance': [], 'doubts': {}}
+
+
+def test_what_is_next_is_what_propose_designs() -> None:
+    machine = SimpleNamespace(catalogue=EFFECTS, words={
+        'gearbox.backlash': lambda numbers: ('it has a gap', ['inspect it', 'repeat a test'])})
+    for chances, steps in (
+            ((0.6, 0.35), 'record the test that `propose` designs from what `diagnose --json` '
+             'writes, to tell the answers apart; inspect it'),
+            # one answer is sure: `propose` would look for other effects
+            ((0.97, 0.02), 'inspect it; repeat a test')):
+        planning = {'inflation': 1.0, 'rivals': [
+            rival(name, chance) for name, chance in zip(('gearbox.backlash', 'shaft.twist'),
+                                                        chances, strict=True)]}
+        objective = objective_for(Findings.of_data(planning))
+        assert (objective == SEPARATE) is ('propose' in steps)
+        assert said(verdict('explained', machine=machine, planning=planning)).then == (
+            f'Next: {steps}.')
+
+
+@pytest.mark.parametrize('turns, tolerance, why', [
+    ([0.02, 0.05], 0.001,
+     'the recordings differ: without one or another it is 0.02 rad to 0.05 rad'),
+    ([0.03, 0.03], 0.02, 'a healthy machine may have up to 0.02 rad of it'),
+    ([0.03, 0.03], 0.001, 'these recordings hardly show it')])
+def test_a_wide_interval_has_a_reason(turns: list[float], tolerance: float, why: str) -> None:
+    effect = replace(EFFECTS['gearbox.backlash'], forms=(
+        Form('', (replace(GAP, tolerance=tolerance),)),))
+    named = replace(FOUND, parameters={GAP.name: {
+        'value': 0.03, 'ci95': [0.01, 0.05], 'unit': 'rad'}})
+    far = {'judged': [], 'explained_fraction': {'value': None}, 'folds': [
+        {'values': {GAP.name: turn}} for turn in turns]}
+    found = said(verdict('explained', named, how_far=far, machine=SimpleNamespace(
+        catalogue={effect.id: effect}, words={}))).sure
+    assert found == f'Probability 97 percent. The interval of gap is wide: {why}.'
+
+
+def test_a_narrow_interval_needs_no_reason() -> None:
+    named = replace(FOUND, parameters={GAP.name: {
+        'value': 0.03, 'ci95': [0.024, 0.036], 'unit': 'rad'}})
+    assert 'interval' not in said(verdict('explained', named)).sure
 
 
 def test_an_effect_that_widens_the_gap_is_not_said_to_remove_it() -> None:
@@ -91,6 +140,25 @@ def test_unknown_says_place_size_and_when_and_what_would_settle_it() -> None:
         'angle (reversal). The model misses angle by 0.0432 rad rms. As force on the carriage it '
         'could explain 83 percent of the gap.')
     assert 'one test is not enough' in found.then and '`propose`' in found.then
+
+
+@pytest.mark.parametrize('begin, end, text', [
+    (2.0, 3.5, 'from 2.00 to 3.50 s'), (2.0, None, 'from 2.00 s on'), (None, 3.5, 'until 3.50 s')])
+def test_unknown_says_when_it_acts_and_by_which_law(
+        begin: float | None, end: float | None, text: str) -> None:
+    span = {'test': 'far', 'from_s': begin, 'until_s': end}
+    where = {'component': 'carriage', 'signal': 'angle', 'regime': 'stick', 'share': 0.6}
+    unknown: Any = {
+        'top': Named(['unknown'], 0.9, {}), 'how_far': {'per_signal': {}},
+        'residual_tests': {'depends_on': [
+            {'signal': 'angle', 'depends_on': 'rate', 'share': 0.62}]}}
+    found = said(verdict('unknown_effect', where=[{**where, 'acts': [span]}], **unknown))
+    assert found.what.endswith(f'It acts {text} of far. What is left of angle goes with rate '
+                               '(62 percent of it).')
+    # a declared model knows what is pushed, and how strongly
+    pushed = {**span, 'size': 3.0, 'unit': 'N'}
+    found = said(verdict('unknown_effect', where=[where], pushes=[pushed] * 3, **unknown))
+    assert f'It acts {text} of far, with 3 N, and 2 times more.' in found.what
 
 
 @pytest.mark.parametrize('text, expected', [

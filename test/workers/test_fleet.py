@@ -43,6 +43,7 @@ if '--corrected' in given:
     pathlib.Path(given['--corrected']).write_text('{{}}')
 pathlib.Path(given['--json']).write_text(json.dumps({{
     'verdict': 'explained' if effects else 'no_gap',
+    'sentence': 'It is said.' if effects else '',
     'which': [{{'effects': effects, 'probability': 0.75}}],
     'how_far': {{'explained_fraction': {{'value': 0.5, 'ci95': [0.4, 0.6]}} if effects else
                                        {{'value': None, 'reason': 'no gap'}}}},
@@ -114,9 +115,11 @@ def test_one_row_a_machine(fleet: Path, told: Told, tmp_path: Path,
     assert failed['failure'] == 'line 3: no number'
     assert 'exit code 1' in (
         fleet / 'diagnosis' / 'machines' / 'south' / 'failure.txt').read_text()
-    # the table has the same rows
-    assert [line.split()[:2] for line in answer.err.splitlines()[1:5]] == [
-        ['east', 'explained'], ['north', 'explained'], ['south', 'failed'], ['west', 'no_gap']]
+    # the table has the same rows, and what is said of each machine
+    assert [line.split()[:2] for line in answer.err.splitlines()[1:7]] == [
+        ['east', 'explained'], ['It', 'is'], ['north', 'explained'], ['It', 'is'],
+        ['south', 'failed'], ['west', 'no_gap']]
+    assert [row['sentence'] for row in found['rows']] == ['It is said.', 'It is said.', '', '']
     # each diagnosis got the recordings of its machine, their sheets and configurations
     given = {tuple(item['recordings']): item for item in told()}
     assert set(given) == {('east.csv',), ('rec_a.csv', 'rec_b.csv'), ('rec_a.csv',),
