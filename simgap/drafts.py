@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A file is written as a draft beside its place, and put there whole."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import os

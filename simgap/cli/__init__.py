@@ -6,8 +6,6 @@ Says why a real machine and its simulation part: where, which effect, and how fa
 Give a model of the machine and logs of its tests. simgap/README.md leads from there to a verdict.
 """
 
-from __future__ import annotations
-
 from simgap import __version__
 from simgap.command.program import Command, Program
 

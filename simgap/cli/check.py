@@ -13,8 +13,6 @@ a first model.
   simgap check my_machine.yaml logs/*.csv
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Ctrl-C ends a command in one line: it unwinds, or ends at a second one or after a while."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import os

@@ -9,8 +9,6 @@ separately. A diagnosis makes and drops Jacobians of 15 MB by the hundred, and a
 memory was such leftovers.
 """
 
-from __future__ import annotations
-
 import ctypes
 import sys
 

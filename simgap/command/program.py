@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A program with subcommands: its parser, its errors in one line, and its exit codes."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

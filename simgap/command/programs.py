@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """From a command line to an exit code: what programs have in common."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import io
 import os

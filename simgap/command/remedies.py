@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a plain installation may lack, and how to get it."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 from traceback import walk_tb
 

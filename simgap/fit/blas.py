@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Linear algebra in one thread."""
 
-from __future__ import annotations
-
 from contextlib import AbstractContextManager, nullcontext
 
 try:

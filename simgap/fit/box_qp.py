@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A box-constrained quadratic programme by an active-set method: the step of a bounded fit."""
 
-from __future__ import annotations
-
 import numpy as np
 from simgap.fit.cholesky import factored, solved
 from simgap.machine.contract import FloatArray

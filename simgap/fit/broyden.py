@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The linear model of a prediction about a fit, corrected by each step that the fit takes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

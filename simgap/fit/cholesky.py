@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The Cholesky factor of a Hessian that was summed in single precision."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import linalg
 from simgap.machine.contract import FloatArray

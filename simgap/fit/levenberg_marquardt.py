@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Levenberg-Marquardt within a box, with iteratively reweighted residuals."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

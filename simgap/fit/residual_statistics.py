@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Statistics of a residual that need no model: its power, its slow part, what it depends on."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robust loss of a residual r: half its square up to a bound k, its logarithm beyond."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from simgap.machine.contract import FloatArray

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where a fit begins and goes on past minima that derivatives do not lead out of."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import math
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The labels of a test: what was different in it, such as load: A."""
 
-from __future__ import annotations
-
 from simgap.errors import one_line
 from simgap.inputs.schema import mapping_of, ParameterError
 

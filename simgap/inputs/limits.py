@@ -7,8 +7,6 @@ A file of a few kilobytes can unpack into gigabytes. Each limit is far above wha
 An environment variable sets another limit.
 """
 
-from __future__ import annotations
-
 import os
 from typing import NamedTuple
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plain data (texts, numbers, lists, mappings) as strict JSON, and back."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 import json
 import math

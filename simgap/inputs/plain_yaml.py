@@ -8,8 +8,6 @@ refused here, as are files that are no text or too long to be meant. It also tak
 for texts, as YAML 1.1 does; here they are numbers, as in YAML 1.2 and in Python.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 import re

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What may be said of one parameter, and the check of a value against it."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 import difflib

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Backlash: the torque of a pair of gears with a gap between their teeth, Eq. (1)."""
 
-from __future__ import annotations
-
 from simgap.laws.compiling import inner
 
 

@@ -9,8 +9,6 @@ numba itself is loaded, when it is first called: a program that only reads a rec
 wait for a compiler. Without numba the functions run slowly, with the same numbers.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass

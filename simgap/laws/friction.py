@@ -9,8 +9,6 @@ breaks away when T_o exceeds the stiction torque, Eq. (4), and then slips agains
 torque. `friction_torque` is the law of Eq. (2) itself, as Fig. 3 draws it.
 """
 
-from __future__ import annotations
-
 import math
 
 from simgap.laws.compiling import inner

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The samples of one signal, each with its own time stamp in whole nanoseconds, as in MCAP."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A map from somebody else's file to signals, see docs/recording.md: columns, units, clocks."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 import math

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rows that a recorder lost, put back because a simulation takes one step from row to row."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

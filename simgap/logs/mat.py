@@ -8,8 +8,6 @@ damaged file crashes the process (scipy pull request 25829). So the types are lo
 Format: The MathWorks, 'MAT-File Format', level 5.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from struct import error as StructError, unpack_from
 from typing import Any

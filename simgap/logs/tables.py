@@ -7,8 +7,6 @@ Cells are texts, empty without a sample, or vectors of texts. A number becomes t
 that is read back to its last bit, so a file means the same whatever its kind.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The types of data that the whole engine shares."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A machine whose effects may differ between labels of its tests."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 import math

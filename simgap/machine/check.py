@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether a machine keeps its contract: what is missing or wrong is named before a fit."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 import math
 

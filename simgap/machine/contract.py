@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a machine is made of, in one place for those who write one."""
 
-from __future__ import annotations
-
 from simgap.machine.arrays import Course, FloatArray, Point
 from simgap.machine.catalogue import Catalogue
 from simgap.machine.effect import Effect, Form, Parameter

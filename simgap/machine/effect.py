@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A number that may differ from the model, and an effect: such numbers with one physical cause."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 import math
 

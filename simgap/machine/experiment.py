@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What was measured in one test, and the noise in it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The numbers that are known only within a tolerance: they are fitted beside any effect."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 
 from simgap.machine.arrays import Point

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tests that a model of one's own declares, as the design of the next test asks for them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A machine by its model: tests that a command plays, and the diagnosis of their logs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a user says of a machine, see docs/own-machine.md; `machine` collects it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from simgap.model.declared import (

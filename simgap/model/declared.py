@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a user has declared of a machine, as records; `declaration` has the words for it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, KW_ONLY
 from typing import Any

@@ -8,8 +8,6 @@ The diagnosis of a machine of one's own.
 >>> print(found.summary())                                                      # doctest: +SKIP
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

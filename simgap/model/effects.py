@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The effects that a user has declared, as a catalogue; the orders of a ripple are found."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Load a model from a Python file, 'my_machine.py:machine', or from a model file in YAML."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
 import sys

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A model of one's own and the logs of its tests, as a `Machine` of the diagnosis."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 import math
 from threading import RLock

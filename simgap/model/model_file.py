@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A model file: YAML that makes a machine of a MuJoCo model or FMU, see docs/own-machine.md."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 import math

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The numbers that a simulation gets, by name: `numbers.inertia`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 from simgap.inputs.schema import nearest

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The orders (cycles per revolution) that stand out in what a model leaves."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

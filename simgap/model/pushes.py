@@ -8,8 +8,6 @@ model share its constant part. So it only says when the push changes. The levels
 fitted together with the numbers of the model, which stay within their tolerances.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a simulation program does for a model file: MuJoCo and FMUs stand behind this."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol

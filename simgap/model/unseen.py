@@ -7,8 +7,6 @@ A free run is judged by its rms, in which a slow error counts, unlike in whitene
 numbers are fitted once more to the diagnosed logs, by plain least squares.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 import math

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which effects a set of tests can and cannot tell apart, before the tests are made."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import cache

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The design of the next test: which of the tests that a machine may run tells most."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace

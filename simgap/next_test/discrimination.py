@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How well a planned test would tell rivals apart."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 import math

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The whole loop: a test, its verdict, the next test, until the answer is sure."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a proposal says: as plain data, as lines of text, and as what a page shows."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math

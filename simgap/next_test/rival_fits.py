@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each rival fitted to the readings that each other one would give in a planned test."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a planned test tells of rivals: how badly a wrong one would fit, and what that decides."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import permutations

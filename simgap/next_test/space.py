@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tests that a machine may run: what they may be is the machine's to say."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -19,8 +19,6 @@ Each part is a function of numbers in SI units; those with many take them in a n
 floats, whose annotations are its units.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import inspect
 from pathlib import Path

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What connects two shafts: a compliance, with or without a gap between teeth."""
 
-from __future__ import annotations
-
 import math
 
 from simgap.laws.backlash import contact_side, contact_torque

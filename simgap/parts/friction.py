@@ -8,8 +8,6 @@ stop and hold it there: no threshold rate and no stiff equation is needed. Torqu
 alike: read N m or N, rad/s or m/s, kg m^2 or kg throughout.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, NamedTuple
 

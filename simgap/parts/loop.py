@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A cascaded loop as drives have it, called once per sample: position, velocity, current."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 from simgap.laws.compiling import inner

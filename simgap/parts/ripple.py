@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What repeats with an angle: torque ripple, a cyclic error of a scale, a bent screw."""
 
-from __future__ import annotations
-
 import math
 
 from simgap.laws.compiling import inner

@@ -7,8 +7,6 @@ A reading with its digit is a staircase without a derivative. In a simulation th
 give the digit to the `reading`; `digitised` and `counts` are for controllers.
 """
 
-from __future__ import annotations
-
 import math
 
 from simgap.laws.compiling import inner

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What happens to a signal on its way: limits, a dead zone, a rate limit, a lag, a delay."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Curves as the plotter of the pages reads them: thinned, and packed to four bytes a sample."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Mapping, Sequence
 import math

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a page about a diagnosis says to an engineer with two minutes, as plain data."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType

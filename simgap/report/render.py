@@ -7,8 +7,6 @@ A page needs no network and no program but a browser. Templates escape whatever 
 so no text from a recording can become a part of the page itself.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

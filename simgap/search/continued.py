@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Answers of an earlier verdict, fitted to more tests than it has seen."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stepwise selection: whether each effect of a hypothesis is needed, and whether another is."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial

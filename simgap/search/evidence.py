@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The fits that a verdict was made from, and the same as plain data."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fits to the whole tests, compared at the sensors' own noise; see `elimination`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A hypothesis at other noise, in whole tests, or without an effect, with shared derivatives."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Screening: how much of the residual each effect could explain, by its derivative alone."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The search for effects: from the nuisances alone over single effects to pairs."""
 
-from __future__ import annotations
-
 from bisect import insort
 from collections.abc import Callable, Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor

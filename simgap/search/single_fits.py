@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One fit of the search: an effect is added to a hypothesis, moved to another place, or split."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeVar

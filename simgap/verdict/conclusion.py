@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """From the machine's fits to what is decided about them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import fmean

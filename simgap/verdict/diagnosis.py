@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The diagnosis of a gap between any `Machine` and its model: where, which effect, how far."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 import time

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The doubt whether an effect of a fit is larger than its tolerance, or mends something else."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How far the gap shrinks on withheld data: what all tests, each withheld, say together."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any

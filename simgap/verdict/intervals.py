@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Intervals of fitted values, by Laplace's approximation with a cluster-robust variance."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 import math
 from types import MappingProxyType

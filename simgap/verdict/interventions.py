@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What an intervention changes: the numbers of the named effects under each value of a label."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 import math
 from typing import Any

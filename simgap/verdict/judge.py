@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Judge effects on a withheld test, to which offsets within the tolerance are fitted."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a hypothesis leaves: how far that is from noise, in which signal, what it depends on."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 import math
 from typing import Any

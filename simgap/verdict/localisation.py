@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where a gap lies: parts (of the effects, or of an unknown input), signals and regimes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 

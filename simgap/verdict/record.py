@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a diagnosis says: a record for programs, with a few lines for people and the JSON."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any

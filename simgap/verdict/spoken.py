@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Numbers as people say them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 import math
 from typing import Any

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """From fitted hypotheses to probabilities, with 'unknown' and 'none' among the answers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 import math
