@@ -184,7 +184,10 @@ def environment(folder: Path) -> dict[str, str]:
             f'antenna_drive.nodes.{modules.get(node, node)} "$@"\n' for node in NODES))
     for path in programs.iterdir():
         path.chmod(0o755)
+    # a home of its own, but for the compiled code: it is that of the other tests
+    cache = os.environ.get('XDG_CACHE_HOME') or str(Path.home() / '.cache')
     return {**os.environ, 'PATH': f'{programs}:{os.environ["PATH"]}', 'HOME': str(folder),
+            'XDG_CACHE_HOME': cache,
             'PYTHONPATH': os.pathsep.join(map(str, (ROOT, ROOT / 'test')))}
 
 
