@@ -54,7 +54,7 @@ def understood(command: str, folder: Path = ROOT) -> None:
                 setup = ROOT / 'examples' / package / 'setup.py'
                 assert re.search(rf"'{node} *=", setup.read_text()), command
             case ['ros2', 'param', 'set' | 'get' | 'describe', node, name, *_]:
-                if not list((ROOT / 'examples').rglob(f'*{node.strip("/")}.py')):
+                if not list((ROOT / 'examples').rglob(f'*{node.strip("/")}*')):
                     _check_parameter(node.strip('/'), name)
             case ['ros2', 'topic' | 'service', *_]:
                 pass  # typed by a test in test/ros2cli
