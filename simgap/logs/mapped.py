@@ -66,9 +66,9 @@ def read_mapped(path: str | Path, import_map: ImportMap) -> dict[str, Channel]:
     shared = np.empty(0, np.int64)
     for name, signal in import_map.signals.items():
         samples = signals.pop(0)  # ten million rows are in memory once
-        stamps = np.array(samples.stamps, np.int64) - origin
-        if not np.array_equal(stamps, shared):
-            shared = stamps
+        times = np.array(samples.stamps, np.int64) - origin
+        if not np.array_equal(times, shared):
+            shared = times
             shared.flags.writeable = False  # or each channel would have a copy
         channels[name] = make_channel(name, signal.unit, shared, samples.values)
     return channels

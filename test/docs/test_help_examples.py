@@ -50,10 +50,8 @@ np.savetxt(sys.argv[2], np.column_stack([time, rows["turn"], angle, np.gradient(
 """
 # Each ends when it is asked to, and says so many words before.
 SERVERS = {'antenna-drive live': 'http://', 'ros2 run': 'ready; waits for'}
-# What starts nodes runs beside no other test that does.
-NODES_START = ('ros2', 'antenna-drive live', 'antenna-drive record', 'antenna-drive demo',
-               'antenna-drive lockstep-check', 'antenna-drive doctor',
-               'antenna-drive article --through-nodes')
+# What starts a whole drive runs beside no other test that does.
+DRIVES = ('antenna-drive live', 'antenna-drive record', 'antenna-drive article --through-nodes')
 TRIALS = ('antenna-drive calibrate', 'antenna-drive investigate', 'simgap investigate',
           'antenna-drive confusability', 'antenna-drive diagnose-many', 'simgap propose',
           'antenna-drive article --figures', 'antenna-drive article --through-nodes',
@@ -207,14 +205,14 @@ def before(number: int) -> str:
     return ''
 
 
-def pasted(nodes: bool) -> Iterator[object]:
+def pasted(drives: bool) -> Iterator[object]:
     """
-    Yield the examples that start nodes, or the others, each with what goes before it.
+    Yield the examples that start a drive, or the others, each with what goes before it.
 
     What cannot be run here says why.
     """
     for number, word in enumerate(EXAMPLES):
-        if word.startswith('mkdir') or word.startswith(NODES_START) is not nodes:
+        if word.startswith('mkdir') or word.startswith(DRIVES) is not drives:
             continue
         reason = next((ELSEWHERE[part] for part in ELSEWHERE if part in word), '')
         yield pytest.param(' && '.join(filter(None, (before(number), word))), id=word, marks=[
@@ -223,14 +221,14 @@ def pasted(nodes: bool) -> Iterator[object]:
 
 
 @pytest.mark.timeout(1200)
-@pytest.mark.parametrize('example', [*pasted(nodes=False)])
-def test_it_runs(example: str, prepared: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize('example', [*pasted(drives=False)])
+def test_it_runs(example: str, prepared: Path, tmp_path: Path, node_domain: int) -> None:
     paste(example, prepared, tmp_path)
 
 
 @pytest.mark.timeout(1200)
-@pytest.mark.parametrize('example', [*pasted(nodes=True)])
-def test_its_nodes_run(example: str, prepared: Path, tmp_path: Path, fresh_domain: int) -> None:
+@pytest.mark.parametrize('example', [*pasted(drives=True)])
+def test_its_drive_runs(example: str, prepared: Path, tmp_path: Path, fresh_domain: int) -> None:
     paste(example, prepared, tmp_path)
 
 
