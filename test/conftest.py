@@ -66,12 +66,18 @@ def module_domain() -> Iterator[int]:
 
 
 @pytest.fixture
-def fresh_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+def node_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     """Put one test, and the processes that it starts, into a domain apart from the others."""
     claim = DomainClaim()
     monkeypatch.setenv('ROS_DOMAIN_ID', str(claim.number))
     yield claim.number
     claim.release()
+
+
+@pytest.fixture
+def fresh_domain(node_domain: int) -> int:
+    """Return the same for a test that starts a whole drive, beside which no other one runs."""
+    return node_domain
 
 
 @pytest.fixture(scope='session')

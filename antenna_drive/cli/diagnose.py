@@ -39,9 +39,7 @@ from simgap.cli.diagnose import (
     write_report,
 )
 from simgap.command.large_arrays import give_back_large_arrays
-from simgap.command.output import (
-    check_options, give, Progress, replaced, warnings_in_one_line,
-)
+from simgap.command.output import check_options, give, Progress, reading, replaced
 from simgap.errors import UserError
 from simgap.inputs.schema import Entry
 
@@ -81,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
     limits = dict(numbers_of('--matters', arguments.matters))
     earlier = earlier_of(arguments.after)
     recordings = {}
-    with warnings_in_one_line():
+    with reading():
         import_map = load_map(arguments.map) if arguments.map else None
         for path in arguments.recordings:
             name = Path(path).stem

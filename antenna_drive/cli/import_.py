@@ -29,7 +29,7 @@ from antenna_drive.cli.reading import refuse_none
 from antenna_drive.recording.bag_writer import write_bag
 from antenna_drive.recording.csv_format import read_csv
 from antenna_drive.recording.import_map import import_file, load_map
-from simgap.command.output import warnings_in_one_line
+from simgap.command.output import reading
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Read the file, write the bag."""
-    with warnings_in_one_line():
+    with reading():
         recording = (import_file(args.csv, load_map(args.map)) if args.map
                      else read_csv(args.csv))
     refuse_none(args.csv, recording.channels.values())

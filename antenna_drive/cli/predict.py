@@ -31,9 +31,7 @@ from typing import Any, TYPE_CHECKING
 
 from antenna_drive.recording.atomic import refuse_existing
 from antenna_drive.recording.files import read_recording
-from simgap.command.output import (
-    add_json_option, STANDARD_OUTPUT, warnings_in_one_line, write_json,
-)
+from simgap.command.output import add_json_option, reading, STANDARD_OUTPUT, write_json
 from simgap.errors import UserError
 from simgap.verdict.spoken import number
 
@@ -72,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
     recorder = _recorder(arguments.recorder) if arguments.recorder else None
     drive = load(*arguments.config)
     other = load(*arguments.against) if arguments.against else None
-    with warnings_in_one_line():
+    with reading():
         recording = read_recording(arguments.recording)
     name = Path(arguments.recording).stem
     notes: list[str] = []

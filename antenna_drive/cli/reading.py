@@ -12,7 +12,7 @@ from pathlib import Path
 from antenna_drive.recording.bam import read_bam
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.recording import Recording
-from simgap.command.output import warnings_in_one_line
+from simgap.command.output import reading
 from simgap.errors import UserError
 from simgap.logs.channel import Channel
 
@@ -39,7 +39,7 @@ def refuse_none(name: object, channels: Iterable[Channel]) -> None:
 
 def read(args: argparse.Namespace) -> Recording:
     """Read the recording that the options name; UserError says what is wrong with it."""
-    with warnings_in_one_line():
+    with reading():
         # a servo's log belongs to its machine, which the room of recordings does not know
         recording = (read_bam(args.recording) if Path(args.recording).suffix == '.json'
                      else read_recording(args.recording, partial=args.partial))

@@ -29,6 +29,9 @@ _PROMPT_S, _JOINED_S = 1.0, 60.0
 # A waveform of the sheet is played by the command's clock, the readings are of the recorder's.
 # Within this time, 100 millionths of it make a tenth of a sample [s].
 _CLOCK_S = 15.0
+# Windows are sought within this time from the start, or are at the onset; this much later no
+# window ends [s].
+SOUGHT_S, LATER_S = 1200.0, 60.0
 # Least number of samples.
 _FEWEST = 10
 # The axis is at rest while the command is below this share of its greatest size.
@@ -150,6 +153,21 @@ class FieldRecording:
             if times.size > 1:
                 slope[there, c] = np.gradient(values, times)[at[there]]
         return measured, slope
+
+
+def looked_at(name: str, recording: Recording, note: Note) -> Recording:
+    """Return the part of a recording in which windows may be: of a day its beginning."""
+    rates = recording.channels.get(RATE_COMMAND)
+    if rates is None or not len(rates):
+        return recording
+    sizes = np.abs(rates.values)
+    onset_s = rates.time_s[np.argmax(sizes > _AT_REST * sizes.max())]
+    end_s = float(onset_s) + SOUGHT_S + LATER_S
+    if end_s >= recording.end_ns / NANOSECONDS:
+        return recording
+    note(f'{name}: of {recording.duration_s:.0f} s, what comes after {end_s:.0f} s was not '
+         'looked at')
+    return recording.between(end_s=end_s)
 
 
 def _from_its_start(name: str, recording: Recording, note: Note) -> Recording:

@@ -13,7 +13,7 @@ from typing import Any
 from antenna_drive.diagnosis.excitation import (
     Bias, CommandedRate, Longest, schedule, SheetCommand,
 )
-from antenna_drive.diagnosis.field_recording import FieldRecording, Note
+from antenna_drive.diagnosis.field_recording import FieldRecording, looked_at, Note
 from antenna_drive.diagnosis.inference import completed
 from antenna_drive.diagnosis.late_readings import dense, parts_of
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
@@ -132,7 +132,8 @@ def prepared(recordings: Mapping[str, Recording], drive: Drive, note: Note) -> l
 
     Raises UserError: a recording lacks the rate command or readings, or cannot be of this drive.
     """
-    found = [FieldRecording.of(name, recording, note) for name, recording in recordings.items()]
+    found = [FieldRecording.of(name, looked_at(name, recording, note), note)
+             for name, recording in recordings.items()]
     for recording in found:
         if not recording.is_planned:
             check(recording, drive, note)

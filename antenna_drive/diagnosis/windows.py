@@ -18,7 +18,7 @@ import math
 from typing import Any
 
 from antenna_drive.diagnosis.excitation import Bias, Longest, schedule
-from antenna_drive.diagnosis.field_recording import FieldRecording
+from antenna_drive.diagnosis.field_recording import FieldRecording, SOUGHT_S
 from antenna_drive.diagnosis.sensors import SensorModel
 from antenna_drive.emulator import batch
 from antenna_drive.parameters.records import place_of, record_of
@@ -43,8 +43,6 @@ _REST_S, _REST_LEFT_S = 12.0, 5.0
 _SETTLING_S = 15.0
 # Windows in the middle of a motion begin at multiples of this [s].
 _GRID_S = 1.0
-# Windows are sought within this time from the start [s].
-_SOUGHT_S = 1200.0
 # A later window that begins this soon is simulated from the start, where the state is known [s].
 _FROM_START_S = 60.0
 # What a window costs, in the mean logarithm of an effect's energy that it must tell more: a state
@@ -130,7 +128,7 @@ def first_window(recording: FieldRecording) -> Window:
 
 def _later(recording: FieldRecording, first: Window, length: float) -> Iterator[Window]:
     """Yield the windows after the first one that compare this much time [s]."""
-    last = min(recording.end, _SOUGHT_S) - length
+    last = min(recording.end, SOUGHT_S) - length
     for compared in np.arange(math.ceil(recording.onset) + _SETTLING_S, last, _GRID_S).tolist():
         known = compared - first.begin <= _FROM_START_S
         yield Window(first.begin if known else compared - _SETTLING_S, compared,
@@ -142,7 +140,7 @@ class _Telling:
 
     def __init__(self, recording: FieldRecording, drive: Drive, bias: Bias) -> None:
         """Run the drive without the effects, and with each."""
-        samples = np.arange(0.0, min(recording.end, _SOUGHT_S), _SAMPLE_S)
+        samples = np.arange(0.0, min(recording.end, SOUGHT_S), _SAMPLE_S)
         plan = schedule(recording.command, bias, samples, Longest(_STEP_S))
         plain = batch.run(record_of(drive), plan)
         noise = SensorModel.of(recording.sheet.sensors).noise(

@@ -14,9 +14,10 @@ docs/recording.md describes the columns.
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+import math
 from pathlib import Path
 import re
 from typing import Any, IO
@@ -72,10 +73,10 @@ def read_csv(path: str | Path) -> Recording:
         table = rows(path, stream)
         line, header = next(table, (1, []))
         units = _header(path, line, header)
-        columns = [(array('q'), array('d')) for _ in units]
+        stamps, columns = array('q'), [array('d') for _ in units]
         room = SAMPLES.value()
         time_column = list(units).index(TIME)
-        previous, count, in_order = -2**63, 0, True
+        previous, in_order = -2**63, True
         for line, row in table:
             if len(row) != len(units):
                 raise RecordingError(f'{path}: line {line}: {len(row)} cells, but the header has '
@@ -83,18 +84,17 @@ def read_csv(path: str | Path) -> Recording:
             cell = Cell(path, line, TIME)
             stamp = parse_nanoseconds(row[time_column].strip(), cell)
             in_order &= stamp > previous
-            previous, count = stamp, count + 1
+            previous = stamp
+            stamps.append(stamp)
             room -= len(row) - 1 - row.count('')
             if room < 0:
                 raise RecordingError(f'{path}: line {line}: {SAMPLES.exceeded()}')
             for i, text in enumerate(row):
-                text = text.strip()
-                if i != time_column and text:
-                    stamps, values = columns[i]
-                    stamps.append(stamp)
-                    values.append(parse_number(text, Cell(path, line, header[i])))
-    ordered: Iterable[Column] = ((np.array(stamps, np.int64), np.array(values))
-                                 for stamps, values in columns)
+                if i != time_column:
+                    text = text.strip()
+                    columns[i].append(parse_number(text, Cell(path, line, header[i]))
+                                      if text else math.nan)
+    ordered: Iterable[Column] = _taken(np.array(stamps, np.int64), columns)
     if not in_order:
         ordered = sorted_rows(path, TIME, *_times_and_lines(path, time_column), ordered)
     channels = {name: make_channel(name, unit, stamps_ns, numbers)
@@ -102,7 +102,22 @@ def read_csv(path: str | Path) -> Recording:
                 if name != TIME}
     sheet_path = path.with_suffix('.yaml')
     sheet = load_sheet(sheet_path) if sheet_path.is_file() else TestSheet()
-    return replace(_with_meta(path, Recording(channels), count), sheet=sheet)
+    return replace(_with_meta(path, Recording(channels), len(stamps)), sheet=sheet)
+
+
+def _taken(stamps: IntArray, columns: list[array[float]]) -> Iterator[Column]:
+    """Yield stamps and values of each column, and keep none: ten million rows fill a memory."""
+    stamps.flags.writeable = False
+    while columns:
+        values = np.array(columns.pop(0))
+        values.flags.writeable = False
+        there = np.isfinite(values)
+        if there.size < stamps.size:
+            yield stamps[:0], values  # of the time
+        elif there.all():
+            yield stamps, values  # as they are: a channel copies what can be written to
+        else:
+            yield stamps[there], values[there]
 
 
 def _times_and_lines(path: Path, time_column: int) -> tuple[IntArray, IntArray]:

@@ -14,9 +14,10 @@ import hashlib
 import os
 from pathlib import Path
 import tempfile
-from typing import Any, TypeVar
+from typing import Any, cast, TypeVar
 
 import numba
+from simgap.errors import UserError
 
 Function = TypeVar('Function', bound=Callable[..., Any])
 
@@ -35,7 +36,13 @@ CACHE_FOLDER = _cache_folder()
 
 
 def compiled(function: Function) -> Function:
-    """Compile a function of numbers and arrays; a division by zero gives infinity."""
+    """
+    Compile a function of numbers and arrays; a division by zero gives infinity.
+
+    Where nothing is compiled, its call raises UserError: Python does not read fields of records.
+    """
+    if numba.config.DISABLE_JIT:
+        return cast(Function, _refuse)
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(CACHE_FOLDER)
     try:
@@ -43,6 +50,11 @@ def compiled(function: Function) -> Function:
     finally:
         numba.config.CACHE_DIR = before
     return kernel
+
+
+def _refuse(*arguments: Any) -> None:
+    raise UserError('NUMBA_DISABLE_JIT is set, and Python cannot read what the compiled antenna '
+                    'reads: unset it')
 
 
 def inner(function: Function) -> Function:

@@ -14,7 +14,6 @@ COMMANDS = {
     'diagnose': Command('diagnose', 'say where machine and model part, and why'),
     'propose': Command('propose', 'design the next test: the one that settles a verdict'),
     'investigate': Command('investigate',
-                           'test a machine until it is clear what is wrong with it'),
-}
+                           'test a machine until it is clear what is wrong with it')}
 PROGRAM = Program('simgap', __name__, __version__, COMMANDS)
 main, make_parser = PROGRAM.main, PROGRAM.parser

@@ -17,7 +17,7 @@ import argparse
 from pathlib import Path
 
 from simgap.cli.diagnose import add_map_option
-from simgap.command.output import add_json_option, give, warnings_in_one_line
+from simgap.command.output import add_json_option, give, reading
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
     from simgap.model import check_model, load_model, read_logs
 
     model = load_model(arguments.model)
-    with warnings_in_one_line():
+    with reading():
         logs = read_logs(arguments.logs, arguments.map)
     checked = check_model(model, logs)
     give({'faults': list(checked.faults), 'remarks': list(checked.remarks)}, arguments.json,

@@ -26,9 +26,7 @@ from typing import TYPE_CHECKING
 
 from simgap import __version__
 from simgap.command.large_arrays import give_back_large_arrays
-from simgap.command.output import (
-    add_json_option, check_options, give, Progress, replaced, warnings_in_one_line,
-)
+from simgap.command.output import add_json_option, check_options, give, Progress, reading, replaced
 from simgap.command.verdict_file import findings_of, planning_of
 from simgap.errors import UserError
 from simgap.inputs.schema import Entry
@@ -84,7 +82,7 @@ def diagnosed(name: str, paths: Sequence[str], arguments: argparse.Namespace) ->
     from simgap.model import diagnose_logs, load_model, read_logs
 
     model, earlier = load_model(name), earlier_of(arguments.after)
-    with warnings_in_one_line():
+    with reading():
         logs = read_logs(paths, arguments.map)
     with Progress('diagnosis', 1.0) as progress:
         verdict = diagnose_logs(

@@ -19,6 +19,7 @@ code is 1 if nothing was decided.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 import os
 from pathlib import Path
 import shlex
@@ -31,8 +32,6 @@ from simgap.errors import UserError
 from simgap.inputs.schema import Entry
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from simgap.next_test.investigation import Bench, InvestigationPlan
 
 PAGE = 'story.html'

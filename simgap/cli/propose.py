@@ -101,8 +101,7 @@ def proposed(arguments: argparse.Namespace, tests: Callable[[dict[str, Any]], Te
                 lambda share, doing: progress.update(share))
         except KeyError as error:
             raise UserError(f'{arguments.verdict}: {error.args[0]}: this configuration knows no '
-                            'such effect; give the model of the diagnosis'
-                            ) from error
+                            'such effect; give the model of the diagnosis') from error
     data = {**as_data(found, space), 'duration_s': arguments.duration,
             'sample_rate_hz': arguments.rate, 'seconds': time.monotonic() - began}
     if arguments.out and found.tests:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, ExitStack
 import math
 import os
 from pathlib import Path
@@ -21,6 +21,7 @@ from simgap.errors import UserError
 from simgap.inputs.plain import strict_json
 from simgap.inputs.schema import Entry
 from simgap.logs.channel import RecordingWarning
+from simgap.logs.text import READ
 
 STANDARD_OUTPUT = '-'
 
@@ -132,10 +133,17 @@ class Progress:
 
 
 @contextmanager
-def warnings_in_one_line() -> Iterator[None]:
-    """Show warnings about recordings to people, without the place in the program."""
-    with warnings.catch_warnings(record=True) as caught:
+def reading() -> Iterator[None]:
+    """While recordings are read, show how far a large one is, and warnings without their place."""
+    with warnings.catch_warnings(record=True) as caught, ExitStack() as stack:
         warnings.simplefilter('always', RecordingWarning)
+        line: list[Progress] = []
+
+        def tell(share: float) -> None:
+            line[:] = line or [stack.enter_context(Progress('reading', 1.0))]
+            line[0].update(share)
+
+        stack.callback(READ.reset, READ.set(tell))
         yield
     for warning in caught:
         if issubclass(warning.category, RecordingWarning):

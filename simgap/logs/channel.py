@@ -18,8 +18,7 @@ NANOSECONDS = 1_000_000_000
 METHODS: Mapping[Method, str] = MappingProxyType({
     'linear': 'straight line between the neighbouring samples',
     'hold': 'the last sample before (zero-order hold)',
-    'nearest': 'the nearest sample, the later one in the middle',
-})
+    'nearest': 'the nearest sample, the later one in the middle'})
 
 
 class RecordingError(UserError, ValueError):

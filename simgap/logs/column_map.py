@@ -27,27 +27,20 @@ UNITS: dict[str, tuple[str, float]] = {
     'A': ('A', 1.0), 'mA': ('A', 1e-3), 'V': ('V', 1.0), 'mV': ('V', 1e-3),
     'N m': ('N m', 1.0), 'kN m': ('N m', 1e3), 'N': ('N', 1.0), 'kN': ('N', 1e3),
     'm': ('m', 1.0), 'mm': ('m', 1e-3), 'um': ('m', 1e-6),
-    'm/s': ('m/s', 1.0), 'mm/s': ('m/s', 1e-3), '1': ('1', 1.0),
-}
+    'm/s': ('m/s', 1.0), 'mm/s': ('m/s', 1e-3), '1': ('1', 1.0)}
 COUNTS = 'counts'
 TIME_UNITS = {'s': NANOSECONDS, 'ms': 1_000_000, 'us': 1_000, 'ns': 1}
 ISO_8601 = 'iso8601'
 _TEXT_ENTRIES = ('delimiter', 'decimal', 'comment', 'encoding')
-_TOP = (*_TEXT_ENTRIES, 'skip_lines', 'header', 'units_row', 'missing', 'time',
-        'signals')
+_TOP = (*_TEXT_ENTRIES, 'skip_lines', 'header', 'units_row', 'missing', 'time', 'signals')
 _TIME = ('column', 'unit', 'offset_s', 'origin', 'duplicates')
-_NUMBERS = {
-    'scale': Entry('1', -1e12, 1e12), 'offset': Entry(''),
-    'clock_offset_s': Entry('s', -9e9, 9e9),
-    'counts_per_revolution': Entry('1', 1.0, 2.0**64),
-}
-_WHOLE_NUMBERS = {
-    'index': Entry('1', 0, MOST_COLUMNS, whole=True),
-    'sign_magnitude_bits': Entry('1', 2, 53, whole=True),
-}
+_PLACE = Entry('1', 0, MOST_COLUMNS, whole=True)
+_NUMBERS = {'scale': Entry('1', -1e12, 1e12), 'offset': Entry(''),
+            'clock_offset_s': Entry('s', -9e9, 9e9),
+            'counts_per_revolution': Entry('1', 1.0, 2.0**64)}
+_WHOLE_NUMBERS = {'index': _PLACE, 'sign_magnitude_bits': Entry('1', 2, 53, whole=True)}
 _SIGNAL = ('column', 'expression', 'unit', 'sign', 'time_column', *_NUMBERS, *_WHOLE_NUMBERS)
 _SKIP_LINES = Entry('1', 0, 10000, whole=True)
-_PLACE = Entry('1', 0, MOST_COLUMNS, whole=True)
 
 
 @dataclass(frozen=True)
@@ -58,8 +51,7 @@ class TimeMap:
     unit: str = 's'  # one of TIME_UNITS, or iso8601 (without a zone it is taken for UTC)
     offset_ns: int = 0  # added to every time stamp [ns]
     from_first: bool = False  # count from the first time stamp of the file
-    # row that counts where a time stamp is repeated: refuse, first or last
-    duplicates: str = 'refuse'
+    duplicates: str = 'refuse'  # or first or last: which of the rows with one stamp counts
 
 
 @dataclass(frozen=True)
@@ -71,8 +63,7 @@ class SignalMap:
     factor: float = 1.0  # SI units in the unit of the column
     gain: float = 1.0  # sign * scale
     offset: float = 0.0  # in the unit of the column
-    # of this signal's own time stamps; None for the common one
-    time_column: str | int | None = None
+    time_column: str | int | None = None  # of its own stamps; None for the common one
     clock_offset_ns: int = 0  # added to this signal's time stamps [ns]
     sign_bit: int = 0  # value of the bit that is the sign of a sign-magnitude register; 0 for none
 
@@ -123,8 +114,7 @@ def parse_map(tree: object, known: KnownSignals = NO_SIGNALS) -> ImportMap:
         ''.encode(texts.get('encoding', 'utf-8'))
     except (LookupError, ValueError, UnicodeError):
         raise ParameterError(f'encoding: {quoted(texts["encoding"])} given, allowed is one that '
-                             'Python '
-                             'knows, such as utf-8 or latin-1') from None
+                             'Python knows, such as utf-8 or latin-1') from None
     skip = int(_SKIP_LINES.check('skip_lines', plain_value(  # type: ignore[arg-type]
         top.get('skip_lines', 0))))
     rows = {'header': top.get('header', True), 'units_row': top.get('units_row', False)}

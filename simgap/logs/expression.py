@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 import math
 import operator
@@ -26,11 +27,9 @@ _COLUMN = 'column'
 
 OPERATORS: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
-    ast.Div: operator.truediv, ast.Mod: operator.mod, ast.Pow: math.pow,
-}
+    ast.Div: operator.truediv, ast.Mod: operator.mod, ast.Pow: math.pow}
 SIGNS: dict[type[ast.unaryop], Callable[[float], float]] = {
-    ast.UAdd: operator.pos, ast.USub: operator.neg,
-}
+    ast.UAdd: operator.pos, ast.USub: operator.neg}
 # Function and number of arguments; angles are in radians.
 FUNCTIONS: dict[str, tuple[Callable[..., float], int]] = {
     'abs': (abs, 1), 'sqrt': (math.sqrt, 1), 'exp': (math.exp, 1), 'log': (math.log, 1),
@@ -38,8 +37,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., float], int]] = {
     'acos': (math.acos, 1), 'atan': (math.atan, 1), 'atan2': (math.atan2, 2),
     'tanh': (math.tanh, 1), 'hypot': (math.hypot, 2), 'floor': (lambda x: float(math.floor(x)), 1),
     'min': (min, 2), 'max': (max, 2),
-    'sign': (lambda x: float((x > 0.0) - (x < 0.0)), 1),
-}
+    'sign': (lambda x: float((x > 0.0) - (x < 0.0)), 1)}
 CONSTANTS = {'pi': math.pi}
 
 _Term = Callable[[Sequence[float]], float]
@@ -114,13 +112,10 @@ class _Parser:
         return lambda numbers: numbers[place]
 
     def _constant(self, node: ast.Constant) -> _Term:
-        given = node.value
-        if isinstance(given, bool) or not isinstance(given, (int, float)):
-            raise self._refused(node)
-        try:
-            value = float(given)
-        except OverflowError:
-            raise self._refused(node) from None
+        given, value = node.value, math.nan
+        with suppress(OverflowError):
+            if isinstance(given, (int, float)) and not isinstance(given, bool):
+                value = float(given)
         if not math.isfinite(value):
             raise self._refused(node)
         return lambda numbers: value

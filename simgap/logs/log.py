@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Logs of tests, as they come from a file or from Python, and the test that a simulation gets."""
 
+from __future__ import annotations
+
+from array import array
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 import math
@@ -144,7 +147,7 @@ def _plain(path: Path) -> tuple[FloatArray, dict[str, FloatArray]]:
             raise LogError(f'{path}: {table.start}' + (
                 'a column is there twice' if any(names) else
                 'the columns have no names; --map says which is which'))
-        cells: dict[str, list[float]] = {name: [] for name in names}
+        cells = {name: array('d') for name in names}
         room = SAMPLES.value()
         for line, row in table.rows:
             room -= len(names)
@@ -159,8 +162,8 @@ def _plain(path: Path) -> tuple[FloatArray, dict[str, FloatArray]]:
                     if table.is_text:
                         raise
                     del cells[name]  # a column of another kind beside the numbers
-    return _with_time(path, {name: np.array(values[:table.lengths.get(name)])
-                             for name, values in cells.items()})
+    return _with_time(path, {name: np.array(cells.pop(name)[:table.lengths.get(name)])
+                             for name in list(cells)})
 
 
 def _number(given: Text, cell: Cell) -> float:
@@ -183,13 +186,14 @@ def _with_time(path: Path, columns: dict[str, FloatArray],
 def _mapped(path: Path, import_map: ImportMap) -> tuple[FloatArray, dict[str, FloatArray]]:
     """Read a file with a map; of several clocks that with most samples gives the times."""
     channels = read_mapped(path, import_map)
-    every = [channel.time_ns for channel in channels.values()]
+    every = list({id(c.time_ns): c.time_ns for c in channels.values()}.values())  # mostly one
     one_clock = len({(s.time_column, s.clock_offset_ns) for s in import_map.signals.values()}) == 1
     stamps = np.unique(np.concatenate(every)) if one_clock else max(every, key=len)
     if len(stamps) < _LEAST_SAMPLES:
         raise LogError(f'{path}: fewer than {_LEAST_SAMPLES} samples')
     columns = {}
-    for name, channel in channels.items():
+    for name in list(channels):
+        channel = channels.pop(name)
         columns[name] = np.full(len(stamps), np.nan)
         place = np.searchsorted(stamps, channel.time_ns)
         columns[name][np.minimum(place, len(stamps) - 1)] = channel.values

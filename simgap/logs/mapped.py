@@ -62,10 +62,16 @@ def read_mapped(path: str | Path, import_map: ImportMap) -> dict[str, Channel]:
                       stacklevel=2)
     first = min((s.stamps[0] for s in signals if s.stamps), default=0)
     origin = first if import_map.time.from_first else 0
-    return {
-        name: make_channel(name, signal.unit, np.array(samples.stamps, dtype=np.int64) - origin,
-                           samples.values)
-        for (name, signal), samples in zip(import_map.signals.items(), signals, strict=True)}
+    channels: dict[str, Channel] = {}
+    shared = np.empty(0, np.int64)
+    for name, signal in import_map.signals.items():
+        samples = signals.pop(0)  # ten million rows are in memory once
+        times = np.array(samples.stamps, np.int64) - origin
+        if not np.array_equal(times, shared):
+            shared = times
+            shared.flags.writeable = False  # or each channel would have a copy
+        channels[name] = make_channel(name, signal.unit, shared, samples.values)
+    return channels
 
 
 def _clock_of(signal: SignalMap, import_map: ImportMap) -> str | int:

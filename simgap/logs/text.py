@@ -2,11 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Text files of numbers: rows of cells, and the number or the time stamp in each cell."""
 
-from collections.abc import Iterator
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextvars import ContextVar
 import csv
 from decimal import Decimal
 import itertools
 import math
+import os
 from pathlib import Path
 import re
 from typing import NamedTuple, TextIO
@@ -18,6 +22,8 @@ from simgap.logs.channel import NANOSECONDS, RecordingError, RecordingWarning
 
 _NUMBER = re.compile(r'[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,4})?', re.ASCII)
 _LATEST_S = 9.2e9  # what 64 bits of nanoseconds hold
+# Gets the share of a large file that has been read; a command shows it.
+READ: ContextVar[Callable[[float], None]] = ContextVar('READ', default=lambda share: None)
 
 
 class Cell(NamedTuple):
@@ -75,6 +81,8 @@ def rows(path: Path, stream: TextIO, delimiter: str = '') -> Iterator[tuple[int,
     def lines() -> Iterator[str]:
         nonlocal last
         for line in itertools.chain([first], iter(lambda: stream.readline(longest + 1), '')):
+            if reader.line_num % 65536 == 65535:
+                READ.get()(stream.buffer.tell() / os.fstat(stream.fileno()).st_size)
             if len(line) > longest:
                 raise RecordingError(f'{path}: line {reader.line_num + 1}: '
                                      f'{CSV_LINE.exceeded()}')

@@ -31,8 +31,7 @@ _KINDS = {
     'geom': ('geom_', mujoco.mjtObj.mjOBJ_GEOM), 'site': ('site_', mujoco.mjtObj.mjOBJ_SITE),
     'tendon': ('tendon_', mujoco.mjtObj.mjOBJ_TENDON),
     'actuator': ('actuator_', mujoco.mjtObj.mjOBJ_ACTUATOR),
-    'equality': ('eq_', mujoco.mjtObj.mjOBJ_EQUALITY),
-}
+    'equality': ('eq_', mujoco.mjtObj.mjOBJ_EQUALITY)}
 # Coordinates and degrees of freedom of a joint of each type: free, ball, slide, hinge.
 _COORDINATES, _FREEDOMS = (7, 4, 1, 1), (6, 3, 1, 1)
 # Fields of the state, in which a run starts.

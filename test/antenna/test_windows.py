@@ -7,19 +7,20 @@ from __future__ import annotations
 from typing import Any
 
 from antenna_drive.diagnosis.excitation import Bias
-from antenna_drive.diagnosis.field_recording import FieldRecording
+from antenna_drive.diagnosis.field_recording import FieldRecording, LATER_S, looked_at, SOUGHT_S
 from antenna_drive.diagnosis.field_test import FieldTest, prepared, window_of
 from antenna_drive.diagnosis.machine import AntennaMachine, TRUNCATED_S
 from antenna_drive.diagnosis.sheet_settings import as_the_sheet_says
 from antenna_drive.diagnosis.windows import first_window, Window
 from antenna_drive.parameters import load
 from antenna_drive.parameters.sets import changed
-from antenna_drive.readings import AT
+from antenna_drive.readings import AT, RATE_COMMAND
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import CircuitBias, FixedStepBias, TestSheet, Triangle
 from field_runs import FAST_TRIANGLE, field_run, NOISE, SLOW_SQUARE
 import numpy as np
 import pytest
+from simgap.logs.channel import Channel, NANOSECONDS
 from simgap.machine.contract import Excerpt, FloatArray
 
 # No jumps, whose times a recording tells to half a macro-step only.
@@ -63,6 +64,19 @@ def test_after_a_rest_the_window_agrees_with_the_recording(signal: dict[str, Any
     test = compared(a=recording, b=recording, c=recording)[0]
     assert test.known_start
     assert misfit(test).max() < 1.5
+
+
+def test_of_a_day_the_first_minutes_of_the_motion_are_looked_at() -> None:
+    """However late it begins; a command of nearly nothing before is none."""
+    time = np.arange(0, 4000 * NANOSECONDS, NANOSECONDS // 10)
+    rates = np.where(time < 1500 * NANOSECONDS, 1e-9, 1e-3 * np.sin(1e-9 * time))
+    whole = Recording({name: Channel('rad/s', time, rates)
+                       for name in (RATE_COMMAND, 'motor_1/tach_rate')})
+    notes: list[str] = []
+    part = looked_at('rec', whole, notes.append)
+    assert part.end_ns / NANOSECONDS == pytest.approx(1500 + SOUGHT_S + LATER_S, abs=0.2)
+    assert notes == ['rec: of 4000 s, what comes after 2760 s was not looked at']
+    assert looked_at('rec', part, notes.append) is part and len(notes) == 1
 
 
 def test_an_offset_of_the_encoder_stays_after_a_long_rest() -> None:

@@ -50,6 +50,8 @@ np.savetxt(sys.argv[2], np.column_stack([time, rows["turn"], angle, np.gradient(
 """
 # Each ends when it is asked to, and says so many words before.
 SERVERS = {'antenna-drive live': 'http://', 'ros2 run': 'ready; waits for'}
+# What starts a whole drive runs beside no other test that does.
+DRIVES = ('antenna-drive live', 'antenna-drive record', 'antenna-drive article --through-nodes')
 TRIALS = ('antenna-drive calibrate', 'antenna-drive investigate', 'simgap investigate',
           'antenna-drive confusability', 'antenna-drive diagnose-many', 'simgap propose',
           'antenna-drive article --figures', 'antenna-drive article --through-nodes',
@@ -184,7 +186,10 @@ def environment(folder: Path) -> dict[str, str]:
             f'antenna_drive.nodes.{modules.get(node, node)} "$@"\n' for node in NODES))
     for path in programs.iterdir():
         path.chmod(0o755)
+    # a home of its own, but for the compiled code: it is that of the other tests
+    cache = os.environ.get('XDG_CACHE_HOME') or str(Path.home() / '.cache')
     return {**os.environ, 'PATH': f'{programs}:{os.environ["PATH"]}', 'HOME': str(folder),
+            'XDG_CACHE_HOME': cache,
             'PYTHONPATH': os.pathsep.join(map(str, (ROOT, ROOT / 'test')))}
 
 
@@ -200,10 +205,14 @@ def before(number: int) -> str:
     return ''
 
 
-def pasted() -> Iterator[object]:
-    """Yield the examples, each with what goes before it; what cannot be run here says why."""
+def pasted(drives: bool) -> Iterator[object]:
+    """
+    Yield the examples that start a drive, or the others, each with what goes before it.
+
+    What cannot be run here says why.
+    """
     for number, word in enumerate(EXAMPLES):
-        if word.startswith('mkdir'):
+        if word.startswith('mkdir') or word.startswith(DRIVES) is not drives:
             continue
         reason = next((ELSEWHERE[part] for part in ELSEWHERE if part in word), '')
         yield pytest.param(' && '.join(filter(None, (before(number), word))), id=word, marks=[
@@ -212,8 +221,19 @@ def pasted() -> Iterator[object]:
 
 
 @pytest.mark.timeout(1200)
-@pytest.mark.parametrize('example', [*pasted()])
-def test_it_runs(example: str, prepared: Path, tmp_path: Path, fresh_domain: int) -> None:
+@pytest.mark.parametrize('example', [*pasted(drives=False)])
+def test_it_runs(example: str, prepared: Path, tmp_path: Path, node_domain: int) -> None:
+    paste(example, prepared, tmp_path)
+
+
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize('example', [*pasted(drives=True)])
+def test_its_drive_runs(example: str, prepared: Path, tmp_path: Path, fresh_domain: int) -> None:
+    paste(example, prepared, tmp_path)
+
+
+def paste(example: str, prepared: Path, tmp_path: Path) -> None:
+    """Run an example in a copy of the folder, until it ends or is asked to."""
     folder = tmp_path / 'here'
     shutil.copytree(prepared, folder)
     server = next((said for begin, said in SERVERS.items() if example.startswith(begin)), '')
@@ -221,12 +241,11 @@ def test_it_runs(example: str, prepared: Path, tmp_path: Path, fresh_domain: int
             r'(?:export|import) \S+ (\S+)', example):
         for path in folder.glob(f'{Path(target).stem}.*' if '.' in target else target):
             shutil.rmtree(path) if path.is_dir() else path.unlink()
-    variables = {**environment(tmp_path), 'ROS_DOMAIN_ID': str(fresh_domain)}
     log = tmp_path / 'said'
     with log.open('wb') as stream:
         # the shell becomes the program, which gets the signal
         process = subprocess.Popen(['bash', '-c', f'exec {example}' if server else example],
-                                   cwd=folder, env=variables, stdin=subprocess.DEVNULL,
+                                   cwd=folder, env=environment(tmp_path), stdin=subprocess.DEVNULL,
                                    stdout=stream, stderr=stream)
         try:
             while server and process.poll() is None and server not in log.read_text():

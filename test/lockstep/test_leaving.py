@@ -34,7 +34,7 @@ def node_of(name: str) -> Node:
 
 
 @pytest.fixture
-def other(fresh_domain: int) -> Iterator[Node]:
+def other(node_domain: int) -> Iterator[Node]:
     found = node_of('other')
     yield found
     leave(found)
@@ -89,11 +89,11 @@ def test_a_node_waits_while_others_come_and_go(
 
 
 @pytest.mark.skipif(sys.platform != 'linux', reason='turns are names that Linux has')
-def test_a_node_waits_for_its_turn(fresh_domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_node_waits_for_its_turn(node_domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
     node = node_of('leaver')
     done: list[str] = []
     taken = socket.socket(socket.AF_UNIX)
-    taken.bind(f'\0antenna_drive/leaving/{fresh_domain}')
+    taken.bind(f'\0antenna_drive/leaving/{node_domain}')
 
     def sleep(seconds: float) -> None:
         """Let the other have left at the third look."""
@@ -105,11 +105,11 @@ def test_a_node_waits_for_its_turn(fresh_domain: int, monkeypatch: pytest.Monkey
     leave(node)
     assert done == ['not my turn', 'not my turn', 'not my turn', 'quiet', 'left']
     with socket.socket(socket.AF_UNIX) as following:
-        following.bind(f'\0antenna_drive/leaving/{fresh_domain}')
+        following.bind(f'\0antenna_drive/leaving/{node_domain}')
 
 
 def test_a_node_leaves_though_others_never_rest(
-        fresh_domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
+        node_domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
     node = node_of('leaver')
     restless = iter(range(1_000_000))
     monkeypatch.setattr(node, 'count_publishers', lambda topic: next(restless))
@@ -117,7 +117,7 @@ def test_a_node_leaves_though_others_never_rest(
     assert not node.context.ok()
 
 
-def test_a_node_leaves_a_context_that_was_shut_down(fresh_domain: int) -> None:
+def test_a_node_leaves_a_context_that_was_shut_down(node_domain: int) -> None:
     node = node_of('leaver')
     node.context.shutdown()
     leave(node)
@@ -141,7 +141,7 @@ def come_and_leave(name: str, together: Barrier, turns: int) -> None:
 
 
 @pytest.mark.trial
-def test_nodes_that_leave_together_do_not_hang(fresh_domain: int) -> None:
+def test_nodes_that_leave_together_do_not_hang(node_domain: int) -> None:
     # where nobody waited, one of the five hung in two of 300 turns
     spawning = multiprocessing.get_context('spawn')
     together = spawning.Barrier(LEAVERS)

@@ -46,7 +46,7 @@ class Speaker:
 
 
 @pytest.fixture
-def speaker(fresh_domain: int) -> Iterator[Speaker]:
+def speaker(node_domain: int) -> Iterator[Speaker]:
     """Return somebody who speaks for all units."""
     speaker = Speaker()
     yield speaker

@@ -17,7 +17,7 @@ UNIT = 'torque_share'  # the quickest to compile
 
 
 @pytest.mark.slow
-def test_compiling_is_told_from_its_beginning(tmp_path: Path, fresh_domain: int) -> None:
+def test_compiling_is_told_from_its_beginning(tmp_path: Path, node_domain: int) -> None:
     with Watch() as watch, DriveProcesses(
             order=[UNIT], environment={'NUMBA_CACHE_DIR': str(tmp_path)}) as processes:
         watch.until(lambda: 'compiling the physics' in processes.log(UNIT), 'the log')

@@ -65,7 +65,7 @@ def test_help_needs_no_ros(node: str) -> None:
     ('recorder', ('-p', 'out:=[]'), 'out'), ('recorder', ('-p', 'out:=5'), 'out: 5 given'),
     ('recorder', ('-p', 'sync:=[]'), 'sync'), ('twin', ('-p', 'alarms_per_day:=[]'), 'alarms_per'),
 ])
-@pytest.mark.usefixtures('fresh_domain')
+@pytest.mark.usefixtures('node_domain')
 def test_wrong_input_is_one_line_and_exit_code_2(
         node: str, args: tuple[str, ...], said: str) -> None:
     pytest.importorskip('rclpy', reason='rclpy is not installed')
@@ -74,7 +74,7 @@ def test_wrong_input_is_one_line_and_exit_code_2(
     assert said in the_line(done)
 
 
-@pytest.mark.usefixtures('fresh_domain')
+@pytest.mark.usefixtures('node_domain')
 def test_what_is_no_ros_argument_is_refused() -> None:
     pytest.importorskip('rclpy', reason='rclpy is not installed')
     done = run_node('torque_share', '--bias')
@@ -82,7 +82,7 @@ def test_what_is_no_ros_argument_is_refused() -> None:
     assert '--bias' in the_line(done)
 
 
-@pytest.mark.usefixtures('fresh_domain')
+@pytest.mark.usefixtures('node_domain')
 def test_a_file_of_parameters_sets_constants_too(tmp_path: Path) -> None:
     pytest.importorskip('rclpy', reason='rclpy is not installed')
     from drive_watch import Watch
@@ -101,7 +101,7 @@ def test_a_file_of_parameters_sets_constants_too(tmp_path: Path) -> None:
         assert node.wait(60.0) == 0
 
 
-@pytest.mark.usefixtures('fresh_domain')
+@pytest.mark.usefixtures('node_domain')
 def test_an_empty_list_of_configurations_is_none(tmp_path: Path) -> None:
     pytest.importorskip('rclpy', reason='rclpy is not installed')
     from drive_watch import Watch

@@ -27,10 +27,10 @@ STAND_IN = (sys.executable, '-m', 'antenna_drive.nodes.partner')
 
 
 def parameters(on_miss: str, exchange: str) -> dict[str, dict[str, Any]]:
-    """Return those of a drive at real-time pace, half a second of which may be missed."""
+    """Return those of a slow drive, whose partner would have to be silent for 40 s to miss it."""
     return {**{unit: {'exchange': exchange} for unit in UNITS}, 'test_signal': {
-        'exchange': exchange, 'run.step': 4e-3, 'run.pace': 1.0, 'run.observers': ['watcher'],
-        'partner.reads': ['plant/encoder'], 'partner.rate': 50.0, 'partner.deadline': 0.5,
+        'exchange': exchange, 'run.step': 4e-3, 'run.pace': 0.1, 'run.observers': ['watcher'],
+        'partner.reads': ['plant/encoder'], 'partner.rate': 50.0, 'partner.deadline': 4.0,
         'partner.on_miss': on_miss}}
 
 
@@ -49,13 +49,15 @@ def test_a_partner_is_followed_missed_and_replayed(on_miss: str, exchange: str) 
         finally:
             partner.kill()
             partner.wait()
+        watch.until(lambda: watch.set_together('test_signal', {'run.pace': 0.0}).successful,
+                    'haste')
         watch.until(lambda: number(watch, 'misses') > 0, 'a miss')
         if on_miss == 'zero':
             target = recorder.steps + 50
             watch.until(lambda: recorder.steps > target, 'steps without a partner')
             assert number(watch, 'steps overdue') > 0
         else:
-            watch.until(lambda: 'no answer of the partner within 0.5 s' in
+            watch.until(lambda: 'no answer of the partner within 4 s' in
                         watch.reports['test_signal'].message, 'the stop')
         samples, schedule = recorder.array(), recorder.schedule()
         log = processes.log('test_signal')

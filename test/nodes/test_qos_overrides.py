@@ -17,7 +17,7 @@ OVERRIDE = 'qos_overrides./torque_share/{}.publisher.reliability'
 
 
 @pytest.mark.slow
-def test_a_signal_is_published_as_it_was_asked_for(fresh_domain: int) -> None:
+def test_a_signal_is_published_as_it_was_asked_for(node_domain: int) -> None:
     asked = {UNIT: {OVERRIDE.format('bias_voltage'): 'best_effort'}}
 
     def reliability(topic: str) -> ReliabilityPolicy | None:
@@ -34,7 +34,7 @@ def test_a_signal_is_published_as_it_was_asked_for(fresh_domain: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize('topic', ['frame', 'changes'])
-def test_the_qos_of_the_lock_step_is_not_changed(topic: str, fresh_domain: int) -> None:
+def test_the_qos_of_the_lock_step_is_not_changed(topic: str, node_domain: int) -> None:
     name = OVERRIDE.format(topic)
     with DriveProcesses({UNIT: {name: 'best_effort'}}, order=[UNIT]) as processes:
         assert processes.process(UNIT).wait(timeout=120.0) == 2

@@ -58,7 +58,7 @@ def started(log: IO[bytes], node: str, *arguments: str) -> Iterator[None]:
             process.terminate()
 
 
-@pytest.mark.usefixtures('fresh_domain')
+@pytest.mark.usefixtures('node_domain')
 @pytest.mark.parametrize(('node', 'arguments', 'waits'), [
     ('recorder', (), f'the frames of {", ".join(UNITS)}'),
     ('joint_states', (), 'the frames of plant, motor_1, motor_2'),
@@ -75,20 +75,19 @@ def test_those_who_only_read_say_so_too(node: str, arguments: tuple[str, ...], w
         assert line.endswith(f']: ready; waits for {waits}')
 
 
-@pytest.mark.usefixtures('fresh_domain')
-def test_the_second_of_a_name_says_so_where_it_was_started(fresh_domain: int) -> None:
+def test_the_second_of_a_name_says_so_where_it_was_started(node_domain: int) -> None:
     with Watch() as watch, DriveProcesses(order=['torque_share']) as first, DriveProcesses(
             order=['torque_share']) as second:
-        line = f'another node is called /torque_share in ROS domain {fresh_domain}: '
+        line = f'another node is called /torque_share in ROS domain {node_domain}: '
         watch.until(lambda: line in second.log('torque_share'), 'the second')
         # and so does the first one, for as long as it waits in vain
         watch.until(lambda: line in first.log('torque_share'), 'the first')
         assert 'ROS_DOMAIN_ID' in second.log('torque_share')
 
 
-def test_a_namesake_has_the_same_namespace_too(fresh_domain: int) -> None:
+def test_a_namesake_has_the_same_namespace_too(node_domain: int) -> None:
     context = Context()
-    context.init(args=[], domain_id=fresh_domain)
+    context.init(args=[], domain_id=node_domain)
     alone, *others = (Node('motor_1', namespace=space, context=context)
                       for space in ('/east', '/west'))
     try:

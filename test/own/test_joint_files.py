@@ -67,20 +67,17 @@ def test_with_the_true_numbers_each_way_leaves_the_noise(
 
 @pytest.mark.trial
 @pytest.mark.timeout(1200)
-@pytest.mark.parametrize(('fault', 'named'), [
-    ('nothing', 'none'), ('compliance', 'gearbox.compliance'), ('backlash', ''),
-    ('load_friction', 'load.friction'), ('delay', 'controller.delay')])
-def test_the_verdict_is_the_same_in_each_way(fault: str, named: str,
-                                             models: dict[str, Model]) -> None:
-    """The probabilities agree; of the gap the fit from no gap does not get there in any way."""
+@pytest.mark.parametrize('fault', MAKER['FAULTS'])
+def test_the_verdict_is_the_same_in_each_way(fault: str, models: dict[str, Model]) -> None:
+    """The probabilities agree, and so does what is likeliest; the page has those in Python."""
     logs = logs_of(fault)
     found = {}
     for way, model in models.items():
         which = diagnose_logs(model, logs).as_data()['which']
         found[way] = {'+'.join(item['effects']): item['probability'] for item in which}
     for probabilities in found.values():
-        if named:
-            assert max(probabilities, key=lambda name: probabilities[name]) == named
+        assert max(probabilities, key=lambda name: probabilities[name]) == max(
+            found['python'], key=lambda name: found['python'][name])
         for effect in {*probabilities, *found['python']}:
             assert abs(probabilities.get(effect, 0.0)
                        - found['python'].get(effect, 0.0)) < APART

@@ -67,8 +67,8 @@ def test_each_is_tested_by_the_workflow() -> None:
 @pytest.mark.skipif(importlib.util.find_spec('rclpy') is None, reason='rclpy is not installed')
 @pytest.mark.parametrize('release', [name for name in RELEASES if name != installed()])
 def test_five_processes_give_the_bits_of_one(release: str, tmp_path: Path,
-                                             module_domain: int) -> None:
-    """With the wheels of a release that the other tests do not run on."""
+                                             node_domain: int) -> None:
+    """With the wheels of a release that no other test runs on; to install them takes longest."""
     venv = tmp_path / 'venv'
     build([sys.executable, '-I', '-m', 'venv', venv], tmp_path, bare_environment())
     python = venv / 'bin' / 'python'
@@ -78,7 +78,7 @@ def test_five_processes_give_the_bits_of_one(release: str, tmp_path: Path,
     # numpy and the like are those of these tests, and come behind
     Path(packages, 'behind.pth').write_text(sysconfig.get_path('purelib') + '\n')
     environment = {**bare_environment(), 'PYTHONPATH': str(ROOT), 'ROS_DOMAIN_ID': str(
-        module_domain), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+        node_domain), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
 
     def run(*words: str) -> str:
         done = subprocess.run([python, '-m', 'antenna_drive', *words], env=environment, text=True,

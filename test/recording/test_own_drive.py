@@ -70,7 +70,7 @@ def test_a_recording_without_its_rows_is_never_called_done(
     begin = recorder.RunRecorder.begin
 
     def begin_twice(self: recorder.RunRecorder, run: int, step_s: float) -> None:
-        begin(self, run, step_s)
+        begin(self, run - 1, step_s)
         begin(self, run, step_s)
 
     monkeypatch.setattr(recorder.RunRecorder, 'begin', begin_twice)

@@ -16,6 +16,7 @@ import sys
 import time
 
 from installations import Installation
+from lab.campaign.domains import DomainClaim
 import pytest
 
 pytestmark = pytest.mark.slow
@@ -98,12 +99,18 @@ after_one = pytest.mark.parametrize('shell', ['pip'], indirect=True, scope='modu
 
 
 @pytest.fixture(scope='module')
-def shell(request: pytest.FixtureRequest, module_domain: int) -> Shell:
-    """Return a shell after an installation, or skip without rclpy or the ros2 command."""
+def shell(request: pytest.FixtureRequest) -> Iterator[Shell]:
+    """
+    Return a shell after an installation, or skip without rclpy or the ros2 command.
+
+    Its drive is slow, and disturbs no other one: these tests are a group of their own.
+    """
     pytest.importorskip('rclpy', reason='ROS 2 is not installed')
     if ROS2 is None:
         pytest.skip('the ros2 command line is not installed')
-    return Shell(request.getfixturevalue(f'{request.param}_installation'), module_domain)
+    claim = DomainClaim()
+    yield Shell(request.getfixturevalue(f'{request.param}_installation'), claim.number)
+    claim.release()
 
 
 @pytest.fixture(scope='module')
