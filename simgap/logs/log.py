@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Logs of tests, as they come from a file or from Python, and the test that a simulation gets."""
 
-from __future__ import annotations
-
 from array import array
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

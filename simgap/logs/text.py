@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Text files of numbers: rows of cells, and the number or the time stamp in each cell."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 import csv

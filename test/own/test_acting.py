@@ -38,7 +38,7 @@ def test_what_acts_from_the_beginning_to_the_end_has_no_moment() -> None:
     loud = noise.copy()
     loud[700:1200] *= 6.0
     first, last = loud_span(loud, able) or (0, 0)
-    assert (first, last) == (pytest.approx(700, abs=15), pytest.approx(1200, abs=15))
+    assert [first, last] == pytest.approx([700, 1200], abs=15)
 
 
 def test_what_is_quiet_only_while_nothing_moves_has_no_moment() -> None:
