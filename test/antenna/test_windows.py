@@ -106,8 +106,8 @@ def test_a_window_in_the_middle_of_a_motion_agrees_once_it_has_settled() -> None
     assert test.time[0] == pytest.approx(15.0, abs=0.01)
     assert test.time[-1] == pytest.approx(45.0, abs=0.02)
     assert test.excerpt is not None
-    assert test.excerpt == Excerpt('rec', test.excerpt.whole_s, 75.0)
-    assert test.excerpt.whole_s == pytest.approx(140.0, abs=0.01)
+    assert test.excerpt == Excerpt('rec', test.excerpt.of_s, 75.0)
+    assert test.excerpt.of_s == pytest.approx(140.0, abs=0.01)
     assert misfit(test).max() < 2.0
     # the elevation goes on from the angle that was reached
     angle = recording['plant/encoder'].values[75 * 200]
