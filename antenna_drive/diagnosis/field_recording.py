@@ -14,6 +14,7 @@ from antenna_drive.readings import AT, NAMED, RATE_COMMAND, RATE_COMMAND_COLUMN,
 from antenna_drive.recording import sheet as sheets
 from antenna_drive.recording.recording import Recording
 import numpy as np
+from numpy.typing import NDArray
 from simgap.errors import UserError
 from simgap.logs.channel import Channel, NANOSECONDS
 from simgap.machine.contract import FloatArray
@@ -54,6 +55,7 @@ class FieldRecording:
     readings : those that were recorded, by their short names, without spikes
     time : of the samples of the reading with most of them, spikes included, shape (n,) [s]
     is_planned : the readings are not measured
+    later_s : how much longer the recording is than what was looked at [s]
     """
 
     name: str
@@ -63,6 +65,7 @@ class FieldRecording:
     readings: dict[str, Channel]
     time: FloatArray
     is_planned: bool
+    later_s: float = 0.0
 
     @classmethod
     def of(cls, name: str, recording: Recording, note: Note) -> FieldRecording:
@@ -82,6 +85,8 @@ class FieldRecording:
         if all(_channel(recording, reading) is None for reading in READINGS):
             raise UserError(f'{name}: there is no reading beside the rate command, '
                             'at least one current is needed')
+        whole_ns, recording = recording.end_ns, looked_at(name, recording, note)
+        later_s = (whole_ns - recording.end_ns) / NANOSECONDS
         recording = _from_its_start(name, recording, note)
         command = _command(name, recording.sheet.waveform, recording[RATE_COMMAND], note)
         readings = {}
@@ -98,7 +103,8 @@ class FieldRecording:
                             f'{_FEWEST} are needed')
         _note_missing_rows(name, time, note)
         return cls(name, recording.sheet, command, recording[RATE_COMMAND],
-                   _without_spikes(name, readings, note), time, PLANNED in recording.notes)
+                   _without_spikes(name, readings, note), time, PLANNED in recording.notes,
+                   later_s)
 
     @property
     def period(self) -> float:
@@ -113,8 +119,7 @@ class FieldRecording:
     @property
     def onset(self) -> float:
         """Return when the motion begins [s]; the first time if nothing is commanded."""
-        moving = np.abs(self.rates.values) > _AT_REST * float(np.abs(self.rates.values).max())
-        moving &= self.rates.time_s >= 0.0
+        moving = _moving(self.rates.values) & (self.rates.time_s >= 0.0)
         return float(self.rates.time_s[np.argmax(moving)] if moving.any() else self.time[0])
 
     def command_between(self, begin: float, compared: float, end: float) -> CommandedRate:
@@ -155,14 +160,16 @@ class FieldRecording:
         return measured, slope
 
 
+def _moving(rates: FloatArray) -> NDArray[np.bool_]:
+    """Return where a command moves the axis, shape (n,)."""
+    sizes = np.abs(rates)
+    return np.asarray(sizes > _AT_REST * float(sizes.max()))
+
+
 def looked_at(name: str, recording: Recording, note: Note) -> Recording:
     """Return the part of a recording in which windows may be: of a day its beginning."""
-    rates = recording.channels.get(RATE_COMMAND)
-    if rates is None or not len(rates):
-        return recording
-    sizes = np.abs(rates.values)
-    onset_s = rates.time_s[np.argmax(sizes > _AT_REST * sizes.max())]
-    end_s = float(onset_s) + SOUGHT_S + LATER_S
+    rates = recording[RATE_COMMAND]
+    end_s = float(rates.time_s[np.argmax(_moving(rates.values))]) + SOUGHT_S + LATER_S
     if end_s >= recording.end_ns / NANOSECONDS:
         return recording
     note(f'{name}: of {recording.duration_s:.0f} s, what comes after {end_s:.0f} s was not '

@@ -13,7 +13,7 @@ from typing import Any
 from antenna_drive.diagnosis.excitation import (
     Bias, CommandedRate, Longest, schedule, SheetCommand,
 )
-from antenna_drive.diagnosis.field_recording import FieldRecording, looked_at, Note
+from antenna_drive.diagnosis.field_recording import FieldRecording, Note
 from antenna_drive.diagnosis.inference import completed
 from antenna_drive.diagnosis.late_readings import dense, parts_of
 from antenna_drive.diagnosis.recorded_command import RecordedCommand
@@ -132,8 +132,7 @@ def prepared(recordings: Mapping[str, Recording], drive: Drive, note: Note) -> l
 
     Raises UserError: a recording lacks the rate command or readings, or cannot be of this drive.
     """
-    found = [FieldRecording.of(name, looked_at(name, recording, note), note)
-             for name, recording in recordings.items()]
+    found = [FieldRecording.of(name, recording, note) for name, recording in recordings.items()]
     for recording in found:
         if not recording.is_planned:
             check(recording, drive, note)
@@ -180,7 +179,8 @@ def window_of(recording: FieldRecording, window: Window, drive: Drive, bias: Bia
         bias.later(window.begin), time - window.begin, measured, slope,
         sensors, jitter_of(recording.command, recording.rates.time_s, recording.rates.values),
         recording.period, recording.sheet, window.known_start, angle,
-        dict(recording.sheet.labels or ()), Excerpt(recording.name, recording.end, window.begin))
+        dict(recording.sheet.labels or ()),
+        Excerpt(recording.name, recording.end + recording.later_s, window.begin))
     if not window.known_start:
         off = (measured - test.simulated(_STEP_S))[:, AT['encoder']]
         if np.isfinite(off).any():

@@ -77,6 +77,9 @@ def test_of_a_day_the_first_minutes_of_the_motion_are_looked_at() -> None:
     assert part.end_ns / NANOSECONDS == pytest.approx(1500 + SOUGHT_S + LATER_S, abs=0.2)
     assert notes == ['rec: of 4000 s, what comes after 2760 s was not looked at']
     assert looked_at('rec', part, notes.append) is part and len(notes) == 1
+    found = FieldRecording.of('rec', whole, notes.append)
+    assert found.end < 3000.0
+    assert found.end + found.later_s == pytest.approx(whole.duration_s, abs=0.2)
 
 
 def test_an_offset_of_the_encoder_stays_after_a_long_rest() -> None:
