@@ -8,8 +8,6 @@ difference in T1 to T4, as a share of the signal's rms. `stability` measures the
 exchange between units on the stability limit of the torque bias.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache

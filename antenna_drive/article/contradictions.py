@@ -7,8 +7,6 @@ Every entry names the passages, runs the possible readings on the configuration 
 draws its conclusion from the figures obtained.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

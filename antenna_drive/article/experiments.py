@@ -7,8 +7,6 @@ T1 and T2 are Section IV (Figs. 8-13), T3a and T3b Section V (Figs. 18-20), T4 S
 (Figs. 21-23). docs/article.md explains how each figure is obtained.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 import math

@@ -7,8 +7,6 @@ Figures 4 to 7 and 14 are block diagrams and are left out. Of Figs. 8 to 13 the 
 drawn. The drawings follow the article's text and captions; its pictures are not copied.
 """
 
-from __future__ import annotations
-
 from base64 import b64encode
 from collections.abc import Callable, Sequence
 from functools import partial

@@ -8,8 +8,6 @@ physics, so that each checks the other. The teeth stay in contact and nothing sa
 friction either holds the rotors or is absent.
 """
 
-from __future__ import annotations
-
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.parameters import Drive
 import numpy as np

@@ -7,8 +7,6 @@ The rate command is zero. A torque on the axis rises and falls slowly enough for
 follow. The torques by Eq. (14) alone, for the same load, are given for comparison.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from antenna_drive.article.experiments import DriveExperiment

@@ -7,8 +7,6 @@ A `Readout` is taken from a weighted sum of one experiment's signals. A `Trend` 
 figures in order. A `ModelFigure` needs no run. `Results` runs each experiment only once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """T5: figures of the static bias profile (Figs. 15, 16) and of the loaded axis (Figs. 2, 17)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import lru_cache, partial
 

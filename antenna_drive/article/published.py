@@ -13,8 +13,6 @@ The basis says what a passing row proves:
 - predicted: no parameter was set from it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The comparison with the article, row by row."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 

@@ -7,8 +7,6 @@ Only the sign of the growth counts, since friction and limits bound the amplitud
 the same limit from eigenvalues.
 """
 
-from __future__ import annotations
-
 from antenna_drive.article.experiments import filter_variant
 from antenna_drive.article.linear import stability_limit
 from antenna_drive.emulator.run import Emulator, MACRO_STEP

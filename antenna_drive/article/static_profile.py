@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The torque bias at a constant load, Eq. (14) and Fig. 15, and the corners of the profile."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from antenna_drive.emulator.unit import FloatArray

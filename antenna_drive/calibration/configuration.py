@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A fitted parameter set as a configuration file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

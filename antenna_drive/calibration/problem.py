@@ -13,8 +13,6 @@ A target file has these sections:
   search:       population and spread of the first generation
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math

@@ -8,8 +8,6 @@ parameters. The uncertainty of a parameter is the move that makes the targets mi
 tolerance: alone (conditional), or while all other parameters compensate for it (marginal).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import count

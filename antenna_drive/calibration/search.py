@@ -8,8 +8,6 @@ the same candidates, and those in the log are not simulated again. An interrupte
 therefore resumes where it stopped and gives the same result.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass

@@ -7,8 +7,6 @@ Run the drive as five ROS 2 nodes or in one process, repeat the article's experi
 record, compare with a real drive, and find out where the two part.
 """
 
-from __future__ import annotations
-
 from antenna_drive import __version__
 from simgap.command.program import Command, Program
 

@@ -8,8 +8,6 @@ experiments, in percent of the signal's rms. It also shows the gain k' of Filter
 torque bias becomes unstable: 145.4 when converged, less with a delay between the units.
 """
 
-from __future__ import annotations
-
 import argparse
 from typing import Any
 

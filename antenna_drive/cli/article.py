@@ -16,8 +16,6 @@ parameter was computed from the figure), fitted (the shipped parameter sets were
 or predicted. Currents are in the article's amperes. The exit code is 1 if a row fails.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections import Counter
 from collections.abc import Callable

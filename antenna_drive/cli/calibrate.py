@@ -12,8 +12,6 @@ same seed tries the same candidates. With --log an interrupted search resumes. T
 1 if a target is missed by more than its tolerance.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import Any

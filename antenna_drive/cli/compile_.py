@@ -8,8 +8,6 @@ sources change. Without this command the first run, and each node at its first s
 what it needs, which takes some seconds.
 """
 
-from __future__ import annotations
-
 import argparse
 
 from simgap.command.output import Progress

@@ -9,8 +9,6 @@ For example:
   antenna-drive completion zsh > ~/.zfunc/_antenna-drive     # with ~/.zfunc in fpath
 """
 
-from __future__ import annotations
-
 import argparse
 
 from simgap.command.programs import OK

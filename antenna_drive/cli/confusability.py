@@ -14,8 +14,6 @@ For example:
   antenna-drive confusability --excitation planned.yaml --json -
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -26,8 +26,6 @@ may hide the true one.
 `simgap check` says beforehand what is wrong with it.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

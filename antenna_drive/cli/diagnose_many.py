@@ -24,8 +24,6 @@ For example:
   antenna-drive diagnose-many antennas/ --out found/ --scheduler tcp://host:8786 --json -
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 from pathlib import Path

@@ -15,8 +15,6 @@ For example:
   antenna-drive doctor nodes recording --json -
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 

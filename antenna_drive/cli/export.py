@@ -16,8 +16,6 @@ Currents are in article amperes, one of which is several real ones; --real-amper
 such as 'motor_1/real_current [real A]' for each.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -20,8 +20,6 @@ Whatever cannot be read is refused with its line and column, and then nothing is
   antenna-drive import log.csv field_bag --map log_map.yaml
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -22,8 +22,6 @@ already these are test_signal with -p sheet:={sheet} and the recorder with -p ou
 code is 1 if nothing was decided.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 import shlex

@@ -21,8 +21,6 @@ with its token can then turn the drive; the connection is not encrypted. The soc
 is for this machine always; it has no token.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -8,8 +8,6 @@ and time derivative of every signal at every step must be the same to the last b
 code is 0 if they are, 1 if not.
 """
 
-from __future__ import annotations
-
 import argparse
 from typing import Any
 

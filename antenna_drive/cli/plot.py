@@ -10,8 +10,6 @@ with real ones on the right where the configuration tells how many they are.
   antenna-drive plot run/ --signals 'motor_*/current' torque_share/bias_voltage --to 12.6
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How every command reads a recording: its options, and warnings in one line."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterable
 import math

@@ -18,8 +18,6 @@ tools, give it the plain names, or any others: --namespace / or --namespace /eas
 To record a drive that runs already: ros2 run antenna_drive recorder --ros-args -p out:=run
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Mapping, Sequence
 from pathlib import Path

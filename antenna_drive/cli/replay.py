@@ -12,8 +12,6 @@ own.
   antenna-drive replay field.csv --config new_circuit my_antenna.yaml --out twin
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -10,8 +10,6 @@ figures alone.
   antenna-drive report run/ -o second_period.html --from 5 --to 10
 """
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import asdict
 from pathlib import Path

@@ -10,8 +10,6 @@ The numbers are those of the five nodes, to the last bit, and come hundreds of t
 real time. --out NAME.csv writes a table, any other name a rosbag2 folder (MCAP).
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Configurations and parameters of single units on a command line."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from typing import Any

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The options of commands whose work other processes or machines can do."""
 
-from __future__ import annotations
-
 import argparse
 import os
 

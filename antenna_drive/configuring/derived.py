@@ -8,8 +8,6 @@ ampere is another number of real ones, and the torque-share circuit keeps its sh
 drive's greatest torque.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import math
 from typing import NamedTuple

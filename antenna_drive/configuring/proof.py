@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether a configured drive gives the figures of its sheet back, each from a run of its own."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The structure's modes from its inertia and its lowest resonance with the rotors held."""
 
-from __future__ import annotations
-
 import math
 
 from antenna_drive.physics.arrays import FloatArray

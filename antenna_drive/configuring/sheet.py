@@ -6,8 +6,6 @@ What is asked of a drive: the figures that data sheets and test reports have, in
 Currents here are real amperes, as a clamp meter shows them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 import math

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A configuration as a file that people read: each number with its unit and its source."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import fields, MISSING
 from operator import attrgetter

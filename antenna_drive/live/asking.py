@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A question to a node, by a service."""
 
-from __future__ import annotations
-
 import asyncio
 from typing import Any
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What every open page is to know: the last word on each subject, from any thread."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import json
 from threading import Lock

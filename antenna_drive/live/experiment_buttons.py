@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The article's experiments and a preview of the test signals, for the page."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache

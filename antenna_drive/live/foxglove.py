@@ -8,8 +8,6 @@ SDK serves them in threads of its own. What clients ask is done in the loop of t
 new comes from the history and the board, as for the page.
 """
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Awaitable, Iterator, Mapping
 import json

@@ -7,8 +7,6 @@ A strip chart of a thousand pixels cannot show sixty thousand samples. Of each i
 and the greatest value are kept, so no peak is lost. Memory does not grow. Nothing here needs ROS.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 import struct
 from threading import Lock

@@ -7,8 +7,6 @@ Frames are taken in bulk, twenty times a second, so that the drive is not slowed
 wakes for each. Services and everything else are served in a second thread.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 import json

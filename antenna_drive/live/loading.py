@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings beside the live curves."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The article's figures as the run on the page gives them, to stand beside the published ones."""
 
-from __future__ import annotations
-
 import math
 
 from antenna_drive.article.experiments import DriveExperiment, experiments

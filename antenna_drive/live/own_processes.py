@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The processes that the page may start: a drive of its own, and a recorder."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Mapping, Sequence
 from datetime import datetime

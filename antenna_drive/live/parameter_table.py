@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the page shows of a parameter, read from the descriptor that its node gives."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 import math
 from typing import Any, NamedTuple

@@ -8,8 +8,6 @@ page of another site cannot use it: the names that it answers to are known, and 
 come from the page itself.
 """
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Awaitable
 import hmac

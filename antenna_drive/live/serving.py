@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page from start to end: drive, link, servers, and an orderly end at Ctrl-C."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Mapping
 from contextlib import ExitStack

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a page may ask, and what is done about it."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path

@@ -7,8 +7,6 @@ A twin is known by its report in /diagnostics, whatever its name and namespace. 
 checked: anything may be on a topic.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 import json
 import math

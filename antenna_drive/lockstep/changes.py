@@ -9,8 +9,6 @@ listens gets whatever anybody has put on the topic, so a text is checked in full
 used. Nothing here needs ROS.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 import json
 import math

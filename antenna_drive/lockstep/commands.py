@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A setting that follows a topic, within limits."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from antenna_drive.lockstep.readings import READING_OVERRIDES, READING_QOS

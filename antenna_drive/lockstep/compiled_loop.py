@@ -11,8 +11,6 @@ What it works on is in arrays, so that the Python side reads where it stands. `W
 `Call` and `Peer` name their places.
 """
 
-from __future__ import annotations
-
 from collections import namedtuple
 from typing import Any
 

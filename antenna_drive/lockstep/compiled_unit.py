@@ -7,8 +7,6 @@ Units of exactly these types have one; a unit in plain Python, or a subclass tha
 something else in its `step`, has none.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path

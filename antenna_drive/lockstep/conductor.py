@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The protocol of the unit that owns a run: when it begins, goes on, and ends."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit

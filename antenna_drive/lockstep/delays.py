@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How long something takes that happens at every step: percentiles of any number of delays."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

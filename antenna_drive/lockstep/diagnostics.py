@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A message on /diagnostics."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue

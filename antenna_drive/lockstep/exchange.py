@@ -8,8 +8,6 @@ are copied into the loop's arrays; when the loop returns, they are copied back. 
 but the loop touches them. Nothing here needs ROS.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 import ctypes
 from functools import cache

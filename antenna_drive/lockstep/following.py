@@ -10,8 +10,6 @@ conductor speaks of it and every unit has sent a step of it: a frame that somebo
 no run. Nothing here needs ROS.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple

@@ -8,8 +8,6 @@ derivative of each output of the unit. Its layout names them, so that a frame ca
 without this package. Nothing here needs ROS.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import math
 import os

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a node says of itself before it takes part: that its physics is being compiled."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Event, Thread

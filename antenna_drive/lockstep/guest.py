@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The protocol of a reader that nobody waits for."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 

@@ -7,8 +7,6 @@ Frames may come in any order, twice, late or from somebody who should not send t
 run and step decide. Nothing here needs ROS, and nothing here reads a clock.
 """
 
-from __future__ import annotations
-
 from collections import Counter, deque
 from collections.abc import Collection, Mapping
 from enum import Enum

@@ -11,8 +11,6 @@ It keeps the lock that the callback waits for, and Python's lock as well: the pr
 good. Callbacks run while somebody else comes or goes, so we leave when nobody does.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 import errno

@@ -7,8 +7,6 @@ It is a plain state machine, as are `conductor.Conductor` and `guest.Guest`: fra
 `receive`, outputs to be published come out of `go_on`. Others carry the frames.
 """
 
-from __future__ import annotations
-
 from array import array
 from collections.abc import Collection, Mapping, Sequence
 

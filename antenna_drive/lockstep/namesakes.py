@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A second node of the same name, as the graph shows it."""
 
-from __future__ import annotations
-
 import os
 
 from rclpy.node import Node

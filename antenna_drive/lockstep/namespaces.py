@@ -11,8 +11,6 @@ undiscovered, nodes that somebody starts later or on another machine, the frames
 senders.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 import os

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One node: a member of the lock-step on ROS 2, its parameters, topics and reports."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping, Sequence
 import gc
 import time

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The parameters of a node itself, beside the settings of its unit."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping
 
 from antenna_drive.emulator.unit import Unit

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """When each step of a run is due: k times real time, or as soon as possible."""
 
-from __future__ import annotations
-
 from antenna_drive.lockstep.delays import Delays
 
 # No one at a screen sees a drive ahead of the clock by so much [s]; a process that has to wait

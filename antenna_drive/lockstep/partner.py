@@ -8,8 +8,6 @@ out the partner's last answer, held, and every answer that it takes is a change 
 therefore replays from its record, whatever the partner's timing was. Nothing here needs ROS.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 import math
 

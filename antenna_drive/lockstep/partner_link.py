@@ -8,8 +8,6 @@ Both are std_msgs/Float64MultiArray: [run, step, macro-step, value of each input
 that is answered, value of each output].
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import time
 

@@ -10,8 +10,6 @@ machine that does other work it is the other way round: who interrupts nobody wa
 work several times in every step.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 import os
 from pathlib import Path

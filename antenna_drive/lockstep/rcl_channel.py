@@ -9,8 +9,6 @@ functions are looked up in the libraries that rclpy has loaded, the layout of a 
 checked, and a frame is sent to ourselves and back. Whatever is not as expected is `Unusable`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 import ctypes

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What people and plotters read: one topic per signal at a decimated rate, clock, changes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 import struct
 from typing import Any

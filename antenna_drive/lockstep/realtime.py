@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Real-time scheduling and locked memory for a node, where the user has the right to them."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 from pathlib import Path

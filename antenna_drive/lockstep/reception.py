@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which peer's frames a node takes when."""
 
-from __future__ import annotations
-
 from antenna_drive.lockstep.exchange import BRIEF_WAIT_S
 from antenna_drive.lockstep.member import Member
 from antenna_drive.lockstep.ros_link import FrameLink

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a node says of itself: in /diagnostics once a second, in its log when it has to wait."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from antenna_drive.lockstep.commands import Commanded

@@ -8,8 +8,6 @@ cost of a step. Here one wait set lives as long as the node, frames are taken as
 nobody but the lock-step thread ever touches them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any

@@ -7,8 +7,6 @@ The states and what `pause`, `step` and `reset` mean are those of simulation_int
 (SimulationState, StepSimulation, ResetSimulation); docs/lockstep.md says where they differ.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import json
 from threading import Condition

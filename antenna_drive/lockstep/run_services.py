@@ -6,8 +6,6 @@ Run control on ROS 2: services of the conductor, and the state that every node h
 std_srvs/Trigger fits all of them but a number of steps, which is the parameter run.steps.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import time
 from typing import Any

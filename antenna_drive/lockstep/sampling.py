@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One run of the drive in its five processes, every sample of it in an array."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import time

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The callbacks of a node, served in a thread of their own."""
 
-from __future__ import annotations
-
 from threading import Thread
 
 from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor

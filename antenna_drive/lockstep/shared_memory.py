@@ -13,8 +13,6 @@ news of the graph alone, and processes of all domains look at it: what befalls i
 away.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 import re
 

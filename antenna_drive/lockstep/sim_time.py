@@ -9,8 +9,6 @@ publishes it, the drive does. Where several drives would, the first namespace of
 it, and the others say what to do.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from threading import Event, Thread
 import time

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a node says in its log as it starts: that it is ready, whom it waits for, its namesake."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 from antenna_drive.lockstep.namesakes import namesake

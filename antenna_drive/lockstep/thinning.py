@@ -7,8 +7,6 @@ This is what a reader needs that nobody waits for and that publishes at a lower 
 the steps. Nothing here needs ROS.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

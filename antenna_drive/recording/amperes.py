@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Currents in real amperes, as a clamp meter shows them, beside those in article amperes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """New files and folders that appear whole or not at all, and never in the place of another."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 import os

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The description of a bag, metadata.yaml: its storage files, topics, messages and times."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any

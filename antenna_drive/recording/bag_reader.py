@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads bags: our own and those of `ros2 bag`, whole or up to where they were cut off."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 import warnings

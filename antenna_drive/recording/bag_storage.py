@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads the storage files of a bag, MCAP, record by record up to where they were cut off."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 import io

@@ -7,8 +7,6 @@ A position-controlled servo swings a pendulum. A log has mass, length, gain, sup
 name of the trajectory at the top, then one entry per sample with its own time stamp.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

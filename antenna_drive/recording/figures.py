@@ -7,8 +7,6 @@ Every sample counts until the next one of its signal, so that uneven sampling do
 share of time. Docstrings define the figures; docs/recording.md lists them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Read a recording, whatever format it is in."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from antenna_drive.recording.csv_format import read_csv

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Somebody else's file as a recording of the drive, read as a map describes it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from antenna_drive.emulator.wiring import signal_names

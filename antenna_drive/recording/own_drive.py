@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether a recording is whole, and of the drive that was started for it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 import json
 from pathlib import Path

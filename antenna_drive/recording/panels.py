@@ -6,8 +6,6 @@ Which signals people look at together, and in which units: degrees here, SI ever
 The report, the pictures and the layouts for plotting programs all show these panels.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 import math

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A picture of a recording, with matplotlib."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import IO

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plain data beside the samples of a recording: frozen on the way in, JSON on the way out."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 import json
 import math

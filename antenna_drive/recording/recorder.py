@@ -7,8 +7,6 @@ The listener of the drive calls `begin`, `step` and `idle` from one thread; `tol
 nodes say of their parameters, may come from another.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from queue import Empty, SimpleQueue

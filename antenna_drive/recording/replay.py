@@ -8,8 +8,6 @@ goes on as before up to the sample after the jump. A command recorded at every m
 played as it was: value and slope at each step, never a slope across a jump.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page about a recording: curves to zoom into, figures, configuration."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Any
 

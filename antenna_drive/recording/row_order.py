@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rows of a table in the order of time: sorted where they are not, repeated ones left out."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 import warnings

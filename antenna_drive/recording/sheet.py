@@ -8,8 +8,6 @@ optional, and None means 'not known'. An entry that is not allowed is refused wi
 names the file, the key and what is allowed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, is_dataclass, make_dataclass
 from itertools import pairwise

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The drive's test signal for the waveform of a test sheet."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a twin has done lately, on an even grid."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from antenna_drive.emulator.unit import FloatArray

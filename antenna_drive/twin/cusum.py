@@ -10,8 +10,6 @@ approximation (D. Siegmund, Sequential Analysis, 1985, section 2.6). The chart a
 change began: at the last zero of its sum.
 """
 
-from __future__ import annotations
-
 import math
 
 from antenna_drive.emulator.unit import FloatArray

@@ -9,8 +9,6 @@ process lives on between looks, which saves its start. A look does not begin whe
 has ended: it says what `antenna-drive diagnose` says of the same tests.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import Executor, Future
 from typing import Any

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is wrong with what a real drive sends: nothing comes, or too much of it is rubbish."""
 
-from __future__ import annotations
-
 from collections import deque
 import math
 

@@ -8,8 +8,6 @@ the drive can do, is left out. So is a stamp that is not later than the one befo
 jumps, the samples before and after it do not belong together: a new stretch begins.
 """
 
-from __future__ import annotations
-
 from array import array
 from collections import Counter
 import math

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether a drive is as far from its twin as in its quiet record, block after block."""
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import dataclass
 import math

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What became of a task that is done beside the watch: the watch goes on, whatever it fails of."""
 
-from __future__ import annotations
-
 from concurrent.futures import BrokenExecutor, Future
 from typing import Any
 

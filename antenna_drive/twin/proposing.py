@@ -7,8 +7,6 @@ It takes minutes of a core, in the process of the looks. So nobody gets it unask
 for every look.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
 from typing import Any

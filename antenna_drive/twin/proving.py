@@ -7,8 +7,6 @@ The core has no clock of its own, so an hour is played as fast as the computer g
 is what it would have said in real time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

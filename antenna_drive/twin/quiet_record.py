@@ -9,8 +9,6 @@ the upper end of its 95 percent interval, and the reference value of the chart i
 standard errors of the mean.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import math

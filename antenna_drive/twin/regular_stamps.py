@@ -14,8 +14,6 @@ than half a period belongs to the sample after a missing one, or to a sample in 
 sent all at once. The stamps that follow tell which.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from itertools import pairwise
 import math

@@ -22,8 +22,6 @@ every effect: a slow square wave calls a machine healthy whose fault a fast tria
 same first answer is therefore asked for in two looks, one after the other, and in a second test.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -8,8 +8,6 @@ line between samples, and at a jump as before up to the sample after it. Whether
 is judged by the slopes around it. The shadow therefore stays a few samples behind the newest one.
 """
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from antenna_drive.diagnosis.sheet_settings import as_the_sheet_says

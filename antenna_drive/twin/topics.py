@@ -14,8 +14,6 @@ one number in each message (std_msgs/Float64) or, with `index`, several (Float64
 With the last one, all signals come from that topic.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math

@@ -7,8 +7,6 @@ It has no clock of its own. Time is that of the samples' stamps. Only whether th
 stopped depends on the time that its owner gives to `advance`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
