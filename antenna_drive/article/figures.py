@@ -266,17 +266,10 @@ def draw_all(results: Results, progress: Callable[[int, int], None] | None = Non
     """
     Draw every figure.
 
-    Parameters
-    ----------
-    results
-        of the parameter set
-    progress
-        called with the number of figures done and their total
+    results : of the parameter set
+    progress : called with the number of figures done and their total
 
-    Returns
-    -------
-    files by name: fig_01.svg and so on, and figures.html with all of them
-
+    Returns the files by name: fig_01.svg and so on, and figures.html with all of them.
     """
     files, parts = {}, []
     captions = read_yaml(Path(__file__).with_suffix('.yaml'))

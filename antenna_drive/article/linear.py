@@ -25,19 +25,11 @@ def bias_loop(drive: Drive, gain: float, pole: float, *, rotors_held: bool) -> F
     lagged demand of amplifier 1 [article A], current [article A], and with free rotors also rate
     [rad/s] and angle [rad]. The axis does not move.
 
-    Parameters
-    ----------
-    drive
-        parameters
-    gain, pole
-        k' and p of Filter 1 [1/s]
-    rotors_held
-        True if static friction holds the rotors
+    drive : parameters
+    gain, pole : k' and p of Filter 1 [1/s]
+    rotors_held : True if static friction holds the rotors
 
-    Returns
-    -------
-    matrix of shape (4, 4) or (6, 6)
-
+    Returns a matrix of shape (4, 4) or (6, 6).
     """
     x_f, integral, demand, current, rate, angle = np.eye(6)
     motor, amplifier = drive.motor_2, drive.motor_2.amplifier
@@ -73,19 +65,11 @@ def stability_limit(drive: Drive, pole: float, *, rotors_held: bool = True) -> f
     """
     Return the gain k' of Filter 1 above which the torque bias is unstable [1/s].
 
-    Parameters
-    ----------
-    drive
-        parameters
-    pole
-        p of Filter 1 [1/s]
-    rotors_held
-        True if static friction holds the rotors
+    drive : parameters
+    pole : p of Filter 1 [1/s]
+    rotors_held : True if static friction holds the rotors
 
-    Returns
-    -------
-    gain [1/s]; NaN if the loop is unstable at every gain or at none
-
+    Returns the gain [1/s]; NaN if the loop is unstable at every gain or at none.
     """
     def rightmost(gain: float) -> float:
         return growth(bias_loop(drive, gain, pole, rotors_held=rotors_held))

@@ -96,19 +96,11 @@ def by_equation_14(drive: Drive, share: float, load: FloatArray) -> FloatArray:
     """
     Return the torques of the motors by Eq. (14) alone: no friction, no filter, no dynamics.
 
-    Parameters
-    ----------
-    drive
-        with one of the circuits
-    share
-        torque bias at no load, as a share of the greatest torque
-    load
-        axial torque, percent of the greatest, shape (n,)
+    drive : with one of the circuits
+    share : torque bias at no load, as a share of the greatest torque
+    load : axial torque, percent of the greatest, shape (n,)
 
-    Returns
-    -------
-    percent of the greatest torque, shape (n, 2)
-
+    Returns them in percent of the greatest torque, shape (n, 2).
     """
     most = drive.motor_1.motor.current_limit
     circuit = drive.torque_share.circuit

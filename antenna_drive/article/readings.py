@@ -61,19 +61,11 @@ def plateau(time: FloatArray, value: FloatArray, period: float, window: tuple[fl
     """
     Return the mean of a response in a window after each reversal, without the first period.
 
-    Parameters
-    ----------
-    time, value
-        shape (n,)
-    period
-        of the square wave [s]; it is positive in its first half
-    window
-        start and end after each reversal [s]
+    time, value : shape (n,)
+    period : of the square wave [s]; it is positive in its first half
+    window : start and end after each reversal [s]
 
-    Returns
-    -------
-    mean of the signal times the sign of the command
-
+    Returns the mean of the signal times the sign of the command.
     """
     sign, since = _half_periods(time, period)
     used = (time >= period) & (since >= window[0]) & (since <= window[1])

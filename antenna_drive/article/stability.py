@@ -65,19 +65,11 @@ def simulated_limit(drive: Drive, pole: float, step_s: float = MACRO_STEP) -> fl
     """
     Return the gain k' of Filter 1 above which a small disturbance grows [1/s].
 
-    Parameters
-    ----------
-    drive
-        with the old circuit
-    pole
-        p of Filter 1 [1/s]
-    step_s
-        macro-step [s]
+    drive : with the old circuit
+    pole : p of Filter 1 [1/s]
+    step_s : macro-step [s]
 
-    Returns
-    -------
-    gain [1/s]; NaN if it is not within ten percent of the linear one
-
+    Returns the gain [1/s]; NaN if it is not within ten percent of the linear one.
     """
     linear = stability_limit(drive, pole)
     low, high = (1.0 - _SHARE) * linear, (1.0 + _SHARE) * linear

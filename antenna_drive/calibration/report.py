@@ -50,27 +50,16 @@ def report(problem: CalibrationProblem, found: SearchResult, trade_offs: Sequenc
     """
     Report the best candidate and how well its parameters are determined.
 
-    Parameters
-    ----------
-    problem
-        the fit
-    found
-        result of the search
-    trade_offs
-        target figures for which to show the cost of the other targets
-    progress
-        called with the share that is done, 0 to 1
-    also
-        candidates of other searches with the same figures, for the trade-offs
+    problem : the fit
+    found : result of the search
+    trade_offs : target figures for which to show the cost of the other targets
+    progress : called with the share that is done, 0 to 1
+    also : candidates of other searches with the same figures, for the trade-offs
 
-    Returns
-    -------
-    mapping of cost, candidates, targets, parameters, correlations, flat_directions, trade_offs
+    Returns a mapping of cost, candidates, targets, parameters, correlations, flat_directions,
+    trade_offs.
 
-    Raises
-    ------
-    ParameterError : a trade-off names a figure that is not a target
-
+    Raises ParameterError: a trade-off names a figure that is not a target.
     """
     known = tuple(target.figure for target in problem.targets)
     for figure in trade_offs:

@@ -46,11 +46,8 @@ def compare(steps: int, step_s: float, config: list[str]) -> dict[str, Any]:
     """
     Run the drive both ways.
 
-    Returns
-    -------
-    processes, samples (numbers compared), max_abs_difference, identical, real_time_factor,
-    steps_per_s, first_step_s (from the start of the last process to its first step)
-
+    Returns processes, samples (numbers compared), max_abs_difference, identical, real_time_factor,
+    steps_per_s, first_step_s (from the start of the last process to its first step).
     """
     from antenna_drive.emulator.run import simulate
     from antenna_drive.lockstep.sampling import sample_processes

@@ -89,31 +89,18 @@ def record_drive(parameters: Mapping[str, Mapping[str, Any]], config: Sequence[s
     """
     Start a drive in its five processes and record it.
 
-    Parameters
-    ----------
-    parameters, config
-        of its nodes, as `DriveProcesses` takes them
-    out
-        the folder to write, which must not be there yet
-    sheet
-        for the bag
-    duration, step_s
-        simulated time and macro-step [s]
-    pace, quiet
-        times real time, 0 for as fast as possible; and whether to show no progress
-    namespace
-        None for one of the drive's own, see drive_namespace
+    parameters, config : of its nodes, as `DriveProcesses` takes them
+    out : the folder to write, which must not be there yet
+    sheet : for the bag
+    duration, step_s : simulated time and macro-step [s]
+    pace, quiet : times real time, 0 for as fast as possible; and whether to show no progress
+    namespace : None for one of the drive's own, see drive_namespace
 
-    Returns
-    -------
-    number of steps that were recorded, which are all of them
+    Returns the number of steps that were recorded, which are all of them.
 
-    Raises
-    ------
-    AnotherDrive : the namespace is not free, or nodes of others have taken part
-    UserError : a node has ended by itself, the bag cannot be written or lacks steps, or the drive
-        had not the parameters that were asked for
-
+    Raises AnotherDrive: the namespace is not free, or nodes of others have taken part.
+    Raises UserError: a node has ended by itself, the bag cannot be written or lacks steps, or the
+    drive had not the parameters that were asked for.
     """
     recorder = RunRecorder(
         out, {f'{unit}/{s.name}': s.unit for unit, own in OUTPUTS.items() for s in own},

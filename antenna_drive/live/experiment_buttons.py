@@ -172,23 +172,13 @@ def preview(values: Mapping[str, Any], span_s: float, points: int = 600) -> dict
     """
     Return a test signal as the drive would play it.
 
-    Parameters
-    ----------
-    values
-        of `Waveform` by name, SI; those that are not given are the defaults
-    span_s
-        how much of it [s]
-    points
-        how many intervals
+    values : of `Waveform` by name, SI; those that are not given are the defaults
+    span_s : how much of it [s]
+    points : how many intervals
 
-    Returns
-    -------
-    `span` [s]; `low` and `high`, least and greatest value in each interval
+    Returns `span` [s]; `low` and `high`, least and greatest value in each interval.
 
-    Raises
-    ------
-    ParameterError : a value is not allowed
-
+    Raises ParameterError: a value is not allowed.
     """
     allowed = dict(entries(Waveform))
     checked: dict[str, Any] = {**check_changes(values, allowed)}

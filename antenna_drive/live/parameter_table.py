@@ -45,13 +45,10 @@ def entry_of(described: Description, value: Any) -> dict[str, Any]:
     """
     Return a parameter as the page shows it.
 
-    Returns
-    -------
-    name, text, allowed, live; value in SI; `kind`: choice, number, list, flag or text; `unit`
-    shown and `factor`, how many of it are one SI unit; for a choice `choices`; for a number `low`
-    and `high`, which may be None, `from` and `to`, the reach of the slider, and `whole`; all
-    numbers in SI
-
+    Returns name, text, allowed, live; value in SI; `kind`: choice, number, list, flag or text;
+    `unit` shown and `factor`, how many of it are one SI unit; for a choice `choices`; for a number
+    `low` and `high`, which may be None, `from` and `to`, the reach of the slider, and `whole`; all
+    numbers in SI.
     """
     text, unit = _split(described)
     entry: dict[str, Any] = {

@@ -42,17 +42,10 @@ class LiveOptions:
 
 def serve(options: LiveOptions) -> int:
     """
-    Serve the page until SIGINT or SIGTERM.
+    Serve the page until SIGINT or SIGTERM; return 0.
 
-    Returns
-    -------
-    0
-
-    Raises
-    ------
-    AnotherDrive : there is a drive already where one is to be started
-    UserError : a port is taken, a configuration or a namespace is not allowed
-
+    Raises AnotherDrive: there is a drive already where one is to be started.
+    Raises UserError: a port is taken, a configuration or a namespace is not allowed.
     """
     if options.foxglove is not None:
         # what is not installed is to be said before a drive is started

@@ -116,14 +116,9 @@ class Session:
         """
         Do what a page asks.
 
-        Returns
-        -------
-        plain data for the answer, None for none
+        Returns plain data for the answer, None for none.
 
-        Raises
-        ------
-        UserError : it is refused or makes no sense; the message says why
-
+        Raises UserError: it is refused or makes no sense; the message says why.
         """
         act = self._acts.get(str(message.get('do')))
         if act is None:

@@ -145,18 +145,12 @@ class Conductor(Member):
         """
         Begin a run if one is due and everybody is there.
 
-        Parameters
-        ----------
-        now
-            wall time [us]; the run's id, unless somebody was born later by his own clock
-        stands_still
-            whether the run in progress has made no step for `patience_s`: only then is a member
-            that said hello, or speaks of another run, believed to be gone
+        now : wall time [us]; the run's id, unless somebody was born later by his own clock
+        stands_still : whether the run in progress has made no step for `patience_s`: only then is
+            a member that said hello, or speaks of another run, believed to be gone
 
-        Returns
-        -------
-        array of shape (len(outputs), 2), to be published as frame 0; None if no run is due
-
+        Returns an array of shape (len(outputs), 2), to be published as frame 0; None if no run is
+        due.
         """
         if stands_still and self._somebody_left():
             self._begin_again = True

@@ -48,29 +48,18 @@ def run_drive_unit(default_name: str, names: Sequence[str], args: Sequence[str] 
     """
     Run a unit of the wiring as a ROS 2 node; SIGINT or SIGTERM ends the process.
 
-    Parameters
-    ----------
-    default_name
-        the node's name unless it is remapped with -r __node:=...
-    names
-        names of the units that this executable can be
-    args
-        command line without the program's name; None for the process's own
-    fed_by_topic
-        settings that follow a Float64 topic `<node>/<setting>`, and what returns the greatest
-        magnitude of each for the parameters of all units
-    description
-        what --help says first
-    wiring
-        module:NAME of the wiring unless the parameter `wiring` names another; '' is the drive's
-    read_sheet
-        returns the settings for a test sheet, where the unit has a parameter `sheet`; see
+    default_name : the node's name unless it is remapped with -r __node:=...
+    names : names of the units that this executable can be
+    args : command line without the program's name; None for the process's own
+    fed_by_topic : settings that follow a Float64 topic `<node>/<setting>`, and what returns the
+        greatest magnitude of each for the parameters of all units
+    description : what --help says first
+    wiring : module:NAME of the wiring unless the parameter `wiring` names another; '' is the
+        drive's
+    read_sheet : returns the settings for a test sheet, where the unit has a parameter `sheet`; see
         DriveNode
 
-    Returns
-    -------
-    exit code of a node that did not start: 2 wrong input, 3 no ROS 2; 0 after --help
-
+    Returns the exit code of a node that did not start: 2 wrong input, 3 no ROS 2; 0 after --help.
     """
     def make(name: str, wired: Wiring, config: Sequence[str], given: Mapping[str, Any]) -> Unit:
         from antenna_drive.emulator import units
@@ -94,19 +83,11 @@ def run_unit(unit: Unit, args: Sequence[str] | None = None, wiring: str = '') ->
     """
     Run a unit of your own in the place of one of the wiring; SIGINT or SIGTERM ends the process.
 
-    Parameters
-    ----------
-    unit
-        its name is the name of the unit that it stands in for
-    args
-        command line without the program's name; None for the process's own
-    wiring
-        as for `run_drive_unit`
+    unit : its name is the name of the unit that it stands in for
+    args : command line without the program's name; None for the process's own
+    wiring : as for `run_drive_unit`
 
-    Returns
-    -------
-    exit code of a node that did not start: 2 wrong input, 3 no ROS 2; 0 after --help
-
+    Returns the exit code of a node that did not start: 2 wrong input, 3 no ROS 2; 0 after --help.
     """
     def make(name: str, wired: Wiring, config: Sequence[str], given: Mapping[str, Any]) -> Unit:
         from simgap.inputs.schema import nearest, ParameterError
@@ -129,15 +110,9 @@ def run_partner(args: Sequence[str] | None = None, description: str = '') -> int
     """
     Run the stand-in of a partner that does not wait; SIGINT or SIGTERM ends the process.
 
-    Parameters
-    ----------
-    args, description
-        as for `run_drive_unit`
+    args, description : as for `run_drive_unit`
 
-    Returns
-    -------
-    exit code of a node that did not start: 2 wrong input, 3 no ROS 2; 0 after --help
-
+    Returns the exit code of a node that did not start: 2 wrong input, 3 no ROS 2; 0 after --help.
     """
     def make(name: str, wired: Wiring, config: Sequence[str], given: Mapping[str, Any]) -> Unit:
         from antenna_drive.lockstep.partner import PartnerUnit

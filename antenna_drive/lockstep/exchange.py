@@ -235,19 +235,11 @@ class Exchange:
         """
         Make steps until something else is due; the member must be `steady`.
 
-        Parameters
-        ----------
-        every
-            publish readings after each step that this divides; 0 for none
-        pace
-            when steps are due; it must have begun unless it is as fast as possible
-        limit_s
-            return after this time [s]
+        every : publish readings after each step that this divides; 0 for none
+        pace : when steps are due; it must have begun unless it is as fast as possible
+        limit_s : return after this time [s]
 
-        Returns
-        -------
-        why, one of the reasons of `compiled_loop`
-
+        Returns why, one of the reasons of `compiled_loop`.
         """
         member, w = self._member, self._s.words
         self._load(every, pace, limit_s)

@@ -126,10 +126,7 @@ def read_foreign(message: bytes) -> tuple[float, ...]:
     ROS 2's own deserialisation writes a line to the log for each message that it cannot read, so
     anybody could fill a disk.
 
-    Returns
-    -------
-    none at all if it is no such message
-
+    Returns no number at all if it is no such message.
     """
     order = {b'\x00\x00': '>', b'\x00\x01': '<'}.get(message[:2])
     if order is None:

@@ -163,17 +163,11 @@ class Member:
         """
         Start the run that was announced or make the next step, if everything for it is there.
 
-        Parameters
-        ----------
-        stands_still
-            whether the run in progress has made no step for a while: only then is it left for
-            another
+        stands_still : whether the run in progress has made no step for a while: only then is it
+            left for another
 
-        Returns
-        -------
-        array of shape (len(outputs), 2), to be published as step `step` of run `run`; None if
-        something is missing
-
+        Returns an array of shape (len(outputs), 2), to be published as step `step` of run `run`;
+        None if something is missing.
         """
         if self._announced is not None:
             if self.inbox.reached(self.conductor) > self._announced_at:

@@ -43,26 +43,15 @@ def drive_namespace(given: str | None, command: str, domain_id: int | None = Non
     """
     Give a drive its namespace, as long as it runs.
 
-    Parameters
-    ----------
-    given
-        the namespace that was asked for, '' or '/' for none; None for one of the drive's own
-    command
-        what the drive is started for; a namespace of its own begins with it
-    domain_id
-        the ROS 2 domain; None for the one in the environment
-    units
-        the names of the drive's nodes
+    given : the namespace that was asked for, '' or '/' for none; None for one of the drive's own
+    command : what the drive is started for; a namespace of its own begins with it
+    domain_id : the ROS 2 domain; None for the one in the environment
+    units : the names of the drive's nodes
 
-    Yields
-    ------
-    the namespace, '/east', or '' for none
+    Yields the namespace, '/east', or '' for none.
 
-    Raises
-    ------
-    AnotherDrive : the namespace is not free
-    UserError : it is no name of a namespace
-
+    Raises AnotherDrive: the namespace is not free.
+    Raises UserError: it is no name of a namespace.
     """
     if given is None:
         yield f'/{command}_{secrets.token_hex(4)}'

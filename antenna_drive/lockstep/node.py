@@ -236,10 +236,7 @@ class DriveNode:
         """
         Let the compiled exchange make the steps that it can make.
 
-        Returns
-        -------
-        False if something is due that only Python does
-
+        Returns False if something is due that only Python does.
         """
         member, pace = self._member, self._pace
         exchange.listen()

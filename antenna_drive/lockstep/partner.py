@@ -131,18 +131,11 @@ class Answers:
         """
         Take in a message of the partner: run, step that it answers, a value of each output.
 
-        Parameters
-        ----------
-        message
-            whatever has come
-        step, now
-            the step that the drive is at, and the time [s]
+        message : whatever has come
+        step, now : the step that the drive is at, and the time [s]
 
-        Returns
-        -------
-        the answer, for the unit's setting; None if the message is refused and counted: wrong
-        length, not finite, of another run, of no step that was sent, older than the last
-
+        Returns the answer, for the unit's setting; None if the message is refused and counted:
+        wrong length, not finite, of another run, of no step that was sent, older than the last.
         """
         if (len(message) != 2 + self._values or not all(map(math.isfinite, message))
                 or message[0] != self._run or message[1] % 1.0 != 0.0

@@ -131,10 +131,7 @@ class DriveProcesses:
         """
         End all processes.
 
-        Returns
-        -------
-        exit code by unit; -9 if a process had to be killed
-
+        Returns the exit code by unit; -9 if a process had to be killed.
         """
         for process in self._processes.values():
             if process.poll() is None:

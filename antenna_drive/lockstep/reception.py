@@ -20,11 +20,8 @@ class Reception:
         """
         Take a frame of each peer that the next step waits for.
 
-        Returns
-        -------
-        False if a wait for something else is called for: one of them takes its time, or the
-        next step waits for nobody but the clock
-
+        Returns False if a wait for something else is called for: one of them takes its time, or
+        the next step waits for nobody but the clock.
         """
         member = self._member
         link = self._link

@@ -83,10 +83,8 @@ class FrameLink:
         """
         Take the oldest frame of a peer that has not been taken.
 
-        Returns
-        -------
-        its numbers, none at all if the message cannot be read; None if there is no message
-
+        Returns its numbers, none at all if the message cannot be read; None if there is no
+        message.
         """
         take_message, decode = self._ways[peer]
         taken = take_message(Float64MultiArray, True)
@@ -100,11 +98,8 @@ class FrameLink:
         """
         Take all frames of a peer that have not been taken, for a reader that nobody waits for.
 
-        Returns
-        -------
-        shape (frames, numbers of the peer's layout), oldest first, without messages of any other
-        layout; None if there is none
-
+        Returns them in shape (frames, numbers of the peer's layout), oldest first, without
+        messages of any other layout; None if there is none.
         """
         layout, handle = self._layouts[peer], self._handles[peer]
         prefix, size = layout.prefix, len(layout.prefix) + 8 * layout.length
@@ -163,10 +158,7 @@ def read_message(message: bytes) -> tuple[float, ...]:
     """
     Return the numbers of a message of somebody else's layout or byte order.
 
-    Returns
-    -------
-    none at all if it is no Float64MultiArray, or longer than any that is taken
-
+    Returns no number at all if it is no Float64MultiArray, or longer than any that is taken.
     """
     if len(message) > FRAME.value():
         return ()

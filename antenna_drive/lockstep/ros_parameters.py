@@ -64,11 +64,8 @@ class Tuning:
         """
         Ask for changes from a thread other than the lock-step thread.
 
-        Returns
-        -------
-        why all of them are refused, or '' if they are in force (with wait) or will be; what is
-        refused is never put in force
-
+        Returns why all of them are refused, or '' if they are in force (with wait) or will be;
+        what is refused is never put in force.
         """
         try:
             self._unit.check(changes)

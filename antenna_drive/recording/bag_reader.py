@@ -30,22 +30,12 @@ def read_bag(path: str | Path, *, partial: bool = False) -> Recording:
     'skipped_topics'. A namespace that the whole drive ran in is taken off the names and kept in
     the notes, under 'namespace'.
 
-    Parameters
-    ----------
-    path
-        the folder, or a file NAME.mcap or NAME.mcap.zstd
-    partial
-        read what can be read of a bag that was cut off or damaged, and warn how far
+    path : the folder, or a file NAME.mcap or NAME.mcap.zstd
+    partial : read what can be read of a bag that was cut off or damaged, and warn how far
 
-    Raises
-    ------
-    RecordingError : the bag is not there, is none, or was cut off or damaged and `partial` is
-        not set; one line says where and why
-
-    Warns
-    -----
-    RecordingWarning : `partial` was needed; the message says up to where the bag was read
-
+    Raises RecordingError: the bag is not there, is none, or was cut off or damaged and `partial`
+    is not set; one line says where and why.
+    Warns RecordingWarning: `partial` was needed; the message says up to where the bag was read.
     """
     path = Path(path)
     if not path.exists():

@@ -36,15 +36,10 @@ def read_bam(path: str | Path) -> Recording:
     """
     Read one log of the BAM project.
 
-    Returns
-    -------
-    the recording; its notes hold mass [kg], length [m], kp, vin [V], motor, trajectory
+    Returns the recording; its notes hold mass [kg], length [m], kp, vin [V], motor, trajectory.
 
-    Raises
-    ------
-    RecordingError : the file cannot be read, is not such a log, or an entry lacks a number; one
-        line names the file and the entry
-
+    Raises RecordingError: the file cannot be read, is not such a log, or an entry lacks a number;
+    one line names the file and the entry.
     """
     path = Path(path)
     try:

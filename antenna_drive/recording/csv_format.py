@@ -48,25 +48,15 @@ def read_csv(path: str | Path) -> Recording:
     """
     Read a CSV file and what lies beside it.
 
-    Parameters
-    ----------
-    path
-        NAME.csv with the field test's columns (FIELD_COLUMNS) or those of `write_csv`
+    path : NAME.csv with the field test's columns (FIELD_COLUMNS) or those of `write_csv`
 
-    Returns
-    -------
-    the recording; the test sheet is that of NAME.yaml where there is one
+    Returns the recording; the test sheet is that of NAME.yaml where there is one.
 
-    Raises
-    ------
-    RecordingError : the file cannot be read as such; the message names file, line and column
-    ParameterError : NAME.yaml is no test sheet
-
-    Warns
-    -----
-    RecordingWarning : the last line is not ended, rows were not in the order of time, or rows
-        were repeated
-
+    Raises RecordingError: the file cannot be read as such; the message names file, line and
+    column.
+    Raises ParameterError: NAME.yaml is no test sheet.
+    Warns RecordingWarning: the last line is not ended, rows were not in the order of time, or rows
+    were repeated.
     """
     path = Path(path)
     with open_text(path) as stream:
@@ -221,25 +211,14 @@ def write_csv(recording: Recording, path: str | Path, *, field: bool = False,
     """
     Write a recording as CSV, with its test sheet and what else is known of it beside it.
 
-    Parameters
-    ----------
-    recording
-        what to write
-    path
-        NAME.csv, not there yet
-    field
-        write the field test's columns under their names, and no other signal
-    names
-        the signals to write; all of them if not given
+    recording : what to write
+    path : NAME.csv, not there yet
+    field : write the field test's columns under their names, and no other signal
+    names : the signals to write; all of them if not given
 
-    Returns
-    -------
-    the files written
+    Returns the files written.
 
-    Raises
-    ------
-    RecordingError : there is no such signal, a file exists already, or cannot be written
-
+    Raises RecordingError: there is no such signal, a file exists already, or cannot be written.
     """
     path = Path(path)
     if field:

@@ -82,27 +82,20 @@ class Recording:
     """
     Named signals with units and uneven time, and what is known of how they came about.
 
-    Attributes
-    ----------
     channels : 'unit/signal' -> Channel, in the order given
     configuration : the configuration in force at the start, plain data; empty if unknown
     changes : live changes of tuning parameters, in the order of their steps
     sheet : the test sheet; empty if there is none
     notes : anything else that is known, plain data (source, method of resampling, payload ...)
 
-    Raises
-    ------
-    RecordingError : no such kind of content; the message names the signal or the key
+    Raises RecordingError: no such kind of content; the message names the signal or the key.
 
-    Examples
-    --------
     >>> recording = Recording.from_arrays(
     ...     [0.0, 0.5, 1.0], {'motor_1/current': [0.0, 1.0, 4.0]})
     >>> recording['motor_1/current'].unit
     'article A'
     >>> recording.resample(4.0).align().values[:, 0].tolist()
     [0.0, 0.5, 1.0, 2.5, 4.0]
-
     """
 
     channels: Mapping[str, Channel]
@@ -252,21 +245,12 @@ class Recording:
         """
         Cut into the whole periods of a repeated excitation, each with its own time from zero.
 
-        Parameters
-        ----------
-        period_s
-            length of a period [s]
-        start_s
-            where the first period begins [s]; what lies before is left out
+        period_s : length of a period [s]
+        start_s : where the first period begins [s]; what lies before is left out
 
-        Returns
-        -------
-        as many recordings as whole periods fit before the last sample
+        Returns as many recordings as whole periods fit before the last sample.
 
-        Raises
-        ------
-        RecordingError : the period is not positive
-
+        Raises RecordingError: the period is not positive.
         """
         period_ns, start_ns = nanoseconds(period_s), nanoseconds(start_s)
         if period_ns <= 0:

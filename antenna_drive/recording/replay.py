@@ -82,18 +82,11 @@ def command_table(channel: Channel, times_ns: Any) -> FloatArray:
     """
     Return value and slope of a recorded command at the macro-steps.
 
-    Parameters
-    ----------
-    channel
-        the command, at least one sample
-    times_ns
-        the macro-steps [ns], shape (n,); before the first sample and after the last the
+    channel : the command, at least one sample
+    times_ns : the macro-steps [ns], shape (n,); before the first sample and after the last the
         command stands still
 
-    Returns
-    -------
-    array of shape (n, 2): value and slope to the right of each step, per second
-
+    Returns an array of shape (n, 2): value and slope to the right of each step, per second.
     """
     values, stamps = channel.values, channel.time_ns
     if len(values) < 2:
@@ -120,26 +113,15 @@ def twin(recording: Recording, config: Sequence[str] = (), step_s: float | None 
     The drive's parameters are those of `config` if given, else those that the recording holds,
     with its live changes, else the reference set as the test sheet changes it.
 
-    Parameters
-    ----------
-    recording
-        has to hold the rate command
-    config
-        configuration files or names of sets in config/
-    step_s
-        macro-step [s]; that of the recording if it tells, else 1 ms
-    every
-        keep the samples of the macro-steps that this number divides
+    recording : has to hold the rate command
+    config : configuration files or names of sets in config/
+    step_s : macro-step [s]; that of the recording if it tells, else 1 ms
+    every : keep the samples of the macro-steps that this number divides
 
-    Returns
-    -------
-    a recording of every signal, with the time stamps of the real one's clock
+    Returns a recording of every signal, with the time stamps of the real one's clock.
 
-    Raises
-    ------
-    RecordingError : the recording holds no command
-    ParameterError : a configuration or the recording's own is not allowed
-
+    Raises RecordingError: the recording holds no command.
+    Raises ParameterError: a configuration or the recording's own is not allowed.
     """
     command = CommandUnit(recording)
     noted = recording.notes.get(STEP)
@@ -213,12 +195,9 @@ def distances(real: Recording, other: Recording) -> dict[str, dict[str, float]]:
     """
     Return how far a twin is from the real recording, signal by signal.
 
-    Returns
-    -------
-    for each signal of both, at the real one's time stamps: the root mean square of the
-    difference `rms`, that of the real signal about its mean `spread`, and their ratio `share`
-    (NaN where the real signal does not change); all in the signal's unit
-
+    Returns for each signal of both, at the real one's time stamps: the root mean square of the
+    difference `rms`, that of the real signal about its mean `spread`, and their ratio `share` (NaN
+    where the real signal does not change); all in the signal's unit.
     """
     result = {}
     for name, channel in real.channels.items():

@@ -24,22 +24,13 @@ def designed(planning: Mapping[str, Any], drive: Drive) -> dict[str, Any]:
     """
     Return the test that tells the answers of a verdict apart, within the limits of the drive.
 
-    Parameters
-    ----------
-    planning
-        entry of the verdict's JSON
-    drive
-        the configuration
+    planning : entry of the verdict's JSON
+    drive : the configuration
 
-    Returns
-    -------
-    say: lines of text; test: a test sheet as plain data, None if no test helps; sheet: the same as
-    YAML, '' for none
+    Returns say: lines of text; test: a test sheet as plain data, None if no test helps; sheet: the
+    same as YAML, '' for none.
 
-    Raises
-    ------
-    UserError : the verdict is of another configuration
-
+    Raises UserError: the verdict is of another configuration.
     """
     from antenna_drive.diagnosis.allowed_tests import AntennaTests
     from antenna_drive.diagnosis.drive_limits import DriveLimits

@@ -71,23 +71,14 @@ def watched(columns: Mapping[str, FloatArray], sheet: Mapping[str, Any], onset_s
     """
     Return what a twin says of a test in which an effect is switched on.
 
-    Parameters
-    ----------
-    columns
-        of the recording
-    sheet
-        plain data of the test sheet
-    onset_s
-        when the effect is switched on; the end of the test if it never is [s]
-    settings
-        of the twin
+    columns : of the recording
+    sheet : plain data of the test sheet
+    onset_s : when the effect is switched on; the end of the test if it never is [s]
+    settings : of the twin
 
-    Returns
-    -------
-    `alarms` before the onset: time [s] and signals of each; `told_after_s`: time from the onset
-    to the first sign of a gap, None if there is none; `since_s`: the beginning that the twin
-    states, after the onset [s]; `gaps`: what it says; `tuning`; blocks `judged` and `unjudged`
-
+    Returns `alarms` before the onset: time [s] and signals of each; `told_after_s`: time from the
+    onset to the first sign of a gap, None if there is none; `since_s`: the beginning that the twin
+    states, after the onset [s]; `gaps`: what it says; `tuning`; blocks `judged` and `unjudged`.
     """
     twin = Twin(load(), parse_sheet(sheet), settings, tune=tuned)
     alarms: list[dict[str, Any]] = []
@@ -112,19 +103,12 @@ def grown(tests: Sequence[Recording], lengths_s: Sequence[float], looks_s: Seque
     """
     Return what looks at tests tell while they are made, one after the other.
 
-    Parameters
-    ----------
-    tests, lengths_s
-        the recordings, and how long each of them is [s]
-    looks_s
-        when to look [s of testing]; once the rule has stopped, only the last look is made
-    rule
-        when to stop
+    tests, lengths_s : the recordings, and how long each of them is [s]
+    looks_s : when to look [s of testing]; once the rule has stopped, only the last look is made
+    rule : when to stop
 
-    Returns
-    -------
-    when the rule stopped, None if it did not; and each look with the result of its diagnosis
-
+    Returns when the rule stopped, None if it did not; and each look with the result of its
+    diagnosis.
     """
     drive, found, stopped = load(), [], None
     for seconds in looks_s:

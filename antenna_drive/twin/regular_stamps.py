@@ -51,20 +51,12 @@ class RegularSamples:
         """
         Take a sample; return those that are settled, of this signal.
 
-        Parameters
-        ----------
-        name
-            of the signal
-        stamp_ns
-            of the message [ns]
-        value
-            of the sample, also if it is rubbish
+        name : of the signal
+        stamp_ns : of the message [ns]
+        value : of the sample, also if it is rubbish
 
-        Returns
-        -------
-        name, time [ns] and value of each; after a pause, or if the time jumps back, those that
-        waited come as they were stamped
-
+        Returns the name, time [ns] and value of each; after a pause, or if the time jumps back,
+        those that waited come as they were stamped.
         """
         since = stamp_ns - self._last.get(name, stamp_ns - 1)
         if -LATE_S * NANOSECONDS <= since <= 0:
@@ -102,16 +94,10 @@ class RegularStamps:
         """
         Take the stamp of the next sample; return the times of those that are settled.
 
-        Parameters
-        ----------
-        stamp_ns
-            later than the one before [ns]
+        stamp_ns : later than the one before [ns]
 
-        Returns
-        -------
-        times of the oldest samples that were not settled yet, increasing but where another rhythm
-        was learned; those of an irregular sender as they came [ns]
-
+        Returns the times of the oldest samples that were not settled yet, increasing but where
+        another rhythm was learned; those of an irregular sender as they came [ns].
         """
         waiting = self.waiting
         waiting.append(stamp_ns)

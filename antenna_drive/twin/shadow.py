@@ -98,18 +98,11 @@ class Shadow:
         """
         Take samples of the command and go on as far as they lead.
 
-        Parameters
-        ----------
-        stamps
-            ascending, later than those before [ns]
-        values
-            axis rate command [rad/s]
+        stamps : ascending, later than those before [ns]
+        values : axis rate command [rad/s]
 
-        Returns
-        -------
-        time stamps of the macro-steps that were made, shape (n,) [ns], and the value and
-        derivative of every signal at them, shape (n, len(names), 2)
-
+        Returns the time stamps of the macro-steps that were made, shape (n,) [ns], and the value
+        and derivative of every signal at them, shape (n, len(names), 2).
         """
         self._stamps = np.append(self._stamps, stamps)
         self._values = np.append(self._values, values)

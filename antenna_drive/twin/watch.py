@@ -140,15 +140,10 @@ class Twin:
         """
         Go on as far as the samples lead.
 
-        Parameters
-        ----------
-        now_s
-            time of any steady clock, which shows that a drive has stopped; None: not looked at [s]
+        now_s : time of any steady clock, which shows that a drive has stopped; None: not looked at
+            [s]
 
-        Returns
-        -------
-        what can be compared since the last call, signal by signal
-
+        Returns what can be compared since the last call, signal by signal.
         """
         if now_s is not None:
             self.faults.look(now_s)
