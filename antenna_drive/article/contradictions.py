@@ -41,36 +41,23 @@ _LARGEST_MOTOR_KW = 100.0
 
 @dataclass(frozen=True)
 class Interpretation:
-    """
-    One way to read a passage.
+    """One way to read a passage."""
 
-    reading : in words
-    gives : the figures that follow from it, with their units in their names
-    fits : whether they agree with the published figures
-    """
-
-    reading: str
-    gives: Mapping[str, float]
-    fits: bool
+    reading: str  # in words
+    gives: Mapping[str, float]  # the figures that follow from it, with their units in their names
+    fits: bool  # whether they agree with the published figures
 
 
 @dataclass(frozen=True)
 class Contradiction:
-    """
-    A passage that disagrees with another.
+    """A passage that disagrees with another."""
 
-    id : short name
-    passages : the passages that disagree
-    published : the figures that the readings are compared with
-    readings : what each reading gives
-    conclusion : which readings fit, and the figures that decide
-    """
-
+    # short name
     id: str  # noqa: A003
-    passages: str
-    published: Mapping[str, float]
-    readings: tuple[Interpretation, ...]
-    conclusion: str
+    passages: str  # the passages that disagree
+    published: Mapping[str, float]  # the figures that the readings are compared with
+    readings: tuple[Interpretation, ...]  # what each reading gives
+    conclusion: str  # which readings fit, and the figures that decide
 
 
 def _saw_tooth_bias(results: Results, name: str, settings: dict[str, Any]) -> dict[str, float]:

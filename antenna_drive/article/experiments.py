@@ -33,21 +33,14 @@ RATE_STEP = math.radians(0.1)
 
 @dataclass(frozen=True)
 class DriveExperiment:
-    """
-    One experiment.
+    """One experiment."""
 
-    name : as in the article's table of results, 'T3a'
-    duration : [s]
-    circuit : set in config/ that overrides the configuration
-    settings : further settings, by dotted name in `Drive`
-    bias_share : torque bias from a fixed source, as a share of the greatest current; None to use
-        the circuit
-    """
-
-    name: str
-    duration: float
-    circuit: str
+    name: str  # as in the article's table of results, 'T3a'
+    duration: float  # [s]
+    circuit: str  # set in config/ that overrides the configuration
+    # further settings, by dotted name in `Drive`
     settings: Mapping[str, Any] = field(default_factory=dict)
+    # torque bias from a fixed source, as a share of the greatest current; None to use the circuit
     bias_share: float | None = None
 
     def drive(self, *configuration: str) -> Drive:

@@ -31,17 +31,11 @@ _AT_NO_LOAD = 5
 
 @dataclass(frozen=True)
 class LoadedAxis:
-    """
-    One cycle of the load, from one extreme to the other and back.
+    """One cycle of the load, from one extreme to the other and back."""
 
-    load : axial torque, percent of the greatest, shape (n,)
-    torques : of the two motors, percent of the greatest, shape (n, 2)
-    rising : True where the load rises, shape (n,)
-    """
-
-    load: FloatArray
-    torques: FloatArray
-    rising: NDArray[np.bool_]
+    load: FloatArray  # axial torque, percent of the greatest, shape (n,)
+    torques: FloatArray  # of the two motors, percent of the greatest, shape (n, 2)
+    rising: NDArray[np.bool_]  # True where the load rises, shape (n,)
 
     @property
     def bias(self) -> FloatArray:

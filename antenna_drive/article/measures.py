@@ -96,26 +96,18 @@ class Measure(Protocol):
 
 @dataclass(frozen=True)
 class Readout:
-    """
-    A figure taken from the run of one experiment.
+    """A figure taken from the run of one experiment."""
 
-    name, unit : for people
-    experiment : the run to read
-    kind : how it is evaluated, a key of `readings.KINDS`
-    signal : weight of each signal in the sum
-    arguments : further arguments of the evaluation
-    compared_with : another experiment; the figure is then the relative change against it [1]
-    scale : the figure is multiplied by it
-    """
-
-    name: str
+    name: str  # as the unit, for people
     unit: str
-    experiment: str
-    kind: str
-    signal: Mapping[str, float]
+    experiment: str  # the run to read
+    kind: str  # how it is evaluated, a key of `readings.KINDS`
+    signal: Mapping[str, float]  # weight of each signal in the sum
+    # further arguments of the evaluation
     arguments: Mapping[str, Any] = field(default_factory=dict)
+    # another experiment; the figure is then the relative change against it [1]
     compared_with: str | None = None
-    scale: float = 1.0
+    scale: float = 1.0  # the figure is multiplied by it
 
     def value(self, results: Results) -> float:
         """Return the figure that a parameter set gives."""
@@ -135,18 +127,12 @@ def weighted(run: Run, signal: Mapping[str, float]) -> FloatArray:
 
 @dataclass(frozen=True)
 class Trend:
-    """
-    The largest violation of a trend by figures in order; below zero the trend holds strictly.
+    """The largest violation of a trend by figures in order; below zero it holds strictly."""
 
-    name, unit : for people
-    of : the figures in order
-    kind : 'falls', or 'falls then rises'
-    """
-
-    name: str
+    name: str  # as the unit, for people
     unit: str
-    of: tuple[Measure, ...]
-    kind: str
+    of: tuple[Measure, ...]  # the figures in order
+    kind: str  # 'falls', or 'falls then rises'
 
     def value(self, results: Results) -> float:
         """Return the greatest step against the trend, below zero if there is none."""
@@ -155,18 +141,12 @@ class Trend:
 
 @dataclass(frozen=True)
 class ModelFigure:
-    """
-    A figure that does not come from the run of an experiment.
+    """A figure that does not come from the run of an experiment."""
 
-    name, unit : for people
-    of : gives the figure of a drive
-    circuit : name of the circuit that the drive has
-    """
-
-    name: str
+    name: str  # as the unit, for people
     unit: str
-    of: Callable[[Drive], float]
-    circuit: str = OLD_CIRCUIT
+    of: Callable[[Drive], float]  # gives the figure of a drive
+    circuit: str = OLD_CIRCUIT  # name of the circuit that the drive has
 
     def value(self, results: Results) -> float:
         """Return the figure that a parameter set gives."""

@@ -26,26 +26,17 @@ SIGNIFICANT_TIME = 10.0
 
 @dataclass(frozen=True)
 class Claim:
-    """
-    One published figure or trend.
+    """One published figure or trend."""
 
-    measure : name of the figure that a parameter set gives for it
-    says : the published figure in the measure's unit, or the article's words; a mapping with the
-        keys field and analysis where the article gives both
-    kind : 'near', 'at_least' or 'at_most'
-    number : the figure to compare with: the analysis' where there are two
-    tolerance : in the measure's unit; zero for a trend or a bound
-    basis : 'published', 'derived', 'fitted' or 'predicted'
-    note : where it is in the article, and what was assumed
-    """
-
-    measure: str
+    measure: str  # name of the figure that a parameter set gives for it
+    # the published figure in the measure's unit, or the article's words; a mapping with the keys
+    # field and analysis where the article gives both
     says: float | str | Mapping[str, float]
-    kind: str
-    number: float
-    tolerance: float
-    basis: str
-    note: str
+    kind: str  # 'near', 'at_least' or 'at_most'
+    number: float  # the figure to compare with: the analysis' where there are two
+    tolerance: float  # in the measure's unit; zero for a trend or a bound
+    basis: str  # 'published', 'derived', 'fitted' or 'predicted'
+    note: str  # where it is in the article, and what was assumed
 
     def holds(self, obtained: float) -> bool:
         """Return whether a figure agrees with the claim; NaN does not."""

@@ -12,27 +12,19 @@ from antenna_drive.article.published import CLAIMS
 
 @dataclass(frozen=True)
 class Row:
-    """
-    One published figure and the model's.
+    """One published figure and the model's."""
 
-    id : 'T4a.overshoot'
-    published : the figure or the words; a mapping where the article gives field and analysis
-    obtained : what the model gives
-    tolerance : allowed distance from the published figure, from the analysis' if there are two
-    unit : of all three
-    passed : whether the obtained figure is within the tolerance
-    basis : 'published', 'derived', 'fitted' or 'predicted'; see published.py
-    note : where it is in the article, and how it is evaluated
-    """
-
+    # 'T4a.overshoot'
     id: str  # noqa: A003
+    # the figure or the words; a mapping where the article gives field and analysis
     published: float | str | Mapping[str, float]
-    obtained: float
+    obtained: float  # what the model gives
+    # allowed distance from the published figure, from the analysis' if there are two
     tolerance: float
-    unit: str
-    passed: bool
-    basis: str
-    note: str
+    unit: str  # of all three
+    passed: bool  # whether the obtained figure is within the tolerance
+    basis: str  # 'published', 'derived', 'fitted' or 'predicted'; see published.py
+    note: str  # where it is in the article, and how it is evaluated
 
 
 def all_measures(results: Results) -> dict[str, Measure]:

@@ -42,20 +42,14 @@ _LIST_ITEM = re.compile(r'(?P<key>.+)\[(?P<index>\d+)\]')
 
 @dataclass(frozen=True)
 class Free:
-    """
-    One free parameter.
+    """One free parameter."""
 
-    name : as in a configuration file, 'gearbox.stiffness', 'axis.mode_inertias[0]'
-    low, high : bounds, in the parameter's unit
-    log : True to search on a logarithmic scale
-    unit : of the parameter
-    """
-
-    name: str
+    name: str  # as in a configuration file, 'gearbox.stiffness', 'axis.mode_inertias[0]'
+    # bounds, in the parameter's unit
     low: float
     high: float
-    log: bool
-    unit: str
+    log: bool  # True to search on a logarithmic scale
+    unit: str  # of the parameter
 
     def at(self, share: float) -> float:
         """Return the value at a share of the range, 0 at low and 1 at high."""
@@ -87,21 +81,13 @@ class Free:
 
 @dataclass(frozen=True)
 class Target:
-    """
-    The aim for one figure.
+    """The aim for one figure."""
 
-    figure : its name
-    kind : value, at_least or at_most
-    number : the aim, in the figure's unit
-    tolerance : the miss that costs as much as any other target's tolerance
-    weight : factor on the cost
-    """
-
-    figure: str
-    kind: str
-    number: float
-    tolerance: float
-    weight: float = 1.0
+    figure: str  # its name
+    kind: str  # value, at_least or at_most
+    number: float  # the aim, in the figure's unit
+    tolerance: float  # the miss that costs as much as any other target's tolerance
+    weight: float = 1.0  # factor on the cost
 
     def residual(self, obtained: float) -> float:
         """Return the miss in tolerances, zero if a bound is kept."""

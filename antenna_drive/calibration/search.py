@@ -39,15 +39,10 @@ class FitCandidate:
 
 @dataclass(frozen=True)
 class SearchResult:
-    """
-    The result of a search.
+    """The result of a search."""
 
-    best : the best candidate
-    candidates : all of them in order; the first is the start
-    """
-
-    best: FitCandidate
-    candidates: tuple[FitCandidate, ...]
+    best: FitCandidate  # the best candidate
+    candidates: tuple[FitCandidate, ...]  # all of them in order; the first is the start
 
 
 def _begin_log(path: Path, problem: CalibrationProblem, seed: int) -> list[FitCandidate]:

@@ -41,25 +41,18 @@ class Given(NamedTuple):
 
 @dataclass(frozen=True)
 class Figure:
-    """
-    One figure that is asked for.
+    """One figure that is asked for."""
 
-    key : section and name in the file
-    units : those that may be written and how much of the SI unit each is; the first one is meant
-        where none is written
-    low, high : what is allowed [SI]
-    what : what it is, for people
-    optional : what is done where it is not given; '' if it has to be
-    either_shaft : whether it may be said of the motor shaft in place of the axis
-    """
-
-    key: str
+    key: str  # section and name in the file
+    # those that may be written and how much of the SI unit each is; the first one is meant where
+    # none is written
     units: Mapping[str, float]
+    # what is allowed [SI]
     low: float
     high: float
-    what: str
-    optional: str = ''
-    either_shaft: bool = False
+    what: str  # what it is, for people
+    optional: str = ''  # what is done where it is not given; '' if it has to be
+    either_shaft: bool = False  # whether it may be said of the motor shaft in place of the axis
 
     @property
     def unit(self) -> str:
@@ -136,17 +129,11 @@ CIRCUIT = 'bias.circuit'
 
 @dataclass(frozen=True)
 class Sheet:
-    """
-    What is known of a drive.
+    """What is known of a drive."""
 
-    figures : by key; those that are optional may be missing
-    circuit : the torque-share circuit of the article's Table 1, 'old' or 'new'
-    source : where it was read, for messages
-    """
-
-    figures: Mapping[str, Given]
-    circuit: str
-    source: str
+    figures: Mapping[str, Given]  # by key; those that are optional may be missing
+    circuit: str  # the torque-share circuit of the article's Table 1, 'old' or 'new'
+    source: str  # where it was read, for messages
 
     def __getitem__(self, key: str) -> float:
         """Return a figure in SI units."""

@@ -111,14 +111,10 @@ def _units() -> dict[str, str]:
 
 
 class ExperimentChanges(NamedTuple):
-    """
-    What an experiment changes in a drive, by unit.
+    """What an experiment changes in a drive, by unit."""
 
-    live : tuning parameters that differ
-    constants : names of the physical constants that differ, which only a restart can change
-    """
-
-    live: dict[str, dict[str, Value]]
+    live: dict[str, dict[str, Value]]  # tuning parameters that differ
+    # names of the physical constants that differ, which only a restart can change
     constants: dict[str, list[str]]
 
 

@@ -32,28 +32,18 @@ SAMPLES = 1
 
 
 class Piece(NamedTuple):
-    """
-    A part of the history: intervals that follow each other.
-
-    run, first, interval_s, time_s, step_s : the run, the number of the first interval, the length
-        of one [s], the time of the last step [s], the macro-step [s]
-    resume : number of the first interval that may still change: ask for it again
-    lows, highs : shape (intervals, signals), NaN where nothing was received
-    ends : the value at the last step of each interval, shape (intervals, signals), NaN where that
-        step was not received
-    now : the last value of each signal, shape (signals,)
-    """
+    """A part of the history: intervals that follow each other."""
 
     run: int
-    first: int
-    interval_s: float
-    time_s: float
-    step_s: float
-    resume: int
-    lows: FloatArray
-    highs: FloatArray
-    ends: FloatArray
-    now: FloatArray
+    first: int  # number of the first interval
+    interval_s: float  # length of an interval [s]
+    time_s: float  # time of the last step [s]
+    step_s: float  # macro-step [s]
+    resume: int  # number of the first interval that may still change: ask for it again
+    lows: FloatArray  # shape (intervals, signals), NaN where nothing was received
+    highs: FloatArray  # the same
+    ends: FloatArray  # the same of the value at the last step of each interval
+    now: FloatArray  # the last value of each signal, shape (signals,)
 
     def packed(self) -> bytes:
         """Return the bytes that the page reads: a header, then numbers of four bytes."""

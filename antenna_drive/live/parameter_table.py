@@ -23,22 +23,17 @@ _CUT = 4.0
 
 
 class Description(NamedTuple):
-    """
-    A descriptor in plain data.
+    """A descriptor in plain data."""
 
-    name, text, allowed : the parameter, what it is, what is allowed (additional_constraints)
-    read_only : whether it is a constant while the drive runs
-    low, high : the range, None if it has none
-    whole : whether only whole numbers are allowed
-    """
-
+    # the parameter, what it is, what is allowed (additional_constraints)
     name: str
     text: str
     allowed: str
-    read_only: bool
+    read_only: bool  # whether it is a constant while the drive runs
+    # the range, None if it has none
     low: float | None = None
     high: float | None = None
-    whole: bool = False
+    whole: bool = False  # whether only whole numbers are allowed
 
 
 def entry_of(described: Description, value: Any) -> dict[str, Any]:

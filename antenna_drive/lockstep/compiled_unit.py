@@ -23,23 +23,15 @@ from simgap.laws.compiling import inner
 
 
 class CompiledForm(NamedTuple):
-    """
-    What a compiled loop needs of a unit.
+    """What a compiled loop needs of a unit."""
 
-    name : tells the form from others
-    advance : compiled (k, h, u, y, memory), one macro-step of h [s] from step k
-    memory : gives the last argument, for a macro-step [s]; asked anew after each change
-    outputs : y, value and time derivative in each row
-    reached : tells the unit that the loop has gone on to a step
-    folder : of the sources that it is compiled from
-    """
-
-    name: str
-    advance: Any
+    name: str  # tells the form from others
+    advance: Any  # compiled (k, h, u, y, memory), one macro-step of h [s] from step k
+    # gives the last argument, for a macro-step [s]; asked anew after each change
     memory: Callable[[float], tuple[Any, ...]]
-    outputs: FloatArray
-    reached: Callable[[int], None]
-    folder: Path
+    outputs: FloatArray  # y, value and time derivative in each row
+    reached: Callable[[int], None]  # tells the unit that the loop has gone on to a step
+    folder: Path  # of the sources that it is compiled from
 
 
 @cache

@@ -22,14 +22,10 @@ _LONGEST_TEXT = 200
 
 
 class RunState(NamedTuple):
-    """
-    What a conductor says of its run.
+    """What a conductor says of its run."""
 
-    state : one of STATES
-    run, step : the run, 0 if there is none yet, and its last step that was made
-    """
-
-    state: str
+    state: str  # one of STATES
+    # the run, 0 if there is none yet, and its last step that was made
     run: int
     step: int
 

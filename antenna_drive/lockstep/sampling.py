@@ -23,21 +23,13 @@ STEP_PATIENCE_S = 30.0
 
 @dataclass(frozen=True)
 class Sampled:
-    """
-    What a run in five processes gave.
+    """What a run in five processes gave."""
 
-    names : the signals, 'unit/signal'
-    samples : shape (steps + 1, len(names), 2), value and time derivative
-    processes : how many ran
-    wall_s : from frame 0 to the last [s]
-    first_step_s : from the start of the last process to frame 0 of all [s]
-    """
-
-    names: tuple[str, ...]
-    samples: FloatArray
-    processes: int
-    wall_s: float
-    first_step_s: float
+    names: tuple[str, ...]  # the signals, 'unit/signal'
+    samples: FloatArray  # shape (steps + 1, len(names), 2), value and time derivative
+    processes: int  # how many ran
+    wall_s: float  # from frame 0 to the last [s]
+    first_step_s: float  # from the start of the last process to frame 0 of all [s]
 
 
 def sample_processes(steps: int, step_s: float, *, name: str = 'observer',

@@ -19,17 +19,12 @@ _MOST_INCOMPLETE = 4096
 
 
 class Thinned(NamedTuple):
-    """
-    One step of all units that are read.
-
-    run, step, step_s : the run, the number of the step, the macro-step [s]
-    values : by unit, the value of each of its signals, shape (signals,)
-    """
+    """One step of all units that are read."""
 
     run: int
-    step: int
-    step_s: float
-    values: dict[str, FloatArray]
+    step: int  # its number
+    step_s: float  # macro-step [s]
+    values: dict[str, FloatArray]  # by unit, the value of each of its signals, shape (signals,)
 
     @property
     def time_ns(self) -> int:

@@ -24,58 +24,42 @@ NOISE_WIDTH = 3.0
 
 @dataclass(frozen=True)
 class BiasStatistics:
-    """
-    The bias voltage.
+    """The bias voltage."""
 
-    minimum_V, maximum_V : the range
-    at_zero : share of time at or below `zero_V`, within which the motors do not counteract
-    zero_V : what counts as zero: 0, or the noise and resolution that the test sheet tells
-    """
-
+    # the lowest and the highest
     minimum_V: float
     maximum_V: float
-    at_zero: float
-    zero_V: float
+    at_zero: float  # share of time at or below `zero_V`, within which the motors do not counteract
+    zero_V: float  # what counts as zero: 0, or the noise and resolution that the test sheet tells
 
 
 @dataclass(frozen=True)
 class MotorStatistics:
-    """
-    One motor; None where its signal was not recorded.
+    """One motor; None where its signal was not recorded."""
 
-    current_peak_A : greatest current either way, with its sign; the ammeter's where the current
-        itself was not recorded [article A]
-    current_peak_s : when it flowed
-    current_rms_A : root mean square [article A]
-    stick : share of time that the rotor stands still
-    still_rad_s : rate that counts as standing still: 0, or noise and resolution of the sheet
-    backlash_crossings : how often the teeth changed from one flank to the other: changes of the
-        sign of the gear torque, the zeros in the gap between left out
-    """
-
+    # greatest current either way, with its sign; the ammeter's where the current itself was not
+    # recorded [article A]
     current_peak_A: float | None = None
-    current_peak_s: float | None = None
-    current_rms_A: float | None = None
-    stick: float | None = None
+    current_peak_s: float | None = None  # when it flowed
+    current_rms_A: float | None = None  # root mean square [article A]
+    stick: float | None = None  # share of time that the rotor stands still
+    # rate that counts as standing still: 0, or noise and resolution of the sheet
     still_rad_s: float | None = None
+    # how often the teeth changed from one flank to the other: changes of the sign of the gear
+    # torque, the zeros in the gap between left out
     backlash_crossings: int | None = None
 
 
 @dataclass(frozen=True)
 class Statistics:
-    """
-    The figures of a recording; None where a signal was not recorded.
+    """The figures of a recording; None where a signal was not recorded."""
 
-    start_s, end_s : span of the samples [s]
-    bias : the bias voltage
-    motors : 'motor_1' and 'motor_2' -> the motor's figures
-    axis_stick : share of time that the axis stands still, its rate being exactly zero
-    """
-
+    # span of the samples [s]
     start_s: float
     end_s: float
-    bias: BiasStatistics | None
-    motors: Mapping[str, MotorStatistics]
+    bias: BiasStatistics | None  # the bias voltage
+    motors: Mapping[str, MotorStatistics]  # 'motor_1' and 'motor_2' -> the motor's figures
+    # share of time that the axis stands still, its rate being exactly zero
     axis_stick: float | None
 
 

@@ -59,21 +59,15 @@ class Change(NamedTuple):
 
 
 class Aligned(NamedTuple):
-    """
-    Several signals on common time stamps.
+    """Several signals on common time stamps."""
 
-    time_s : array of shape (n,) [s]
-    values : array of shape (n, m), one column for each name
-    names, units : m texts each
-    method : one sentence that says how the values were found
-    longest_gap_s : for each name the widest distance between neighbouring samples used [s]
-    """
-
-    time_s: FloatArray
-    values: FloatArray
+    time_s: FloatArray  # array of shape (n,) [s]
+    values: FloatArray  # array of shape (n, m), one column for each name
+    # m texts each
     names: tuple[str, ...]
     units: tuple[str, ...]
-    method: str
+    method: str  # one sentence that says how the values were found
+    # for each name the widest distance between neighbouring samples used [s]
     longest_gap_s: tuple[float, ...]
 
 
@@ -81,12 +75,6 @@ class Aligned(NamedTuple):
 class Recording:
     """
     Named signals with units and uneven time, and what is known of how they came about.
-
-    channels : 'unit/signal' -> Channel, in the order given
-    configuration : the configuration in force at the start, plain data; empty if unknown
-    changes : live changes of tuning parameters, in the order of their steps
-    sheet : the test sheet; empty if there is none
-    notes : anything else that is known, plain data (source, method of resampling, payload ...)
 
     Raises RecordingError: no such kind of content; the message names the signal or the key.
 
@@ -98,10 +86,13 @@ class Recording:
     [0.0, 0.5, 1.0, 2.5, 4.0]
     """
 
-    channels: Mapping[str, Channel]
+    channels: Mapping[str, Channel]  # 'unit/signal' -> Channel, in the order given
+    # the configuration in force at the start, plain data; empty if unknown
     configuration: Mapping[str, Any] = field(default_factory=dict)
+    # live changes of tuning parameters, in the order of their steps
     changes: tuple[Change, ...] = ()
-    sheet: TestSheet = TestSheet()
+    sheet: TestSheet = TestSheet()  # the test sheet; empty if there is none
+    # anything else that is known, plain data (source, method of resampling, payload ...)
     notes: Mapping[str, Any] = field(default_factory=dict)
 
     __hash__ = None  # type: ignore[assignment]

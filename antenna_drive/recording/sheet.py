@@ -167,31 +167,22 @@ USUAL = Tolerances(**{number.key: number.usual for number in _TOLERANCES})
 
 @dataclass(frozen=True)
 class TestSheet:
-    """
-    What the tester knows. Every entry may be None: not known.
-
-    circuit, filter_1 : torque-share and Filter 1 constants of Table 1, 'old' or 'new'
-    bias : where the bias voltage comes from
-    waveform : the rate command
-    start : 'rest' if everything stood still, encoder near zero, each motor inside its gap
-    elevation_deg : elevation at the start [deg]
-    sensors : how good the sensors are
-    parameter_tolerance : how far the machine's parameters may lie from the configuration [1]
-    tolerances : the same for zeros, recorders and clocks
-    labels : names and values of what was different in this test, such as load: A
-    """
+    """What the tester knows. Every entry may be None: not known."""
 
     __test__: ClassVar[bool] = False  # not a test case, whatever pytest makes of the name
 
     circuit: str | None = _choice('torque-share constants of Table 1', 'old', 'new')
     filter_1: str | None = _choice('Filter 1 constants of Table 1', 'old', 'new')
-    bias: Bias | None = None
-    waveform: Waveform | None = None
+    bias: Bias | None = None  # where the bias voltage comes from
+    waveform: Waveform | None = None  # the rate command
+    # 'rest' if everything stood still, encoder near zero, each motor inside its gap
     start: str | None = _choice('state at the start', 'rest')
     elevation_deg: float | None = _entry('deg', 'elevation at the start', -90.0, 180.0)
-    sensors: Sensors | None = None
+    sensors: Sensors | None = None  # how good the sensors are
+    # how far the machine's parameters may lie from the configuration [1]
     parameter_tolerance: float | None = _entry('1', 'relative tolerance', 0.0, 1.0)
-    tolerances: Tolerances | None = None
+    tolerances: Tolerances | None = None  # the same for zeros, recorders and clocks
+    # names and values of what was different in this test, such as load: A
     labels: tuple[tuple[str, str], ...] | None = field(default=None, metadata={'labels': True})
 
     def __bool__(self) -> bool:

@@ -60,42 +60,29 @@ DRIFT_S = 10.0
 
 @dataclass(frozen=True)
 class SignalBaseline:
-    """
-    What is known of one signal of a healthy drive.
+    """What is known of one signal of a healthy drive."""
 
-    lag : by which the reading is late [s]
-    centre, scale : of the regressors, shape (m,)
-    coefficients : of the standardised regressors, in units of the signal, shape (m,)
-    sigma : robust standard deviation of what is left, in units of the signal
-    mean, deviation : of the scores, shape (5,); deviation 0 where a score says nothing
-    allowance : two standard errors of the mean, shape (5,), in deviations
-    """
-
-    lag: float
+    lag: float  # by which the reading is late [s]
+    # of the regressors, shape (m,)
     centre: FloatArray
     scale: FloatArray
-    coefficients: FloatArray
-    sigma: float
+    coefficients: FloatArray  # of the standardised regressors, in units of the signal, shape (m,)
+    sigma: float  # robust standard deviation of what is left, in units of the signal
+    # of the scores, shape (5,); deviation 0 where a score says nothing
     mean: FloatArray
     deviation: FloatArray
-    allowance: FloatArray
+    allowance: FloatArray  # two standard errors of the mean, shape (5,), in deviations
 
 
 @dataclass(frozen=True)
 class Baseline:
-    """
-    What is known of a healthy drive.
+    """What is known of a healthy drive."""
 
-    signals : by name
-    envelope : greatest rate command [rad/s] and greatest rms slope of it in a block [rad/s^2]
-    spacing : of the samples of the command: how far a block may be shifted [s]
-    blocks : of the quiet record
-    """
-
-    signals: Mapping[str, SignalBaseline]
+    signals: Mapping[str, SignalBaseline]  # by name
+    # greatest rate command [rad/s] and greatest rms slope of it in a block [rad/s^2]
     envelope: tuple[float, float]
-    spacing: float
-    blocks: int
+    spacing: float  # of the samples of the command: how far a block may be shifted [s]
+    blocks: int  # of the quiet record
 
     def judged(self, motion: tuple[float, float]) -> bool:
         """Return whether the motion of a block is one that the quiet record had."""
@@ -193,17 +180,11 @@ def standardised(rows: FloatArray, centre: FloatArray, scale: FloatArray) -> Flo
 
 @dataclass(frozen=True)
 class SignalBlock:
-    """
-    One signal in one block.
+    """One signal in one block."""
 
-    column : of the signal among the readings
-    residual : measured minus twin, shape (n,)
-    rows : regressors at the same times, shape (n, 16)
-    """
-
-    column: int
-    residual: FloatArray
-    rows: FloatArray
+    column: int  # of the signal among the readings
+    residual: FloatArray  # measured minus twin, shape (n,)
+    rows: FloatArray  # regressors at the same times, shape (n, 16)
 
     @property
     def slope(self) -> FloatArray:

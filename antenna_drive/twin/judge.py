@@ -30,21 +30,15 @@ Pending = dict[str, tuple[FloatArray, FloatArray]]
 
 @dataclass(frozen=True)
 class Gap:
-    """
-    What parts a signal from its twin.
+    """What parts a signal from its twin."""
 
-    name, unit : of the signal
-    since_ns : stamp at which the change began, as the chart tells it [ns]
-    score : what shows it most, one of SCORES
-    sigma : mean of that score since then, in deviations of the quiet record
-    rms, usual : of what the residual has beyond the healthy, since then and in the quiet record
-    """
-
+    # of the signal
     name: str
     unit: str
-    since_ns: int
-    score: str
-    sigma: float
+    since_ns: int  # stamp at which the change began, as the chart tells it [ns]
+    score: str  # what shows it most, one of SCORES
+    sigma: float  # mean of that score since then, in deviations of the quiet record
+    # of what the residual has beyond the healthy, since then and in the quiet record
     rms: float
     usual: float
 

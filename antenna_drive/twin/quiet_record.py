@@ -42,20 +42,14 @@ _MOST_LAG_S, _LAG_STEP_S = 0.3, 0.005
 class Track:
     """
     A stretch of the twin's course on an even grid, and the readings of a real drive beside it.
-
-    time : of the twin, ascending, shape (n,) [s]
-    course : the twin's readings, shape (n, 6), in the order of `SIGNALS`
-    washed : the same with the encoder behind its high-pass
-    command : axis rate command, shape (n,) [rad/s]
-    spacing : of the samples of the command that the twin was driven with [s]
-    samples : times [s] and values of each measured signal
     """
 
-    time: FloatArray
-    course: FloatArray
-    washed: FloatArray
-    command: FloatArray
-    spacing: float
+    time: FloatArray  # of the twin, ascending, shape (n,) [s]
+    course: FloatArray  # the twin's readings, shape (n, 6), in the order of `SIGNALS`
+    washed: FloatArray  # the same with the encoder behind its high-pass
+    command: FloatArray  # axis rate command, shape (n,) [rad/s]
+    spacing: float  # of the samples of the command that the twin was driven with [s]
+    # times [s] and values of each measured signal
     samples: Mapping[str, tuple[FloatArray, FloatArray]]
 
 

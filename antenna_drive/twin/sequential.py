@@ -31,36 +31,23 @@ Answer = tuple[str, ...]
 
 @dataclass(frozen=True)
 class Rule:
-    """
-    When to stop.
+    """When to stop."""
 
-    false_alarm : greatest probability that a gap is ever decided on a healthy machine
-    error : greatest mean error of a decided answer
-    looks : so many looks in a row must have the same first answer
-    tests : the last look must be based on so many tests
-    """
-
+    # greatest probability that a gap is ever decided on a healthy machine
     false_alarm: float = 0.05
-    error: float = 0.1
-    looks: int = 2
-    tests: int = 2
+    error: float = 0.1  # greatest mean error of a decided answer
+    looks: int = 2  # so many looks in a row must have the same first answer
+    tests: int = 2  # the last look must be based on so many tests
 
 
 @dataclass(frozen=True)
 class Look:
-    """
-    What one look said.
+    """What one look said."""
 
-    seconds : of testing that it was based on [s]
-    tests : that it was based on, those that are long enough to count
-    probabilities : of the answers; they sum to 1
-    confusable : groups of effects that the data cannot tell apart
-    """
-
-    seconds: float
-    tests: int
-    probabilities: Mapping[Answer, float]
-    confusable: Sequence[frozenset[str]] = ()
+    seconds: float  # of testing that it was based on [s]
+    tests: int  # that it was based on, those that are long enough to count
+    probabilities: Mapping[Answer, float]  # of the answers; they sum to 1
+    confusable: Sequence[frozenset[str]] = ()  # groups of effects that the data cannot tell apart
 
     @property
     def first(self) -> Answer:

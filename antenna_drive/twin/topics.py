@@ -33,36 +33,22 @@ SOURCE, ARRIVAL = 'source', 'arrival'
 
 @dataclass(frozen=True)
 class Topic:
-    """
-    A topic of the real drive.
+    """A topic of the real drive."""
 
-    name : as the node subscribes to it
-    vector : whether its messages have several numbers
-    signals : what is read from it, by signal
-    """
-
-    name: str
-    vector: bool
-    signals: Mapping[str, SignalMap]
+    name: str  # as the node subscribes to it
+    vector: bool  # whether its messages have several numbers
+    signals: Mapping[str, SignalMap]  # what is read from it, by signal
 
 
 @dataclass(frozen=True)
 class TopicMap:
-    """
-    The topics of a real drive, and how their messages are read.
+    """The topics of a real drive, and how their messages are read."""
 
-    topics : to subscribe to
-    clock : SOURCE, ARRIVAL, or the topic that holds the time
-    time_index : which of its numbers
-    time_unit : nanoseconds in its unit
-    offset_ns : added to every stamp [ns]
-    """
-
-    topics: Sequence[Topic]
-    clock: str = SOURCE
-    time_index: int = 0
-    time_unit: int = 1
-    offset_ns: int = 0
+    topics: Sequence[Topic]  # to subscribe to
+    clock: str = SOURCE  # SOURCE, ARRIVAL, or the topic that holds the time
+    time_index: int = 0  # which of its numbers
+    time_unit: int = 1  # nanoseconds in its unit
+    offset_ns: int = 0  # added to every stamp [ns]
 
     @property
     def has_stamps_of_messages(self) -> bool:

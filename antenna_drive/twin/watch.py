@@ -42,27 +42,17 @@ Tune = Callable[[Recording, Drive], Tuned]
 
 @dataclass(frozen=True)
 class TwinSettings:
-    """
-    How a twin judges.
+    """How a twin judges."""
 
-    alarms_per_day : false alarms of a healthy drive, of all charts together
-    quiet_s : length of the quiet record from which it learns what is healthy [s]
-    run_in_s : after which a start at rest is forgotten; the diagnosis takes as much [s]
-    again_s : the same after a jump of the time, in the middle of a motion [s]
-    stale_s : without new samples for so long, the real drive has stopped [s]
-    reference : k of the charts, half the shift that they find fastest, in deviations
-    clip : greatest increment of a chart, in deviations
-    keep_s : how much of the real drive's samples is kept [s]
-    """
-
-    alarms_per_day: float = 1.0
-    quiet_s: float = 300.0
+    alarms_per_day: float = 1.0  # false alarms of a healthy drive, of all charts together
+    quiet_s: float = 300.0  # length of the quiet record from which it learns what is healthy [s]
+    # after which a start at rest is forgotten; the diagnosis takes as much [s]
     run_in_s: float = 15.0
-    again_s: float = 30.0
-    stale_s: float = 2.0
-    reference: float = 1.0
-    clip: float = 3.2
-    keep_s: float = 300.0
+    again_s: float = 30.0  # the same after a jump of the time, in the middle of a motion [s]
+    stale_s: float = 2.0  # without new samples for so long, the real drive has stopped [s]
+    reference: float = 1.0  # k of the charts, half the shift that they find fastest, in deviations
+    clip: float = 3.2  # greatest increment of a chart, in deviations
+    keep_s: float = 300.0  # how much of the real drive's samples is kept [s]
 
 
 @dataclass(frozen=True)
