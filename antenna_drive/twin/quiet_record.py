@@ -40,9 +40,7 @@ _MOST_LAG_S, _LAG_STEP_S = 0.3, 0.005
 
 @dataclass(frozen=True)
 class Track:
-    """
-    A stretch of the twin's course on an even grid, and the readings of a real drive beside it.
-    """
+    """A stretch of the twin's course on an even grid, and a real drive's readings beside it."""
 
     time: FloatArray  # of the twin, ascending, shape (n,) [s]
     course: FloatArray  # the twin's readings, shape (n, 6), in the order of `SIGNALS`
