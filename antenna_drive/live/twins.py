@@ -71,11 +71,7 @@ class Twins:
         self._board.post(f'twin {name}', self._told[name])
 
     def begin_test(self, name: str) -> None:
-        """
-        Tell a twin that another test begins.
-
-        Raises UserError: there is no such twin.
-        """
+        """Tell a twin that another test begins. Raises UserError: there is no such twin."""
         if name not in self._begins:
             raise UserError(f'{name[:80]}: no such twin')
         self._begins[name].publish(Empty())

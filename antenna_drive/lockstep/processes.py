@@ -128,11 +128,7 @@ class DriveProcesses:
         self._processes[unit].wait()
 
     def stop(self, number: signal.Signals = signal.SIGINT) -> dict[str, int]:
-        """
-        End all processes.
-
-        Returns the exit code by unit; -9 if a process had to be killed.
-        """
+        """End all processes. Returns the exit code by unit; -9 if a process had to be killed."""
         for process in self._processes.values():
             if process.poll() is None:
                 process.send_signal(number)

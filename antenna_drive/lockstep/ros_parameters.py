@@ -141,11 +141,7 @@ class Overrides:
         return value
 
     def names(self, name: str, default: Sequence[str]) -> list[str]:
-        """
-        Return a list of texts.
-
-        Raises ParameterError: something else was given.
-        """
+        """Return a list of texts. Raises ParameterError: something else was given."""
         self._asked.add(name)
         given = self._values.get(name, list(default))
         texts = [given] if isinstance(given, str) else given
@@ -158,11 +154,7 @@ class Overrides:
         return {key: value for key, value in self._values.items() if key not in self._asked}
 
     def check_all_known(self, known: Sequence[str]) -> None:
-        """
-        Refuse what no parameter has asked for.
-
-        Raises ParameterError: a name is unknown.
-        """
+        """Refuse what no parameter has asked for. Raises ParameterError: a name is unknown."""
         for name in self.rest():
             if name not in known:
                 raise ParameterError(f'{name}: no such parameter{nearest(name, tuple(known))}')
