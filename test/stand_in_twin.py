@@ -7,9 +7,9 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from antenna_drive.lockstep.diagnostics import diagnostics
 from antenna_drive.lockstep.leaving import leave
 from antenna_drive.lockstep.serving import Serving
+from antenna_drive.lockstep.starting import diagnostics
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.context import Context
 from rclpy.node import Node

@@ -16,9 +16,9 @@ from antenna_drive.article import readings
 from antenna_drive.article.experiments import (
     experiments, GAINS, SAW_TOOTH, TABLE_1_GAIN, TAU_6_NEW, TAU_6_OLD,
 )
-from antenna_drive.article.linear import bias_loop, growth, stability_limit
 from antenna_drive.article.measures import OLD_CIRCUIT, Results
 from antenna_drive.article.published import SIGNIFICANT_TIME
+from antenna_drive.article.stability import bias_loop, growth, stability_limit
 from antenna_drive.emulator.run import simulate
 from antenna_drive.parameters.sets import changed
 import numpy as np

@@ -120,24 +120,13 @@ def _square_wave(results: Results, name: str, signals: Sequence[tuple[str, str, 
     return figure
 
 
-_MOTORS = 'motor 1', 'motor 2'
-
-
-def _tachs(results: Results, name: str) -> Figure:
-    return _square_wave(results, name, [('motor_1/tach_rate', _MOTORS[0], '-'),
-                                        ('motor_2/tach_rate', _MOTORS[1], _DASHED)],
-                        _DEGREES, 'Tachometer rate, deg/s')
-
-
-def _currents(results: Results, name: str) -> Figure:
-    return _square_wave(results, name, [('motor_1/current', _MOTORS[0], '-'),
-                                        ('motor_2/current', _MOTORS[1], _DASHED)],
-                        1.0, "Motor current, A (the article's)")
-
-
-def _encoder(results: Results, name: str) -> Figure:
-    return _square_wave(results, name, [('plant/encoder', 'encoder', '-')], _DEGREES,
-                        'Encoder, deg')
+_tachs, _currents = (
+    partial(_square_wave, scale=scale, label=label, signals=[
+        (f'motor_1/{signal}', 'motor 1', '-'), (f'motor_2/{signal}', 'motor 2', _DASHED)])
+    for signal, scale, label in (('tach_rate', _DEGREES, 'Tachometer rate, deg/s'),
+                                 ('current', 1.0, "Motor current, A (the article's)")))
+_encoder = partial(_square_wave, signals=[('plant/encoder', 'encoder', '-')], scale=_DEGREES,
+                   label='Encoder, deg')
 
 
 def bias_fade_out(results: Results) -> Figure:

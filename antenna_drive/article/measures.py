@@ -18,8 +18,7 @@ from antenna_drive.article.experiments import (
     DriveExperiment, experiments, filter_variants, GAINS, LAGS, rate_step, SAW_TOOTH, SQUARE,
     TAU_6_NEW, TAU_6_OLD,
 )
-from antenna_drive.article.linear import stability_limit
-from antenna_drive.article.stability import simulated_limit
+from antenna_drive.article.stability import simulated_limit, stability_limit
 from antenna_drive.emulator.run import MACRO_STEP, Run, simulate
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.parameters import Drive, load

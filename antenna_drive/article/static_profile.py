@@ -49,11 +49,7 @@ def bias_voltage(share: TorqueShare, current_sum: FloatArray) -> FloatArray:
 
 
 def corners(share: TorqueShare) -> Corners:
-    """
-    Return the corners of the profile, found numerically.
-
-    Raises ValueError: the profile has no corners; it is constant.
-    """
+    """Return the corners of the profile; ValueError if it is constant and has none."""
     record = record_of(share)[0]
     most = share.bias_pot * share.saturation_high
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
 """
-How well a fit determines its parameters: sensitivity, correlation, profile, trade-off.
+What a fit has found, as a configuration, and how well it determines the parameters.
 
 Near the best candidate each target's miss, in tolerances, is taken as linear in the
 parameters. The uncertainty of a parameter is the move that makes the targets miss by one
@@ -17,7 +17,10 @@ from typing import Any
 from antenna_drive.calibration.problem import CalibrationProblem
 from antenna_drive.calibration.search import FitCandidate, SearchResult
 from antenna_drive.emulator.unit import FloatArray
+from antenna_drive.parameters.loading import find
+from antenna_drive.yaml_text import dump_yaml
 import numpy as np
+from simgap.inputs.plain_yaml import read_yaml
 from simgap.inputs.schema import nearest, ParameterError
 
 # Half the step of the difference quotient, as a share of the bounds; wider than the jumps of
@@ -34,6 +37,8 @@ _CORRELATED = 0.8
 _TRADE_OFF_POINTS = 12
 # Candidates that cost this many times the least are left out of a trade-off.
 _HOPELESS = 30.0
+# Significant digits of a fitted number: more than any figure determines.
+_DIGITS = 7
 
 
 @dataclass(frozen=True)
@@ -213,3 +218,29 @@ def _trade_off(problem: CalibrationProblem, candidates: Sequence[FitCandidate], 
             curve.append({'level': tried[k][figure], 'cost_of_the_others': costs[k],
                           'missed': missed, 'figures': dict(tried[k])})
     return curve
+
+
+def configuration(problem: CalibrationProblem, shares: Sequence[float], start: str) -> str:
+    """
+    Return a candidate as a configuration file that overrides the start of the fit.
+
+    problem : the fit
+    shares : the candidate, as shares of the bounds
+    start : configuration that the fit started from; its other parameters are kept
+    """
+    content: dict[str, Any] = {}
+    if find(start) != find('reference'):
+        content = dict(read_yaml(find(start)) or {})
+    units = {item.key: item.unit for item in problem.free}
+    for key, value in problem.parameters(shares).items():
+        section, _, entry = key.partition('.')
+        numbers = [_rounded(item) for item in value] if isinstance(value, tuple) else (
+            _rounded(value))
+        body = dict(content.get(section) or {})
+        body[entry] = {'value': numbers, 'unit': units[key], 'source': 'fitted'}
+        content[section] = body
+    return dump_yaml(content, default_flow_style=None, width=10_000)
+
+
+def _rounded(value: float) -> float:
+    return float(f'{value:.{_DIGITS}g}')

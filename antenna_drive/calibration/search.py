@@ -69,11 +69,7 @@ def _candidate(line: str) -> FitCandidate:
 
 
 def read_log(path: Path) -> list[FitCandidate]:
-    """
-    Return the candidates of any search's log.
-
-    Raises UserError: the file cannot be read, or is not such a log.
-    """
+    """Return the candidates of any search's log; UserError if it is none."""
     return _read_log(path)[1]
 
 

@@ -25,7 +25,7 @@ from pathlib import Path
 from antenna_drive.article.contradictions import Contradiction, contradictions
 from antenna_drive.article.experiments import DriveExperiment
 from antenna_drive.article.measures import Results, with_circuits
-from antenna_drive.article.rows import Row, rows
+from antenna_drive.article.published import Row, rows
 from antenna_drive.emulator.run import MACRO_STEP, Run, simulate
 from antenna_drive.parameters import Drive
 import numpy as np

@@ -16,11 +16,10 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from antenna_drive.calibration.configuration import configuration
 from antenna_drive.calibration.problem import read_problem
-from antenna_drive.calibration.report import report
+from antenna_drive.calibration.report import configuration, report
 from antenna_drive.calibration.search import read_log, search
-from antenna_drive.cli.sharing import add_worker_options
+from antenna_drive.cli.options import add_worker_options
 from antenna_drive.parameters.files import config_dir
 from simgap.command.output import add_json_option, check_options, give, Progress, replaced
 from simgap.command.programs import NEGATIVE, OK

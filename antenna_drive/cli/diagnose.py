@@ -30,8 +30,7 @@ import argparse
 from pathlib import Path
 
 from antenna_drive import __version__
-from antenna_drive.recording.files import read_recording
-from antenna_drive.recording.import_map import import_file, load_map
+from antenna_drive.recording.files import import_file, load_map, read_recording
 from simgap.cli.diagnose import (
     add_diagnosis_options, add_map_option, diagnosed, earlier_of, facts, numbers_of, settings_of,
     write_report,

@@ -30,7 +30,7 @@ from pathlib import Path
 import shlex
 from urllib.parse import quote
 
-from antenna_drive.cli.sharing import add_diagnosis_options, add_worker_options
+from antenna_drive.cli.options import add_diagnosis_options, add_worker_options
 from simgap.command.output import (
     add_json_option, check_options, give, Progress, replaced, write_json,
 )

@@ -19,10 +19,9 @@ such as 'motor_1/real_current [real A]' for each.
 import argparse
 from pathlib import Path
 
-from antenna_drive.cli.reading import add_recording_options, read, refuse_none
-from antenna_drive.recording.amperes import with_real_amperes
+from antenna_drive.cli.options import add_recording_options, read, refuse_none
 from antenna_drive.recording.csv_format import write_csv
-from antenna_drive.recording.panels import chosen
+from antenna_drive.recording.panels import chosen, with_real_amperes
 from simgap.errors import UserError
 
 

@@ -27,7 +27,7 @@ from pathlib import Path
 import shlex
 import sys
 
-from antenna_drive.cli.settings import add_settings_option, parse_settings
+from antenna_drive.cli.options import add_settings_option, parse_settings
 from simgap.cli.investigate import add_investigation_options, investigated, plan_of, PlayedBy
 from simgap.errors import UserError
 

@@ -24,7 +24,7 @@ is for this machine always; it has no token.
 import argparse
 from pathlib import Path
 
-from antenna_drive.cli.settings import add_config_option, add_settings_option, parse_settings
+from antenna_drive.cli.options import add_config_option, add_settings_option, parse_settings
 from simgap.command.output import check_options
 from simgap.errors import UserError
 from simgap.inputs.schema import Entry

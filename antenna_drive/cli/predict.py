@@ -26,12 +26,11 @@ import argparse
 import json
 import math
 from pathlib import Path
-import sys
 from typing import Any, TYPE_CHECKING
 
 from antenna_drive.recording.atomic import refuse_existing
 from antenna_drive.recording.files import read_recording
-from simgap.command.output import add_json_option, reading, STANDARD_OUTPUT, write_json
+from simgap.command.output import add_json_option, give, reading
 from simgap.errors import UserError
 from simgap.verdict.spoken import number
 
@@ -83,19 +82,17 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.out is not None:
         write_csv(prediction.as_recording(recording), arguments.out, field=True)
     better = other is None or _mean_ratio(signals) <= 1.0
-    if arguments.json:
-        write_json({'recording': name, 'signals': signals, 'notes': notes,
-                    **({} if other is None else {'ratio': _mean_ratio(signals)})},
-                   arguments.json)
-    stream = sys.stderr if arguments.json == STANDARD_OUTPUT else sys.stdout
+    lines = []
     for channel, item in signals.items():
         line = f'{channel:<14} {item["rms"]:.4g} {item["unit"]}'
         if 'against' in item:
             line += (f'   {item["against"]:.4g} {item["unit"]} with --against, '
                      f'{_change(item["rms"], item["against"])}')
-        print(line, file=stream)
-    for note in notes:
-        print(f'note: {note}', file=stream)
+        lines.append(line)
+    lines += [f'note: {note}' for note in notes]
+    give({'recording': name, 'signals': signals, 'notes': notes,
+          **({} if other is None else {'ratio': _mean_ratio(signals)})},
+         arguments.json, '\n'.join(lines))
     return 0 if better else 1
 
 

@@ -24,7 +24,7 @@ from pathlib import Path
 import time
 from typing import Any
 
-from antenna_drive.cli.settings import add_config_option, add_settings_option, parse_settings
+from antenna_drive.cli.options import add_config_option, add_settings_option, parse_settings
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.recording.recorder import RunRecorder
 from antenna_drive.recording.sheet import load_sheet, TestSheet

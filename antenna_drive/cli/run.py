@@ -13,7 +13,7 @@ real time. --out NAME.csv writes a table, any other name a rosbag2 folder (MCAP)
 import argparse
 from pathlib import Path
 
-from antenna_drive.cli.settings import add_config_option, add_settings_option, parse_settings
+from antenna_drive.cli.options import add_config_option, add_settings_option, parse_settings
 from simgap.command.output import check_options, Progress
 from simgap.inputs.schema import Entry
 

@@ -12,10 +12,10 @@ from collections.abc import Iterator
 import math
 from typing import NamedTuple
 
-from antenna_drive.configuring.resonance import mode_scale, rigid_frequency
 from antenna_drive.configuring.sheet import FIGURES, Sheet
 from antenna_drive.parameters import load
 from antenna_drive.parameters.sets import Drive
+from antenna_drive.physics.arrays import FloatArray
 import numpy as np
 from scipy.optimize import brentq
 from simgap.inputs.schema import ParameterError
@@ -23,6 +23,8 @@ from simgap.inputs.schema import ParameterError
 _TWO_MOTORS = 2.0
 # Bandwidths: corner of the integral below, and of the lag above, the bandwidth of the rate loop.
 _INTEGRAL_BELOW, _LAG_ABOVE = 4.0, 10.0
+# Between these the lowest resonance goes from near zero to that of a rigid structure.
+_SCALES = 1e-3, 1e2
 
 
 class Number(NamedTuple):
@@ -64,6 +66,10 @@ def _shown(sheet: Sheet, *keys: str) -> str:
     return ', '.join(f'{key} = {sheet.figures[key].written}' for key in keys)
 
 
+def _as_given(sheet: Sheet, section: str, name: str, key: str) -> Number:
+    return Number(section, name, sheet[key], f'sheet: {_shown(sheet, key)}')
+
+
 def _motor(sheet: Sheet, drive: Drive) -> Iterator[Number]:
     real, limit = kappa(sheet), drive.motor_1.motor.current_limit
     constant = sheet['motor.torque_constant'] * real
@@ -78,16 +84,15 @@ def _motor(sheet: Sheet, drive: Drive) -> Iterator[Number]:
     yield Number('motor', 'torque_constant', constant, per_ampere)
     for section in ('motor', 'axis'):
         yield Number(section, 'friction_torque_per_ampere', constant, per_ampere)
-    for name, key in (('resistance', 'motor.resistance'), ('inductance', 'motor.inductance'),
-                      ('voltage_limit', 'amplifier.greatest_voltage')):
-        yield Number('armature', name, sheet[key], f'sheet: {_shown(sheet, key)}')
-    emf = sheet.get('motor.back_emf')
-    yield Number('armature', 'back_emf_constant',
-                 sheet['motor.torque_constant'] if emf is None else emf,
-                 'assumed: as large as the torque constant' if emf is None
-                 else f'sheet: {_shown(sheet, "motor.back_emf")}')
-    yield Number('motor', 'rotor_inertia', sheet['motor.rotor_inertia'],
-                 f'sheet: {_shown(sheet, "motor.rotor_inertia")}')
+    yield _as_given(sheet, 'armature', 'resistance', 'motor.resistance')
+    yield _as_given(sheet, 'armature', 'inductance', 'motor.inductance')
+    yield _as_given(sheet, 'armature', 'voltage_limit', 'amplifier.greatest_voltage')
+    if 'motor.back_emf' in sheet.figures:
+        yield _as_given(sheet, 'armature', 'back_emf_constant', 'motor.back_emf')
+    else:
+        yield Number('armature', 'back_emf_constant', sheet['motor.torque_constant'],
+                     'assumed: as large as the torque constant')
+    yield _as_given(sheet, 'motor', 'rotor_inertia', 'motor.rotor_inertia')
 
 
 def _stiffness(sheet: Sheet) -> float:
@@ -104,7 +109,7 @@ def _gearbox(sheet: Sheet, drive: Drive) -> Iterator[Number]:
         2.0 * math.sqrt(gearbox.stiffness * motor.rotor_inertia))
     squared = '' if sheet.figures['gear.stiffness'].at_motor else ' over gear.ratio squared'
     times = '' if backlash.at_motor else ' times gear.ratio'
-    yield Number('axis', 'gear_ratio', ratio, f'sheet: {_shown(sheet, "gear.ratio")}')
+    yield _as_given(sheet, 'axis', 'gear_ratio', 'gear.ratio')
     yield Number('gearbox', 'stiffness', stiffness,
                  f'derived: {_shown(sheet, "gear.stiffness")}{squared}')
     yield Number('gearbox', 'half_gap',
@@ -163,10 +168,8 @@ def _friction(sheet: Sheet, drive: Drive) -> Iterator[Number]:
         yield Number(section, 'coulomb_torque', share * level / real,
                      f'derived: {two} are {level:.4g} real A at rate zero; '
                      f'{100 * share:.3g} percent of it, as in the reference')
-        ratio = sheet.get('friction.stiction_ratio')
-        if ratio is not None:
-            yield Number(section, 'stiction_ratio', ratio,
-                         f'sheet: {_shown(sheet, "friction.stiction_ratio")}')
+        if 'friction.stiction_ratio' in sheet.figures:
+            yield _as_given(sheet, section, 'stiction_ratio', 'friction.stiction_ratio')
     yield Number('axis', 'viscous_friction',
                  slope * sheet['motor.torque_constant'] * sheet['gear.ratio'],
                  f'derived: slope of {two} over the rates, times torque constant and gear.ratio; '
@@ -180,8 +183,7 @@ def _loops(sheet: Sheet, drive: Drive) -> Iterator[Number]:
     inertia = sheet['motor.rotor_inertia'] + sheet['axis.inertia'] / (_TWO_MOTORS * ratio**2)
     constant = sheet['motor.torque_constant'] * kappa(sheet)
     gain = wanted * inertia / (tachometer * constant)
-    yield Number('amplifier', 'tach_gain', tachometer,
-                 f'sheet: {_shown(sheet, "amplifier.tachometer")}')
+    yield _as_given(sheet, 'amplifier', 'tach_gain', 'amplifier.tachometer')
     k_s = drive.motor_1.rate_command.k_s
     yield Number('rate_command', 'k_1', tachometer * ratio / k_s,
                  f'derived: the tachometer times gear.ratio over k_s = {k_s:g}')
@@ -247,3 +249,42 @@ class _Loop(NamedTuple):
         return abs(self.gain * (1.0 + 1.0 / (s * self.integral_time))
                    * filter_1.gain / (s + filter_1.pole)
                    / (1.0 + s * self.lag) / (1.0 + s * self.current_lag))
+
+
+def locked_rotor_frequency(hub: float, inertias: FloatArray, frequencies: FloatArray,
+                           stiffness: float) -> float:
+    """
+    Return the lowest resonance of hub and modes on gearboxes whose rotors are held [Hz].
+
+    hub : its inertia [kg m^2]
+    inertias, frequencies : of each mode [kg m^2], with the hub held [Hz]
+    stiffness : of all gearboxes together, at the axis [N m/rad]
+    """
+    springs = inertias * (2.0 * math.pi * frequencies) ** 2
+    matrix = np.diag(np.concatenate([[stiffness + springs.sum()], springs]))
+    matrix[0, 1:] = matrix[1:, 0] = -springs
+    root = 1.0 / np.sqrt(np.concatenate([[hub], inertias]))
+    lowest = np.linalg.eigvalsh(root[:, None] * matrix * root)[0]
+    return math.sqrt(max(lowest, 0.0)) / (2.0 * math.pi)
+
+
+def rigid_frequency(inertia: float, stiffness: float) -> float:
+    """Return that resonance of a structure that does not bend [Hz]: no other one is higher."""
+    return math.sqrt(stiffness / inertia) / (2.0 * math.pi)
+
+
+def mode_scale(hub: float, inertias: FloatArray, frequencies: FloatArray, stiffness: float,
+               wanted: float) -> float:
+    """
+    Return by what to multiply the frequencies of the modes for a lowest resonance [Hz].
+
+    Raises ValueError: it is not below that of a rigid structure.
+    """
+    if wanted >= 0.999 * rigid_frequency(hub + float(inertias.sum()), stiffness):
+        raise ValueError('not below that of a rigid structure')
+
+    def miss(logarithm: float) -> float:
+        return locked_rotor_frequency(
+            hub, inertias, frequencies * math.exp(logarithm), stiffness) - wanted
+
+    return math.exp(brentq(miss, *map(math.log, _SCALES), xtol=1e-10))

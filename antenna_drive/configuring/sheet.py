@@ -146,12 +146,7 @@ class Sheet:
 
 
 def read_sheet(path: Path) -> Sheet:
-    """
-    Read a filled sheet.
-
-    Raises ParameterError: it is no sheet, or a figure is missing, misspelt or not allowed; the
-    message names file, key and remedy.
-    """
+    """Read a filled sheet; ParameterError names file, key and remedy."""
     sections: dict[str, list[str]] = {}
     for key in (*(figure.key for figure in FIGURES), CIRCUIT):
         section, _, name = key.partition('.')

@@ -20,12 +20,7 @@ _WIDTH = 98
 
 
 def configuration(sheet: Sheet) -> str:
-    """
-    Return a whole configuration, which needs no other, as YAML.
-
-    Raises ParameterError: the figures contradict one another, or lead to a number that is not
-    allowed.
-    """
+    """Return a whole configuration as YAML; ParameterError if figures do not go together."""
     found = {(number.section, number.name): number for number in derived(sheet)}
     drive, real = reference(sheet.circuit), kappa(sheet)
     lines = [

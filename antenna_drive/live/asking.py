@@ -12,11 +12,7 @@ PATIENCE_S = 8.0
 
 
 async def ask(client: Any, request: Any, who: str) -> Any:
-    """
-    Return the answer of a node whose callbacks are served in another thread.
-
-    Raises UserError: it does not answer.
-    """
+    """Return the answer of a node whose callbacks another thread serves; UserError if none."""
     if not client.service_is_ready():
         raise UserError(f'{who} does not answer: is it running?')
     loop = asyncio.get_running_loop()

@@ -57,6 +57,7 @@ class History:
     """
     Takes the frames of the units in any portions, from one thread; gives pieces to any other.
 
+    run : the run in progress, 0 for none
     lost : steps of any unit that were missed after the first that was received
     """
 
@@ -83,18 +84,13 @@ class History:
         self._begin(0, 1e-3)
 
     def _begin(self, run: int, step_s: float) -> None:
-        self._run, self._step_s = run, step_s
+        self.run, self._step_s = run, step_s
         self._per = max(1, round(INTERVAL_S / step_s))
         self._newest = -1
         self._last = dict.fromkeys(self._columns, -1)
         self._senders: dict[str, float] = {}
         for ring in (self._lows, self._highs, self._ends):
             ring[:] = np.nan
-
-    @property
-    def run(self) -> int:
-        """Return the run in progress, 0 for none."""
-        return self._run
 
     def take(self, unit: str, frames: FloatArray) -> None:
         """
@@ -111,13 +107,13 @@ class History:
             frames = frames[np.isfinite(frames).all(axis=1)]
             if unit == self._conductor:
                 runs = frames[_plausible(frames)]
-                if len(runs) and int(runs[-1, _RUN]) != self._run:
+                if len(runs) and int(runs[-1, _RUN]) != self.run:
                     self._begin(int(runs[-1, _RUN]), float(runs[-1, _STEP_S]))
-            mine = frames[frames[:, _RUN] == self._run]
+            mine = frames[frames[:, _RUN] == self.run]
             if unit != self._conductor and early is None and len(mine) < len(frames):
                 # of a run that the conductor's frames, which are read first, did not tell yet
-                self._early[unit] = frames[frames[:, _RUN] > self._run]
-            if self._run and len(mine):
+                self._early[unit] = frames[frames[:, _RUN] > self.run]
+            if self.run and len(mine):
                 # where two nodes have one name, those of the first: a mixture is no curve
                 sender = self._senders.setdefault(unit, float(mine[0, _SENDER]))
                 self._file(unit, mine[mine[:, _SENDER] == sender])
@@ -169,9 +165,9 @@ class History:
         with self._lock:
             last_step = min(self._last.values())
             last = last_step // self._per
-            first = max(0, first if run == self._run else 0, self._newest - KEPT + 1)
+            first = max(0, first if run == self.run else 0, self._newest - KEPT + 1)
             slots = np.arange(first, last + 1) % KEPT
-            return Piece(self._run, first, self._per * self._step_s,
+            return Piece(self.run, first, self._per * self._step_s,
                          max(0, last_step) * self._step_s, self._step_s,
                          max(first, (last_step + 1) // self._per),
                          self._lows[slots], self._highs[slots], self._ends[slots],

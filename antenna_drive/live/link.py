@@ -8,7 +8,8 @@ wakes for each. Services and everything else are served in a second thread.
 """
 
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 import json
 import os
 from threading import Event, Thread
@@ -105,15 +106,13 @@ class DriveLink:
     def _listen(self) -> None:
         node = self._node
         for unit in _UNITS:
-            node.create_subscription(String, f'{unit}/changes', self._of(unit), CHANGES_QOS)
+            node.create_subscription(String, f'{unit}/changes', partial(self._changed, unit),
+                                     CHANGES_QOS)
         node.create_subscription(DiagnosticArray, '/diagnostics', self._diagnosed, 50)
         node.create_subscription(ParameterEvent, '/parameter_events', self._parameters_set, 100)
 
-    def _of(self, unit: str) -> Callable[[String], None]:
-        return lambda message: self._changed(unit, message.data)
-
-    def _changed(self, unit: str, text: str) -> None:
-        record = read_record(text)
+    def _changed(self, unit: str, message: String) -> None:
+        record = read_record(message.data)
         if record is None:
             return
         if SETTINGS in record:
@@ -183,11 +182,7 @@ class DriveLink:
         return all(client.service_is_ready() for client in self._clients.values())
 
     async def load(self, unit: str) -> None:
-        """
-        Ask a unit for its parameters, and post their table.
-
-        Raises UserError: it does not answer.
-        """
+        """Ask a unit for its parameters, and post their table; UserError if it does not answer."""
         listed = await ask(self._clients[unit, 'list_parameters'],
                            ListParameters.Request(), unit)
         names = sorted(name for name in listed.result.names

@@ -5,26 +5,21 @@
 import asyncio
 from collections.abc import Mapping, Sequence
 from datetime import datetime
-import os
 from pathlib import Path
 import re
-import signal
-import subprocess
 import sys
-import tempfile
 from threading import Lock
 from typing import Any
 
 from antenna_drive.article.experiments import experiments
 from antenna_drive.emulator.wiring import TEST_SIGNAL
 from antenna_drive.live.experiment_buttons import start_of
-from antenna_drive.lockstep.entry import choose_transport
 from antenna_drive.lockstep.processes import DriveProcesses, Parameter
-from simgap.command.programs import PARENT
 from simgap.errors import UserError
 
 # A recorder completes its bag within this [s]; after it, it is ended at once.
 _PATIENCE_S = 10.0
+_RECORDER = 'recorder'
 _NAME = re.compile(r'[A-Za-z0-9][\w.-]{0,80}')
 
 
@@ -34,16 +29,11 @@ class OwnDrive:
     def __init__(self, config: Sequence[str], parameters: Mapping[str, Mapping[str, Parameter]],
                  namespace: str = '', pace: float = 1.0) -> None:
         """Say what to start; `start` does it."""
-        self._config = tuple(config)
+        self.config = tuple(config)  # without the circuit of an experiment
         self._parameters = {unit: dict(values) for unit, values in parameters.items()}
         self._namespace = namespace
         self.pace = pace
         self._processes: DriveProcesses | None = None
-
-    @property
-    def config(self) -> tuple[str, ...]:
-        """Return the configuration files, without the circuit of an experiment."""
-        return self._config
 
     def start(self, experiment: str | None) -> None:
         """
@@ -53,13 +43,13 @@ class OwnDrive:
 
         Raises ParameterError: a configuration is not allowed.
         """
-        config = list(self._config)
+        config = list(self.config)
         parameters: dict[str, dict[str, Any]] = {
             unit: dict(values) for unit, values in self._parameters.items()}
         if experiment is not None:
             chosen = experiments()[experiment]
             config.append(chosen.circuit)
-            for unit, values in start_of(chosen, self._config).items():
+            for unit, values in start_of(chosen, self.config).items():
                 parameters.setdefault(unit, {}).update(values)
         parameters.setdefault(TEST_SIGNAL, {})['run.pace'] = self.pace
         self._processes = DriveProcesses(parameters, config=config, namespace=self._namespace)
@@ -79,7 +69,7 @@ class OwnDrive:
         """End the processes; takes up to five seconds."""
         processes, self._processes = self._processes, None
         if processes is not None:
-            processes.__exit__(None, None, None)
+            processes.__exit__()
 
 
 class RecorderProcess:
@@ -94,8 +84,7 @@ class RecorderProcess:
         """Record to bags in a folder."""
         self.folder = folder
         self._namespace = namespace
-        self._process: subprocess.Popen[bytes] | None = None
-        self._log: Any = None
+        self._processes: DriveProcesses | None = None
         self._stopping = Lock()
         self.path: Path | None = None
         self.said = ''
@@ -103,7 +92,8 @@ class RecorderProcess:
     @property
     def running(self) -> bool:
         """Return whether a recording is under way."""
-        return self._process is not None and self._process.poll() is None
+        own = self._processes
+        return own is not None and own.process(_RECORDER).poll() is None
 
     def start(self, name: str = '') -> Path:
         """
@@ -121,37 +111,24 @@ class RecorderProcess:
         if path.exists():
             raise UserError(f'{path}: exists already, choose another name')
         self.folder.mkdir(parents=True, exist_ok=True)
-        arguments = ['-p', f'out:={path}']
-        if self._namespace:
-            arguments += ['-r', f'__ns:={self._namespace}']
-        environment = {**os.environ, PARENT: str(os.getpid())}
-        choose_transport(environment)
-        self._log = tempfile.TemporaryFile()
-        self._process = subprocess.Popen(
-            [sys.executable, '-m', 'antenna_drive.nodes.recorder', '--ros-args', *arguments],
-            env=environment, stdin=subprocess.DEVNULL, stdout=self._log, stderr=self._log,
-            start_new_session=True)
+        self._processes = DriveProcesses(
+            {_RECORDER: {'out': str(path)}}, namespace=self._namespace, order=[_RECORDER],
+            commands={_RECORDER: [sys.executable, '-m', 'antenna_drive.nodes.recorder']})
+        self._processes.start()
         self.path, self.said = path, ''
         return path
 
     def stop(self) -> None:
         """Complete the bag; from any thread."""
         with self._stopping:
-            process = self._process
-            if process is None:
+            own = self._processes
+            if own is None:
                 return
-            if process.poll() is None:
-                process.send_signal(signal.SIGINT)
-            try:
-                process.wait(_PATIENCE_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-            self._log.seek(0)
-            lines = self._log.read().decode(errors='replace').strip().splitlines()
-            self._log.close()
+            own.stop(patience_s=_PATIENCE_S)
+            lines = own.log(_RECORDER).strip().splitlines()
             self.said = lines[-1].rpartition(']: ')[2] if lines else ''
-            self._process = None
+            own.__exit__()
+            self._processes = None
 
     def size(self) -> int:
         """Return how many bytes the recording has on disk."""

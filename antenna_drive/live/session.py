@@ -10,21 +10,25 @@ from typing import Any
 from antenna_drive.article.experiments import experiments
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.live.board import Board
-from antenna_drive.live.experiment_buttons import listed, plan, preview
+from antenna_drive.live.experiment_buttons import listed, Obtained, plan, preview
 from antenna_drive.live.link import DriveLink
-from antenna_drive.live.loading import recordings_in, thinned
-from antenna_drive.live.obtained import Obtained
 from antenna_drive.live.own_processes import off_the_loop, OwnDrive, RecorderProcess
 from antenna_drive.recording.files import read_recording
 from antenna_drive.recording.panels import PANELS
+from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import parse_sheet
 from antenna_drive.recording.sheet_signal import settings_for, settings_of
 from simgap.errors import UserError
 from simgap.inputs.schema import ParameterError
+from simgap.logs.channel import NANOSECONDS
+from simgap.report.curves import kept
 
 # How often nodes are looked after [s].
 _LOOK_S = 0.5
 _LONGEST_SPAN_S = 600.0
+# Samples of a recording's curve that are sent to the page, and recordings that it lists.
+MOST_SAMPLES = 20_000
+_MOST_LISTED = 100
 _RUN_SERVICES = ('pause', 'resume', 'step', 'reset')
 
 
@@ -233,3 +237,28 @@ def _mapping(message: Mapping[str, Any], key: str) -> dict[str, Any]:
     if not isinstance(value, dict) or not value:
         raise ParameterError(f'{key}: is missing')
     return value
+
+
+def thinned(recording: Recording, path: Path) -> dict[str, Any]:
+    """Return the signals that the charts show; times in seconds from the recording's start."""
+    names = [name for panel in PANELS for name in panel.names if name in recording]
+    curves = {}
+    for name in names:
+        channel = recording[name]
+        if len(channel):
+            chosen, _ = kept(channel.values, MOST_SAMPLES)
+            time = (channel.time_ns[chosen] - recording.start_ns) / NANOSECONDS
+            curves[name] = {'t': [round(float(t), 6) for t in time],
+                            'y': [float(f'{y:.7g}') for y in channel.values[chosen]]}
+    return {'name': path.name, 'path': str(path), 'duration': recording.duration_s,
+            'curves': curves}
+
+
+def recordings_in(folder: Path) -> list[str]:
+    """Return the bags and CSV files of a folder, the newest first."""
+    if not folder.is_dir():
+        return []
+    found = [item for item in folder.iterdir()
+             if item.suffix in ('.csv', '.mcap') or (item / 'metadata.yaml').exists()]
+    return [str(item) for item in sorted(
+        found, key=lambda item: item.stat().st_mtime, reverse=True)[:_MOST_LISTED]]

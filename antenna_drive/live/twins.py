@@ -77,11 +77,7 @@ class Twins:
         self._begins[name].publish(Empty())
 
     async def propose(self, name: str) -> str:
-        """
-        Ask a twin for the next test; return what it answers.
-
-        Raises UserError: there is no such twin, it does not answer, or it refuses.
-        """
+        """Ask a twin for the next test; return its answer; UserError if there is none."""
         if name not in self._proposes:
             raise UserError(f'{name[:80]}: no such twin')
         answer = await ask(self._proposes[name], Trigger.Request(), name)
@@ -90,11 +86,7 @@ class Twins:
         return str(answer.message)
 
     def next_test(self, name: str) -> Mapping[str, Any]:
-        """
-        Return the test sheet that a twin proposes, as plain data.
-
-        Raises UserError: there is none.
-        """
+        """Return the test sheet that a twin proposes, as plain data; UserError if none."""
         proposed = (self._told.get(name) or {}).get('next_test') or {}
         if not proposed.get('test'):
             raise UserError(f'{name[:80]}: proposes no test')

@@ -44,13 +44,13 @@ def is_record(record: object) -> bool:
     if not isinstance(record, Mapping):
         return False
     values = record.get(SETTINGS, record.get(CHANGES))
-    return (_is_count(record.get('run')) and 0 < record['run'] < LARGEST_RUN
-            and _is_count(record.get('step')) and 0 <= record['step'] < LARGEST_RUN
+    return (is_count(record.get('run')) and record['run'] > 0 and is_count(record.get('step'))
             and isinstance(values, Mapping) and _is_plain(values, _DEEPEST))
 
 
-def _is_count(value: object) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
+def is_count(value: object) -> bool:
+    """Return whether this is a whole number that may be a run or a step."""
+    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < LARGEST_RUN
 
 
 def _is_plain(value: object, deepest: int) -> bool:

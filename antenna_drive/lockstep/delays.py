@@ -76,6 +76,11 @@ class Delays:
         places = np.searchsorted(totals, wanted)
         return Percentiles(*(_SHORTEST_S * 2.0 ** (places / _PER_OCTAVE)).tolist())
 
+    def values(self, what: str) -> list[tuple[str, str]]:
+        """Return what /diagnostics says of them; `what` takes so long."""
+        return [(f'{what} p{percent:g} [ms]', f'{1e3 * delay_s:.3g}')
+                for percent, delay_s in zip(PERCENTILES, self.percentiles() or ())]
+
 
 # In Python a call of compiled code takes longer than the sum itself.
 _count = count.function  # type: ignore[attr-defined]

@@ -38,7 +38,7 @@ def leave(node: Node) -> None:
         node.destroy_node()
         return
     deadline = time.monotonic() + _PATIENCE_S
-    with _turn(f'antenna_drive/leaving/{context.get_domain_id()}', deadline):
+    with held(f'antenna_drive/leaving/{context.get_domain_id()}', deadline):
         before, now = None, _graph(node)
         while now != before and time.monotonic() < deadline:
             time.sleep(_QUIET_S)
@@ -55,19 +55,19 @@ def _graph(node: Node) -> object:
 
 
 @contextmanager
-def _turn(name: str, deadline: float) -> Iterator[None]:
-    """Be the only process in here, or one of several after the deadline."""
+def held(name: str, deadline: float = 0.0) -> Iterator[bool]:
+    """Hold a name on this machine once it is free; yield False if it is not by the deadline."""
     if sys.platform != 'linux':
-        yield
+        yield True
         return
     # A name in the abstract namespace is no file and vanishes with its process.
     with socket.socket(socket.AF_UNIX) as place:
-        while is_taken(place, name) and time.monotonic() < deadline:
+        while (taken := _is_taken(place, name)) and time.monotonic() < deadline:
             time.sleep(_LOOK_S)
-        yield
+        yield not taken
 
 
-def is_taken(place: socket.socket, name: str) -> bool:
+def _is_taken(place: socket.socket, name: str) -> bool:
     """Return whether another process has a name; if none has, the socket takes it."""
     try:
         place.bind(f'\0{name}')

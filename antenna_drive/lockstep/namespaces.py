@@ -15,13 +15,11 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 import os
 import secrets
-import socket
-import sys
 import time
 
 from antenna_drive.emulator.wiring import UNITS
 from antenna_drive.lockstep.entry import choose_transport
-from antenna_drive.lockstep.leaving import is_taken, leave
+from antenna_drive.lockstep.leaving import held, leave
 from rclpy.context import Context
 from rclpy.node import Node
 from simgap.errors import UserError
@@ -66,7 +64,7 @@ def drive_namespace(given: str | None, command: str, domain_id: int | None = Non
         context.try_shutdown()
         raise UserError(f'--namespace {given}: {error}') from error
     domain = context.get_domain_id()
-    with _held(f'antenna_drive/drive/{domain}{namespace}') as free:
+    with held(f'antenna_drive/drive/{domain}{namespace}') as free:
         try:
             found = _seen(node, namespace, units) if free else list(units)
         finally:
@@ -87,13 +85,3 @@ def _seen(node: Node, namespace: str, units: Collection[str]) -> list[str]:
         if found or time.monotonic() > deadline:
             return found
         time.sleep(_GLANCE_S)
-
-
-@contextmanager
-def _held(name: str) -> Iterator[bool]:
-    """Hold a name on this machine; yield whether it was free."""
-    if sys.platform != 'linux':
-        yield True
-        return
-    with socket.socket(socket.AF_UNIX) as place:
-        yield not is_taken(place, name)

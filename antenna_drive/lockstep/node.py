@@ -10,8 +10,7 @@ from types import MappingProxyType
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
 from antenna_drive.lockstep import compiled_loop, node_parameters, ros_parameters
-from antenna_drive.lockstep.changes import CHANGES, write_record
-from antenna_drive.lockstep.commands import Commanded
+from antenna_drive.lockstep.changes import CHANGES, SETTINGS
 from antenna_drive.lockstep.compiled_unit import form_of
 from antenna_drive.lockstep.conductor import Conductor
 from antenna_drive.lockstep.exchange import compile_ahead, Exchange
@@ -20,12 +19,11 @@ from antenna_drive.lockstep.node_parameters import ReadSheet
 from antenna_drive.lockstep.pace import Pace
 from antenna_drive.lockstep.partner import ANSWER, PartnerUnit
 from antenna_drive.lockstep.partner_link import Answer, PartnerLink
+from antenna_drive.lockstep.placement import lock_memory, schedule_first_in_first_out
 from antenna_drive.lockstep.rcl_channel import RclChannel, Unusable
-from antenna_drive.lockstep.readings import ChangeRecord, Readings
-from antenna_drive.lockstep.realtime import lock_memory, schedule_first_in_first_out
-from antenna_drive.lockstep.reception import Reception
+from antenna_drive.lockstep.readings import ChangeRecord, Commanded, Readings
 from antenna_drive.lockstep.report import Report
-from antenna_drive.lockstep.ros_link import FrameLink
+from antenna_drive.lockstep.ros_link import FrameLink, Reception
 from antenna_drive.lockstep.run_services import RunServices, StateReader
 from antenna_drive.lockstep.serving import Serving
 from antenna_drive.lockstep.sim_time import SimTime
@@ -233,11 +231,7 @@ class DriveNode:
                 self._channel.close()
 
     def _exchanged(self, exchange: Exchange) -> bool:
-        """
-        Let the compiled exchange make the steps that it can make.
-
-        Returns False if something is due that only Python does.
-        """
+        """Let the compiled exchange make steps; return False if only Python can do what is due."""
         member, pace = self._member, self._pace
         exchange.listen()
         services = self._services
@@ -316,8 +310,7 @@ class DriveNode:
 
     def _note_changes(self, changes: Mapping[str, Value]) -> None:
         member = self._member
-        self._record.add(member.run, member.step, changes)
-        self._report.last_change = write_record(member.run, member.step, CHANGES, changes)
+        self._report.last_change = self._record.add(member.run, member.step, CHANGES, changes)
 
     def _publish(self, outputs: FloatArray) -> None:
         member = self._member
@@ -344,7 +337,7 @@ class DriveNode:
         self._every = self._readings.every(member.step_s)
         if self._partner is not None:
             self._partner.begin()
-        self._record.begin(member.run, {
+        self._record.add(member.run, 0, SETTINGS, {
             name: value for name, (_, value) in self._unit.settings().items()})
         self._node.get_logger().info(
             f'run {member.run:.0f} begins, macro-step {member.step_s:g} s')

@@ -15,7 +15,6 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 import os
 import time
-from types import TracebackType
 from typing import Any
 
 from antenna_drive.emulator.unit import FloatArray, Signal, Unit
@@ -23,10 +22,9 @@ from antenna_drive.emulator.wiring import OUTPUTS
 from antenna_drive.lockstep.changes import read_record
 from antenna_drive.lockstep.entry import choose_transport
 from antenna_drive.lockstep.frame import NO_RUN, two_of_one_name
-from antenna_drive.lockstep.guest import Guest
 from antenna_drive.lockstep.inbox import Frame
 from antenna_drive.lockstep.leaving import leave
-from antenna_drive.lockstep.member import Member
+from antenna_drive.lockstep.member import Guest, Member
 from antenna_drive.lockstep.readings import CHANGES_QOS
 from antenna_drive.lockstep.ros_link import FRAME_QOS, FrameLink
 from antenna_drive.lockstep.run_control import PAUSED
@@ -71,6 +69,7 @@ class Observer:
 
     Use it as a context manager; `spin` does the work, in the thread that calls it.
 
+    node : of the observer
     names : the signals, 'unit/signal', in the order of the rows given to `on_step`
     """
 
@@ -99,14 +98,14 @@ class Observer:
         self._on_begin = on_begin
         context = Context()
         context.init(args=[], domain_id=domain_id)
-        self._node = Node(name, namespace=namespace, context=context)
+        self.node = Node(name, namespace=namespace, context=context)
         birth = float(time.time_ns() // 1000)
         reader = _Reader(name, self.names, on_step)
         self._member = Guest(reader, outputs) if guest else Member(reader, birth, outputs)
         self._begun = (0.0, 0)
         self._told = -1
-        self._link = FrameLink(self._node, self._member.layouts)
-        self._state = StateReader(self._node, self._member.conductor)
+        self._link = FrameLink(self.node, self._member.layouts)
+        self._state = StateReader(self.node, self._member.conductor)
         # frames of the conductor that were taken before there was room for them
         self._ahead: deque[Frame] = deque()
         self._serving: Serving | None = None
@@ -122,13 +121,8 @@ class Observer:
                 if record is not None:
                     on_change(unit, record)
 
-            self._node.create_subscription(String, f'{unit}/changes', pass_on, CHANGES_QOS)
-        self._serving = Serving(self._node)
-
-    @property
-    def node(self) -> Node:
-        """Return the observer's node."""
-        return self._node
+            self.node.create_subscription(String, f'{unit}/changes', pass_on, CHANGES_QOS)
+        self._serving = Serving(self.node)
 
     @property
     def lost(self) -> str:
@@ -246,13 +240,12 @@ class Observer:
         """Leave the drive."""
         if self._serving is not None:
             self._serving.close()
-        leave(self._node)
+        leave(self.node)
 
     def __enter__(self) -> Observer:
         """Return the observer."""
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 traceback: TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         """Leave the drive."""
         self.close()

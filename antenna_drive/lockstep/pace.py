@@ -18,6 +18,7 @@ class Pace:
     may be made `lead_s` earlier, so that a process which has to wait for the machine makes none
     late. A step that comes late is counted and made all the same; the next ones catch up.
 
+    begun : whether the timetable has begun
     factor : how many times faster than real time; 0 for as fast as possible
     lead_s : how long before it is due a step may be made [s]
     late_steps : steps of this run that came more than one step's time after they were due
@@ -37,25 +38,20 @@ class Pace:
         self.late_steps = 0
         self.worst_s = 0.0
         self.delays.clear()
-        self._begun = False
+        self.begun = False
         self._start = 0.0
         self._first_step = 0
 
     def change(self, factor: float, now: float, step: int) -> None:
         """Go on at another pace from `step`, which is made at `now` [s]."""
         self.factor = factor
-        if self._begun:
+        if self.begun:
             self._anchor(step, now)
 
     def _anchor(self, step: int, now: float) -> None:
-        self._begun = True
+        self.begun = True
         self._start = now
         self._first_step = step
-
-    @property
-    def begun(self) -> bool:
-        """Return whether the timetable has begun."""
-        return self._begun
 
     @property
     def timetable(self) -> tuple[float, int]:
@@ -68,13 +64,13 @@ class Pace:
 
     def remaining(self, step: int, step_s: float, now: float) -> float:
         """Return how long it is until `step` may be made [s], zero or less if it may."""
-        if self.factor == 0.0 or not self._begun:
+        if self.factor == 0.0 or not self.begun:
             return 0.0
         return self.due(step, step_s) - self.lead_s - now
 
     def note(self, step: int, step_s: float, now: float) -> None:
         """Note that `step` was made at `now`: the first begins the timetable, late ones count."""
-        if not self._begun:
+        if not self.begun:
             self._anchor(step, now)
         elif self.factor > 0.0:
             after_s = now - self.due(step, step_s)

@@ -11,7 +11,6 @@ that is answered, value of each output].
 from collections.abc import Callable
 import time
 
-from antenna_drive.lockstep.delays import PERCENTILES
 from antenna_drive.lockstep.member import Member
 from antenna_drive.lockstep.partner import Answers, NO_STEP, PartnerUnit, STOP, ZERO
 from antenna_drive.lockstep.readings import READING_QOS
@@ -131,8 +130,7 @@ class PartnerLink:
             ('answered step', str(answers.of_step)),
             ('age of the answer [steps]', str(answers.age)), ('misses', str(answers.misses)),
             ('steps overdue', str(answers.overdue(self._member.step))),
-            *((f'round trip p{percent:g} [ms]', f'{1e3 * delay_s:.3g}')
-              for percent, delay_s in zip(PERCENTILES, answers.round_trips.percentiles() or ()))]
+            *answers.round_trips.values('round trip')]
 
     def summary(self) -> str:
         """Say in words how the partner kept its deadline."""

@@ -12,7 +12,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from types import TracebackType
 from typing import IO
 
 from antenna_drive.emulator.wiring import find, TEST_SIGNAL
@@ -110,11 +109,7 @@ class DriveProcesses:
         return os.pread(log.fileno(), os.fstat(log.fileno()).st_size, 0).decode(errors='replace')
 
     def check(self) -> None:
-        """
-        Make sure that all processes run.
-
-        Raises UserError: one has ended by itself; the message is its last line.
-        """
+        """Make sure that all processes run; UserError has the last line of one that has ended."""
         for unit, process in self._processes.items():
             status = process.poll()
             if status is not None:
@@ -127,12 +122,13 @@ class DriveProcesses:
         self._processes[unit].kill()
         self._processes[unit].wait()
 
-    def stop(self, number: signal.Signals = signal.SIGINT) -> dict[str, int]:
+    def stop(self, number: signal.Signals = signal.SIGINT,
+             patience_s: float = END_PATIENCE_S) -> dict[str, int]:
         """End all processes. Returns the exit code by unit; -9 if a process had to be killed."""
         for process in self._processes.values():
             if process.poll() is None:
                 process.send_signal(number)
-        deadline = time.monotonic() + END_PATIENCE_S
+        deadline = time.monotonic() + patience_s
         codes: dict[str, int] = {}
         for unit, process in self._processes.items():
             try:
@@ -147,8 +143,7 @@ class DriveProcesses:
         self.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 traceback: TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         """End all processes."""
         self.stop()
         for log in self._logs.values():

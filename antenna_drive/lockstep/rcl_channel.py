@@ -21,7 +21,7 @@ from typing import Any
 from antenna_drive.lockstep.compiled_loop import MESSAGE_WORDS
 from antenna_drive.lockstep.frame import FrameLayout
 from antenna_drive.lockstep.readings import Readings
-from antenna_drive.lockstep.ros_link import FRAME_QOS, FrameLink, NotForExecutors, read_message
+from antenna_drive.lockstep.ros_link import FRAME_QOS, FrameLink, read_message, unserved
 import numpy as np
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
@@ -62,11 +62,7 @@ class RclChannel:
     """A node's frames and readings as rcl's C functions carry them; see `exchange.Channel`."""
 
     def __init__(self, node: Node, link: FrameLink, readings: Readings) -> None:
-        """
-        Look everything up and check it, for a node's frames and readings.
-
-        Raises Unusable: something is not as expected.
-        """
+        """Look everything up for a node's frames and readings, and check it; or Unusable."""
         _check_platform()
         rcl, rcutils, libc = _loaded('rcl'), _loaded('rcutils'), ctypes.CDLL(None)
         self.calls: Mapping[str, int] = {
@@ -131,9 +127,7 @@ class RclChannel:
         """Send a frame to ourselves, with the functions that will carry all others."""
         topic = f'{node.get_name()}/_exchange_check'
         publisher = node.create_publisher(Float64MultiArray, topic, FRAME_QOS)
-        subscription = node.create_subscription(
-            Float64MultiArray, topic, lambda message: None, FRAME_QOS, raw=True,
-            callback_group=NotForExecutors())
+        subscription = unserved(node, Float64MultiArray, topic, FRAME_QOS, raw=True)
         try:
             frame = FrameLayout(()).encode(1.0, 2, 3.0, 4.0)
             with publisher.handle, subscription.handle:

@@ -1,17 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""What people and plotters read: one topic per signal at a decimated rate, clock, changes."""
+"""What people and plotters read and command: a topic per signal, clock, changes, settings."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 import struct
 from typing import Any
 
 from antenna_drive.emulator.unit import FloatArray, Signal
-from antenna_drive.lockstep.changes import CHANGES, SETTINGS, write_record
+from antenna_drive.lockstep.changes import write_record
 from antenna_drive.lockstep.compiled_loop import TIME
 from antenna_drive.lockstep.frame import READING_PREFIX
+from antenna_drive.lockstep.ros_link import remembered
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rosgraph_msgs.msg import Clock
 from simgap.inputs.schema import Value
@@ -22,8 +23,7 @@ READING_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 READING_OVERRIDES = QoSOverridingOptions.with_default_policies()
 
 # A late subscriber still gets the changes of the run in progress.
-CHANGES_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE,
-                         durability=DurabilityPolicy.TRANSIENT_LOCAL)
+CHANGES_QOS = remembered(1000)
 
 _FLOAT64 = struct.Struct('<4sd')
 _CLOCK = struct.Struct('<4siI')
@@ -43,19 +43,18 @@ class Readings:
         amperes : real amperes per article ampere, to publish `<node>/armature_current` [real A]
             beside `<node>/current`; None for not
         """
-        name = node.get_name()
+        def advertise(kind: Any, topic: str) -> Any:
+            return node.create_publisher(kind, topic, READING_QOS,
+                                         qos_overriding_options=READING_OVERRIDES)
+
         self.rate_hz = rate_hz
-        self._rows = [(row, 1.0, node.create_publisher(
-            Float64, f'{name}/{signal.name}', READING_QOS,
-            qos_overriding_options=READING_OVERRIDES)) for row, signal in enumerate(signals)]
-        names = [signal.name for signal in signals]
-        if amperes is not None and 'current' in names:
-            self._rows.append((names.index('current'), amperes, node.create_publisher(
-                Float64, f'{name}/armature_current', READING_QOS,
-                qos_overriding_options=READING_OVERRIDES)))
-        self._clock = node.create_publisher(
-            Clock, 'clock', READING_QOS,
-            qos_overriding_options=READING_OVERRIDES) if with_clock else None
+        rows = [(row, 1.0, signal.name) for row, signal in enumerate(signals)]
+        if amperes is not None:
+            rows += [(row, amperes, 'armature_current') for row, _, name in rows
+                     if name == 'current']
+        self._rows = [(row, scale, advertise(Float64, f'{node.get_name()}/{name}'))
+                      for row, scale, name in rows]
+        self._clock = advertise(Clock, 'clock') if with_clock else None
 
     def routes(self) -> list[tuple[int, float, Any]]:
         """Return row, scale and publisher handle of each reading; TIME is the clock's row."""
@@ -90,13 +89,49 @@ class ChangeRecord:
         self._publisher = node.create_publisher(
             String, f'{node.get_name()}/changes', CHANGES_QOS)
 
-    def begin(self, run: float, settings: Mapping[str, Value]) -> None:
-        """Record what is in force as a run begins."""
-        self._publish(run, 0, SETTINGS, settings)
+    def add(self, run: float, step: int, key: str, values: Mapping[str, Value]) -> str:
+        """Record the SETTINGS or CHANGES that take effect at `step`; return the text."""
+        text = write_record(run, step, key, values)
+        self._publisher.publish(String(data=text))
+        return text
 
-    def add(self, run: float, step: int, changes: Mapping[str, Value]) -> None:
-        """Record changes that take effect at `step`."""
-        self._publish(run, step, CHANGES, changes)
 
-    def _publish(self, run: float, step: int, key: str, values: Mapping[str, Value]) -> None:
-        self._publisher.publish(String(data=write_record(run, step, key, values)))
+class Commanded:
+    """
+    Lets a live setting of a unit follow the Float64 topic `<node>/<setting>`.
+
+    A value that is refused leaves the one of before in force. The first of several is said in the
+    log.
+
+    refused : how many values have been refused
+    """
+
+    def __init__(self, node: Node, setting: str, limit: float,
+                 change: Callable[[dict[str, Value]], str]) -> None:
+        """
+        Follow the topic.
+
+        node, setting : the node of the unit, and the name of the setting
+        limit : the greatest magnitude that is taken
+        change : asks for changes; returns why they are refused, or ''
+        """
+        self.refused = 0
+        self._setting, self._limit = setting, limit
+        self._change = change
+        self._log = node.get_logger()
+        self._told = False
+        node.create_subscription(Float64, f'{node.get_name()}/{setting}', self._follow,
+                                 READING_QOS, qos_overriding_options=READING_OVERRIDES)
+
+    def _follow(self, message: Float64) -> None:
+        value = message.data
+        if abs(value) > self._limit:
+            reason = (f'{self._setting}: {value:g} given, allowed is {-self._limit:.4g} to '
+                      f'{self._limit:.4g}, or more with -p run.{self._setting}_limit:=...')
+        else:
+            reason = self._change({self._setting: value})
+        if reason:
+            self.refused += 1
+            if not self._told:
+                self._log.warning(f'{reason}. The value of before stays in force')
+        self._told = bool(reason)

@@ -4,24 +4,20 @@
 
 from collections.abc import Callable
 
-from antenna_drive.lockstep.commands import Commanded
 from antenna_drive.lockstep.conductor import Conductor
-from antenna_drive.lockstep.delays import PERCENTILES
-from antenna_drive.lockstep.diagnostics import diagnostics
 from antenna_drive.lockstep.exchange import Exchange
 from antenna_drive.lockstep.frame import two_of_one_name
 from antenna_drive.lockstep.member import Member
-from antenna_drive.lockstep.namesakes import LEASE_S, namesake
 from antenna_drive.lockstep.pace import Pace
 from antenna_drive.lockstep.partner_link import PartnerLink
+from antenna_drive.lockstep.readings import Commanded
 from antenna_drive.lockstep.run_control import PAUSED, RunState
 from antenna_drive.lockstep.shared_memory import is_cut_off
+from antenna_drive.lockstep.starting import diagnostics, LEASE_S, namesake, PATIENCE_S
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
 PERIOD_S = 1.0
-# A wait is reported after this.
-PATIENCE_S = 0.9
 CUT_OFF = ('; it cannot hear them: it did not run for a second or more, and Fast DDS gave its '
            'shared memory away. Start this node again')
 # A wait that begins so soon after a sleep may be its consequence.
@@ -61,7 +57,7 @@ class Report:
         self.exchange: Exchange | None = None
         self.partner: PartnerLink | None = None
         # what the conductor says of its run; in the conductor itself, what it is
-        self.told_state: Callable[[], RunState | None] = _unknown
+        self.told_state: Callable[[], RunState | None] = lambda: None
         self._excused_s = 0.0
 
     def stepped(self) -> None:
@@ -228,8 +224,7 @@ class Report:
             values.append(('pace', repr(self._pace.factor)))
             values.append(('late steps', str(self._pace.late_steps)))
             values.append(('latest step [ms]', f'{1e3 * self._pace.worst_s:.3g}'))
-            values += [(f'delay p{percent:g} [ms]', f'{1e3 * delay_s:.3g}') for percent, delay_s
-                       in zip(PERCENTILES, self._pace.delays.percentiles() or ())]
+            values += self._pace.delays.values('delay')
         values.append(('exchange', 'compiled' if self.exchange else 'Python'))
         if self.exchange:
             values.append(('compiled steps', str(self.exchange.steps)))
@@ -243,7 +238,3 @@ def forgotten(slept_s: float) -> str:
     """Say what to do if a node waits on after it did not run for `slept_s` [s]."""
     return (f'; this node did not run for {slept_s:.0f} s, and others forget a process after '
             f'{LEASE_S:.0f} s. If this lasts, start it again')
-
-
-def _unknown() -> None:
-    return None

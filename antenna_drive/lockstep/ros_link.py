@@ -13,33 +13,31 @@ from contextlib import suppress
 from typing import Any
 
 from antenna_drive.limits import FRAME
+from antenna_drive.lockstep.exchange import BRIEF_WAIT_S
 from antenna_drive.lockstep.frame import FrameLayout, read_foreign
-from antenna_drive.lockstep.member import MEMORY
+from antenna_drive.lockstep.member import Member, MEMORY
 from antenna_drive.physics.arrays import FloatArray
 import numpy as np
 from rclpy.callback_groups import CallbackGroup
 from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Float64MultiArray
 
-# One second of frames at 1 kHz. Transient local: a late subscriber still gets frame 0.
-FRAME_QOS = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST,
-    depth=MEMORY,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
+
+def remembered(depth: int) -> QoSProfile:
+    """Return the quality of service with which a late subscriber gets the last messages too."""
+    return QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE,
+                      durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+# One second of frames at 1 kHz, frame 0 for a late subscriber.
+FRAME_QOS = remembered(MEMORY)
 # Fast DDS sorts what waits to be taken by the time of its sender's clock and drops the oldest. If
 # that clock was set back, the newest frame is the oldest to a reader that is full of what a sender
 # remembers. A reader has room for all of that and as much again.
-READ_QOS = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST,
-    depth=2 * FRAME_QOS.depth,
-    reliability=FRAME_QOS.reliability,
-    durability=FRAME_QOS.durability,
-)
+READ_QOS = remembered(2 * MEMORY)
 
 
 class NotForExecutors(CallbackGroup):  # type: ignore[misc]
@@ -55,6 +53,12 @@ class NotForExecutors(CallbackGroup):  # type: ignore[misc]
         pass
 
 
+def unserved(node: Node, kind: Any, topic: str, qos: QoSProfile, raw: bool = False) -> Any:
+    """Return a subscription whose messages are taken when they are asked for."""
+    return node.create_subscription(kind, topic, _never_called, qos, raw=raw,
+                                    callback_group=NotForExecutors())
+
+
 class FrameLink:
     """A node's frames out, its peers' frames in, and the wait in between."""
 
@@ -63,16 +67,13 @@ class FrameLink:
         self._layouts = dict(layouts)
         self._publisher = node.create_publisher(
             Float64MultiArray, f'{node.get_name()}/frame', FRAME_QOS)
-        self._group = NotForExecutors()
         self._subscriptions = {
-            peer: node.create_subscription(
-                Float64MultiArray, f'{peer}/frame', _never_called, READ_QOS,
-                callback_group=self._group, raw=True)
+            peer: unserved(node, Float64MultiArray, f'{peer}/frame', READ_QOS, raw=True)
             for peer in self._layouts}
         self._handles = {peer: item.handle for peer, item in self._subscriptions.items()}
         self._ways = {peer: (handle.take_message, self._layouts[peer].decode)
                       for peer, handle in self._handles.items()}
-        self._guard = node.create_guard_condition(_nothing, callback_group=self._group)
+        self._guard = node.create_guard_condition(lambda: None, callback_group=NotForExecutors())
         self._guard_handle = self._guard.handle
         context = node.context.handle
         assert context is not None
@@ -166,8 +167,54 @@ def read_message(message: bytes) -> tuple[float, ...]:
 
 
 def _never_called(message: Any) -> None:
-    raise AssertionError('frames are taken by the lock-step thread alone')
+    raise AssertionError('messages are taken by who asks for them, alone')
 
 
-def _nothing() -> None:
-    pass
+class Reception:
+    """Takes frames of a member's peers from the link."""
+
+    def __init__(self, link: FrameLink, member: Member, paced: bool) -> None:
+        """Take frames for a member; `paced` says that a step may wait for the clock alone."""
+        self._link = link
+        self._member = member
+        self._paced = paced
+
+    def gather(self) -> bool:
+        """
+        Take a frame of each peer that the next step waits for.
+
+        Returns False if a wait for something else is called for: one of them takes its time, or
+        the next step waits for nobody but the clock.
+        """
+        member = self._member
+        link = self._link
+        missing = member.missing()
+        # One peer at a time: a wait costs something for each that it looks at, and to be woken
+        # by each in turn costs most.
+        for peer in missing:
+            frame = link.take(peer)
+            if frame is None:
+                link.wait_for(peer, BRIEF_WAIT_S)
+                frame = link.take(peer)
+                if frame is None:
+                    return False
+                if peer is not missing[0]:
+                    # While the slowest is waited for, the frames of the others come.
+                    member.inbox.put_first(peer)
+            member.receive(peer, frame)
+        return bool(missing) or not self._paced
+
+    def take_some(self, peer: str) -> None:
+        """
+        Take all frames of an observer; those of a peer that steps up to the first not refused.
+
+        For as long as frames come, the conductor begins no new run. One a turn would be too few:
+        whoever speaks in a peer's name may send more than that, and an observer may have reported
+        each of hundreds of steps.
+        """
+        member = self._member
+        while (frame := self._link.take(peer)) is not None:
+            refused = member.inbox.refused.total()
+            member.receive(peer, frame)
+            if peer in member.inbox.stepping and member.inbox.refused.total() == refused:
+                break

@@ -53,7 +53,7 @@ class Tuning:
         self._unit = unit
         self._queue: deque[_Request] = deque()
         self._lock = Lock()  # held while changes are put in force or withdrawn
-        self.wake: Callable[[], None] = _nothing
+        self.wake: Callable[[], None] = lambda: None
 
     @property
     def pending(self) -> bool:
@@ -124,11 +124,7 @@ class Overrides:
         self.own: dict[str, tuple[Entry, Value]] = {}
 
     def get(self, name: str, entry: Entry, default: Value) -> Value:
-        """
-        Return the value given for a parameter, or its default.
-
-        Raises ParameterError: the value given is not allowed.
-        """
+        """Return a parameter's value or default; ParameterError if it is not allowed."""
         self._asked.add(name)
         value = entry.check(name, self._values[name]) if name in self._values else default
         self.own[name] = (entry, value)
@@ -238,7 +234,3 @@ def _plain(value: Any) -> Any:
 
 def _ros_value(value: Value) -> Any:
     return list(value) if isinstance(value, tuple) else value
-
-
-def _nothing() -> None:
-    pass

@@ -10,9 +10,9 @@ The states and what `pause`, `step` and `reset` mean are those of simulation_int
 from collections.abc import Callable
 import json
 from threading import Condition
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from antenna_drive.lockstep.frame import LARGEST_RUN
+from antenna_drive.lockstep.changes import is_count
 
 STOPPED, PLAYING, PAUSED = 'stopped', 'playing', 'paused'
 STATES = (STOPPED, PLAYING, PAUSED)
@@ -49,12 +49,8 @@ def read_state(text: str) -> RunState | None:
     if not isinstance(found, dict) or found.keys() != set(RunState._fields):
         return None
     state = RunState(**found)
-    return state if (state.state in STATES and _is_count(state.run)
-                     and _is_count(state.step)) else None
-
-
-def _is_count(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < LARGEST_RUN
+    return state if (state.state in STATES and is_count(state.run)
+                     and is_count(state.step)) else None
 
 
 class RunControl:
@@ -64,36 +60,29 @@ class RunControl:
     The lock-step thread asks `holds` before each step and tells what has come of it with
     `stands`, `begun` and `ended`. The methods that ask return why the request is refused, or ''
     when it is in force.
+
+    paused : whether the drive is paused or on its way there
+    reset_wanted : whether a new run was asked for
     """
 
     def __init__(self, patience_s: float) -> None:
         """Let requests wait for the lock-step thread for this long [s]."""
         self._patience_s = patience_s
         self._changed = Condition()
-        self._paused = False
+        self.paused = False
         self._until = 0
         self._standing: int | None = None
         self._begun = 0
-        self._reset = False
-
-    @property
-    def paused(self) -> bool:
-        """Return whether the drive is paused or on its way there."""
-        return self._paused
+        self.reset_wanted = False
 
     @property
     def halt(self) -> int:
         """Return the step after which a stepping drive is paused again, 0 for none."""
-        return self._until if self._paused else 0
-
-    @property
-    def reset_wanted(self) -> bool:
-        """Return whether a new run was asked for."""
-        return self._reset
+        return self._until if self.paused else 0
 
     def holds(self, step: int) -> bool:
         """Return whether no step is to be made after `step`."""
-        return self._paused and step >= self._until
+        return self.paused and step >= self._until
 
     def stands(self, step: int) -> bool:
         """Note that the drive stands still at `step`; return whether that is news."""
@@ -109,7 +98,7 @@ class RunControl:
     def begun(self) -> None:
         """Note that a run has begun: a paused drive stands still at its step 0."""
         with self._changed:
-            self._reset = False
+            self.reset_wanted = False
             self._until = 0
             self._standing = None
             self._begun += 1
@@ -122,8 +111,8 @@ class RunControl:
         wake : makes the lock-step thread look
         """
         with self._changed:
-            if not self._paused:
-                self._paused = True
+            if not self.paused:
+                self.paused = True
                 self._standing = None
             self._until = 0
             return self._wait(wake, lambda: self._standing is not None, 'come to its next step')
@@ -131,9 +120,9 @@ class RunControl:
     def resume(self) -> str:
         """Go on with the run."""
         with self._changed:
-            if not self._paused:
+            if not self.paused:
                 return 'the drive is not paused'
-            self._paused = False
+            self.paused = False
             self._standing = None
         return ''
 
@@ -145,7 +134,7 @@ class RunControl:
         wake, patience_s : see `pause`; after that time the steps go on to be made
         """
         with self._changed:
-            if not self._paused or self._standing is None:
+            if not self.paused or self._standing is None:
                 return 'steps can be made in a paused run only: call pause first'
             self._until = self._standing + count
             self._standing = None
@@ -157,7 +146,7 @@ class RunControl:
         """Begin a new run; return when it has begun. A paused drive stays paused."""
         with self._changed:
             before = self._begun
-            self._reset = True
+            self.reset_wanted = True
             return self._wait(wake, lambda: self._begun > before, 'heard from all its nodes')
 
     def _wait(self, wake: Callable[[], None], done: Callable[[], bool], what: str) -> str:

@@ -13,22 +13,20 @@ from typing import Any
 from antenna_drive.lockstep.conductor import Conductor
 from antenna_drive.lockstep.node_parameters import ReadSheet, SHEET
 from antenna_drive.lockstep.pace import Pace
-from antenna_drive.lockstep.ros_link import NotForExecutors
+from antenna_drive.lockstep.ros_link import remembered, unserved
 from antenna_drive.lockstep.ros_parameters import PATIENCE_S
 from antenna_drive.lockstep.run_control import (
     PAUSED, PLAYING, read_state, RunControl, RunState, STOPPED,
 )
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from simgap.errors import UserError
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 TOPIC = 'run_state'
 # Whoever comes late hears the state that is in force.
-STATE_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
-                       durability=DurabilityPolicy.TRANSIENT_LOCAL)
+STATE_QOS = remembered(1)
 
 # `step` answers after this at the latest [s]: parameters are served by the same thread.
 STEP_PATIENCE_S = 1.0
@@ -145,9 +143,7 @@ class StateReader:
 
     def __init__(self, node: Node, conductor: str) -> None:
         """Listen to `<conductor>/run_state`."""
-        self._subscription = node.create_subscription(
-            String, f'{conductor}/{TOPIC}', _never_called, STATE_QOS,
-            callback_group=NotForExecutors())
+        self._subscription = unserved(node, String, f'{conductor}/{TOPIC}', STATE_QOS)
         self._last: RunState | None = None
 
     def latest(self) -> RunState | None:
@@ -155,7 +151,3 @@ class StateReader:
         while (taken := self._subscription.handle.take_message(String, False)) is not None:
             self._last = read_state(taken[0].data) or self._last
         return self._last
-
-
-def _never_called(message: Any) -> None:
-    raise AssertionError('states are read when they are asked for')

@@ -12,13 +12,13 @@ from typing import Any
 from antenna_drive.emulator.wiring import MOTORS, OUTPUTS, PLANT
 from antenna_drive.lockstep.changes import read_record, SETTINGS
 from antenna_drive.lockstep.entry import ros_node, stopped_by_signals
+from antenna_drive.lockstep.following import Thinned, Thinning
 from antenna_drive.lockstep.frame import FrameLayout
 from antenna_drive.lockstep.readings import CHANGES_QOS, READING_OVERRIDES, READING_QOS
 from antenna_drive.lockstep.ros_link import FrameLink
 from antenna_drive.lockstep.ros_parameters import Overrides
 from antenna_drive.lockstep.serving import Serving
 from antenna_drive.lockstep.starting import Absence
-from antenna_drive.lockstep.thinning import Thinned, Thinning
 from builtin_interfaces.msg import Time
 from rclpy.node import Node
 from sensor_msgs.msg import JointState

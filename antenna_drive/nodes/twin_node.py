@@ -16,20 +16,17 @@ import time
 from typing import Any
 
 from antenna_drive.diagnosis.tuned import loaded, tuned
-from antenna_drive.lockstep.diagnostics import diagnostics
 from antenna_drive.lockstep.entry import ros_node, stopped_by_signals
-from antenna_drive.lockstep.getting_ready import told_while_compiling
 from antenna_drive.lockstep.ros_parameters import Overrides
 from antenna_drive.lockstep.run_services import STATE_QOS
 from antenna_drive.lockstep.serving import Serving
-from antenna_drive.lockstep.starting import say_ready
+from antenna_drive.lockstep.starting import diagnostics, say_ready, told_while_compiling
 from antenna_drive.parameters.loading import load
 from antenna_drive.readings import RATE_COMMAND, SIGNALS
 from antenna_drive.recording.sheet import load_sheet, TestSheet
 from antenna_drive.twin import watch
 from antenna_drive.twin.baseline import Baseline
-from antenna_drive.twin.growing import GrowingVerdict
-from antenna_drive.twin.proposing import NextTest
+from antenna_drive.twin.growing import GrowingVerdict, NextTest
 from antenna_drive.twin.regular_stamps import RegularSamples
 from antenna_drive.twin.topics import load_topics, own_topics, Topic, TopicMap
 from antenna_drive.twin.watch import Twin, TwinSettings

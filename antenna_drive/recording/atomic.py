@@ -15,11 +15,7 @@ from simgap.logs.channel import RecordingError
 
 
 def refuse_existing(path: Path) -> None:
-    """
-    Check that nothing is in the place of a new file or folder.
-
-    Raises RecordingError: there is something.
-    """
+    """Raise RecordingError if something is in the place of a new file or folder."""
     if path.exists() or path.is_symlink():
         raise RecordingError(f'{path}: exists already; remove it or choose another name')
 
@@ -30,11 +26,7 @@ def refuse_io(path: Path, error: OSError) -> RecordingError:
 
 
 def sync_folder(path: Path) -> None:
-    """
-    Make the disk hold the names of the files in a folder, and of the folder.
-
-    Raises OSError: it cannot be done.
-    """
+    """Make the disk hold the names of a folder and of the files in it; OSError if it cannot."""
     for folder in (path, path.absolute().parent):
         handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
         try:
@@ -45,11 +37,7 @@ def sync_folder(path: Path) -> None:
 
 @contextmanager
 def new_file(path: Path) -> Iterator[IO[bytes]]:
-    """
-    Give a stream that becomes the file `path` at the end, if all went well.
-
-    Raises RecordingError: the file exists already or cannot be written.
-    """
+    """Give a stream that becomes a new file if all goes well; RecordingError if it cannot."""
     refuse_existing(path)
     try:
         with drafted(path, refuse_existing) as stream:
@@ -60,11 +48,7 @@ def new_file(path: Path) -> Iterator[IO[bytes]]:
 
 @contextmanager
 def new_folder(path: Path) -> Iterator[Path]:
-    """
-    Give a folder that becomes `path` at the end, if all went well.
-
-    Raises RecordingError: there is something at `path` already, or it cannot be written.
-    """
+    """Give a folder that becomes `path` if all goes well; RecordingError if it cannot."""
     refuse_existing(path)
     try:
         draft = Path(tempfile.mkdtemp(dir=path.parent, prefix=f'.{path.name}.'))

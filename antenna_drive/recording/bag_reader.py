@@ -72,11 +72,7 @@ def read_bag(path: str | Path, *, partial: bool = False) -> Recording:
 
 
 def message_counts(path: Path) -> dict[str, int]:
-    """
-    Return how many messages of each topic the description of a bag tells of.
-
-    Raises RecordingError: it is no bag, or it has no description.
-    """
+    """Return a bag's messages by topic as it tells; RecordingError if it does not."""
     counts = _files(path)[1]
     if not counts:
         raise RecordingError(f'{path}: holds no description of its messages')

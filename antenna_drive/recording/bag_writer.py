@@ -19,15 +19,13 @@ import os
 from pathlib import Path
 import struct
 import time
-from types import TracebackType
 from typing import Any
 
 from antenna_drive.recording.atomic import new_folder, refuse_existing, refuse_io, sync_folder
 from antenna_drive.recording.bag import (
-    CDR_HEADER, CHANGE, CONFIGURATION, FORMAT, FORMAT_VERSION, MESSAGE_DEFINITION, MESSAGE_HASH,
-    MESSAGE_TYPE, METADATA, NOTES,
+    CDR_HEADER, CHANGE, CONFIGURATION, description, FORMAT, FORMAT_VERSION, MESSAGE_DEFINITION,
+    MESSAGE_HASH, MESSAGE_TYPE, METADATA, NOTES, StorageFile,
 )
-from antenna_drive.recording.bag_description import description, StorageFile
 from antenna_drive.recording.plain import freeze, to_json
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import dump_sheet, FILE_NAME, TestSheet
@@ -131,8 +129,7 @@ class BagWriter:
         """Return the writer."""
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
         """Close the bag; after an error leave it as it is, safe up to the last chunk."""
         if kind is None:
             self.close()
@@ -173,11 +170,7 @@ class BagWriter:
             self.flush()
 
     def add(self, signal: int, step: int, time_ns: int, value: float) -> None:
-        """
-        Write one sample of one signal, given by its place in the order of the signals.
-
-        Raises RecordingError: see `write`.
-        """
+        """Write one sample of a signal, given by its place in their order; raise as `write`."""
         self._check(signal, time_ns, value)
         with self._guarded() as writer:
             writer.add_message(self._topics[signal], time_ns,
@@ -192,11 +185,7 @@ class BagWriter:
                                  'are finite numbers and times that are not negative')
 
     def know(self, configuration: Mapping[str, Any]) -> None:
-        """
-        Write down the configuration, in the place of what was known of it before.
-
-        Raises RecordingError: the file cannot be written, or it is no plain data.
-        """
+        """Write down the configuration instead of what was known; errors as of `change`."""
         text = _as_json(configuration)
         with self._guarded() as writer:
             writer.add_attachment(0, 0, CONFIGURATION, 'application/json', text.encode())
@@ -213,11 +202,7 @@ class BagWriter:
         self.flush()
 
     def flush(self) -> None:
-        """
-        Complete the chunk, so that what was written so far survives this process.
-
-        Raises RecordingError: the disk is full or the file cannot be written.
-        """
+        """Complete the chunk, so that it survives this process; errors as of `write`."""
         with self._guarded() as writer:
             writer.flush()
         self.written_ns = self._last_ns
@@ -261,11 +246,7 @@ class BagWriter:
         self._synced_at = self._clock()
 
     def close(self) -> None:
-        """
-        Complete the bag: the index, and metadata.yaml, which ROS 2 tools look for.
-
-        Raises RecordingError: the disk is full or the file cannot be written.
-        """
+        """Complete the bag: index, and metadata.yaml for ROS 2 tools; errors as of `write`."""
         if self._writer is None:
             return
         with self._guarded() as writer:

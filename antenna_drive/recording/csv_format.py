@@ -27,7 +27,6 @@ from antenna_drive.readings import FIELD_COLUMNS, RATE_COMMAND, RATE_COMMAND_COL
 from antenna_drive.recording.atomic import new_file, refuse_existing
 from antenna_drive.recording.plain import to_json
 from antenna_drive.recording.recording import Change, Recording, unit_of
-from antenna_drive.recording.row_order import Column, sorted_rows
 from antenna_drive.recording.sheet import dump_sheet, load_sheet, TestSheet
 import numpy as np
 from simgap.errors import one_line
@@ -35,7 +34,8 @@ from simgap.inputs.limits import SAMPLES, SIGNALS
 from simgap.inputs.plain import from_json, PlainDataError
 from simgap.inputs.schema import nearest
 from simgap.logs.channel import (
-    Channel, check_name, IntArray, make_channel, NANOSECONDS, RecordingError, RecordingWarning,
+    Channel, check_name, FloatArray, IntArray, make_channel, NANOSECONDS, RecordingError,
+    RecordingWarning,
 )
 from simgap.logs.text import Cell, open_text, parse_nanoseconds, parse_number, read_text, rows
 
@@ -183,11 +183,7 @@ def _with_meta(path: Path, recording: Recording, count: int) -> Recording:
 
 
 def parse_known(meta: dict[str, Any]) -> dict[str, Any]:
-    """
-    Return configuration, changes and notes from plain data that a file held.
-
-    Raises PlainDataError: something in it is not what it has to be.
-    """
+    """Return configuration, changes and notes from a file's plain data; or PlainDataError."""
     changes = []
     given = meta.get('changes', [])
     for item in given if isinstance(given, list) else [given]:
@@ -275,3 +271,50 @@ def format_nanoseconds(stamp: int) -> str:
     whole, rest = divmod(abs(stamp), NANOSECONDS)
     fraction = f'{rest:09d}'.rstrip('0') or '0'
     return f'{"-" if stamp < 0 else ""}{whole}.{fraction}'
+
+
+Column = tuple[IntArray, FloatArray]
+
+
+def sorted_rows(path: Path, time_column: str, stamps: IntArray, lines: IntArray,
+                columns: Iterable[Column]) -> list[Column]:
+    """
+    Return the columns with their rows in the order of time, each row once.
+
+    stamps, lines : time stamp and line of each row, shape (rows,)
+    columns : stamps and values of each column, which may lack some rows
+
+    Raises RecordingError if two rows have one time stamp and differ. Warns with RecordingWarning
+    if rows were sorted, or repeated rows left out.
+    """
+    steps = np.diff(stamps)
+    if np.any(steps < 0):
+        warnings.warn(
+            f'{path}: line {lines[1:][steps < 0][0]}: the time is earlier than in the row before; '
+            'the rows were sorted by time', RecordingWarning, stacklevel=3)
+    order = np.argsort(stamps, kind='stable')
+    stamps, lines = stamps[order], lines[order]
+    repeated = np.flatnonzero(np.diff(stamps) == 0) + 1
+    rows_at = dict(zip(*(part.tolist() for part in np.unique(stamps[repeated],
+                                                             return_counts=True))))
+    found = []
+    for column_stamps, values in columns:
+        order = np.argsort(column_stamps, kind='stable')
+        column_stamps, values = column_stamps[order], values[order]
+        again = np.flatnonzero(np.diff(column_stamps) == 0) + 1
+        # of equal rows, a value is in each or in none
+        here, counts = np.unique(column_stamps, return_counts=True)
+        twice = np.isin(here, stamps[repeated])
+        unlike = [stamp for stamp, count in zip(here[twice].tolist(), counts[twice].tolist())
+                  if count != 1 + rows_at[stamp]]
+        unlike += column_stamps[again][values[again] != values[again - 1]].tolist()
+        if unlike:
+            place = int(np.searchsorted(stamps, min(unlike)))
+            raise RecordingError(
+                f'{path}: line {lines[place + 1]}, column {time_column}: the time is that of '
+                f'line {lines[place]}, but the row is another one; remove one of them')
+        found.append((np.delete(column_stamps, again), np.delete(values, again)))
+    if repeated.size:
+        warnings.warn(f'{path}: line {lines[repeated].min()}: the row repeats an earlier one; '
+                      f'{repeated.size} such rows were left out', RecordingWarning, stacklevel=3)
+    return found

@@ -1,13 +1,22 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""Read a recording, whatever format it is in."""
+"""Read a recording, whatever format it is in: one of ours, or what a map describes."""
 
 from pathlib import Path
 
+from antenna_drive.emulator.wiring import signal_names
+from antenna_drive.readings import FIELD_COLUMNS
 from antenna_drive.recording.csv_format import read_csv
-from antenna_drive.recording.recording import Recording
+from antenna_drive.recording.recording import Recording, unit_of
+from antenna_drive.recording.sheet import load_sheet, TestSheet
+from simgap.logs import column_map
 from simgap.logs.channel import RecordingError
+from simgap.logs.column_map import ImportMap, KnownSignals
+from simgap.logs.mapped import read_mapped
 
+# What a column's unit has to be convertible to: a map's scale makes article amperes of real ones.
+DRIVE = KnownSignals('the drive', {name: unit_of(name).removeprefix('article ')
+                                   for name in signal_names()}, FIELD_COLUMNS)
 
 def read_recording(path: str | Path, *, partial: bool = False) -> Recording:
     """
@@ -30,3 +39,27 @@ def read_recording(path: str | Path, *, partial: bool = False) -> Recording:
         raise RecordingError(f'{path}: no recording; allowed are a bag (a folder, .mcap or '
                              '.mcap.zstd) and .csv')
     return read_csv(path)
+
+
+def load_map(path: str | Path) -> ImportMap:
+    """Read a map whose signals may be the drive's own; errors as of `column_map.load_map`."""
+    return column_map.load_map(path, DRIVE)
+
+
+def parse_map(tree: object) -> ImportMap:
+    """Check the plain data of such a map; errors as in `load_map`."""
+    return column_map.parse_map(tree, DRIVE)
+
+
+def import_file(path: str | Path, import_map: ImportMap) -> Recording:
+    """
+    Read a file of any kind that `tables` knows, and the test sheet NAME.yaml beside it.
+
+    Raises RecordingError: the file cannot be read as the map says, see `read_mapped`.
+    Raises ParameterError: NAME.yaml is no test sheet.
+    """
+    path = Path(path)
+    channels = read_mapped(path, import_map)
+    beside = path.with_suffix('.yaml')
+    return Recording(channels, sheet=load_sheet(beside) if beside.is_file() else TestSheet(),
+                     notes={'source': path.name, 'import_map': import_map.source})

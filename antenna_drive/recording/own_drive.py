@@ -24,11 +24,7 @@ class IncompleteRecording(RecordingError):
 
 
 def check_rows(path: Path, rows: int) -> None:
-    """
-    Make sure that a bag has so many samples of every signal.
-
-    Raises IncompleteRecording: it has more or fewer.
-    """
+    """Raise IncompleteRecording unless a bag has so many samples of every signal."""
     counts = message_counts(path)
     wrong = {topic: count for topic, count in counts.items() if count != rows}
     for topic, count in wrong.items():

@@ -3,10 +3,12 @@
 """
 Which signals people look at together, and in which units: degrees here, SI everywhere else.
 
-The report, the pictures and the layouts for plotting programs all show these panels.
+The report, the pictures and the layouts for plotting programs all show these panels. Currents are
+in article amperes; here they also come in real ones, as a clamp meter shows them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 import math
 from typing import NamedTuple
@@ -14,11 +16,11 @@ from typing import NamedTuple
 from antenna_drive.readings import (
     AMMETER, ENCODER, of, RATE_COMMAND, Sensor, TACHOMETER, VOLTMETER,
 )
-from antenna_drive.recording.amperes import ARTICLE
 from antenna_drive.recording.recording import Recording
-from simgap.logs.channel import RecordingError
+from simgap.logs.channel import Channel, RecordingError
 
 _DEGREES = 180.0 / math.pi
+ARTICLE, REAL = 'article A', 'real A'
 
 
 class Panel(NamedTuple):
@@ -103,3 +105,41 @@ def _idle(recording: Recording, name: str) -> bool:
         if name == ammeter.signal:
             return recording.channels.get(ammeter.instead) == recording[name]
     return signal == 'missed_impulse'
+
+
+def real_amperes(recording: Recording) -> float | None:
+    """Return how many real amperes one article ampere is, None if the recording tells nothing."""
+    for motor in ('motor_1', 'motor_2'):
+        try:
+            ratio = recording.configuration[motor]['armature.physical_amperes_per_article_ampere']
+        except (KeyError, TypeError):
+            continue
+        if isinstance(ratio, float):
+            return ratio
+    return None
+
+
+def with_real_amperes(recording: Recording, names: Iterable[str]) -> Recording:
+    """
+    Return the signals of these names, and each current among them once more in real amperes.
+
+    A current `motor_1/current` is followed by `motor_1/real_current`.
+
+    Raises RecordingError: the recording does not tell how many real amperes an article ampere is,
+    or there is no current.
+    """
+    kappa = real_amperes(recording)
+    if kappa is None:
+        raise RecordingError('the recording does not tell how many real amperes an article '
+                             'ampere is: it has no configuration; one of antenna-drive record '
+                             'has')
+    channels = {}
+    for name in names:
+        channel = channels[name] = recording[name]
+        if channel.unit == ARTICLE:
+            unit, _, signal = name.partition('/')
+            channels[f'{unit}/real_{signal}'] = Channel(
+                REAL, channel.time_ns, kappa * channel.values)
+    if not any(channel.unit == REAL for channel in channels.values()):
+        raise RecordingError('there is no current among the signals')
+    return replace(recording, channels=channels)

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
-from antenna_drive.recording.amperes import real_amperes
-from antenna_drive.recording.panels import panels_of
+from antenna_drive.recording.panels import panels_of, real_amperes
 from antenna_drive.recording.recording import Recording
 from simgap.logs.channel import RecordingError
 from simgap.report.curves import COLOURS
@@ -63,11 +62,7 @@ def draw(recording: Recording, stream: IO[bytes], form: str, *,
 
 
 def picture_format(path: Path) -> str:
-    """
-    Return the format that a file's name asks for.
-
-    Raises RecordingError: it asks for none of FORMATS.
-    """
+    """Return which of FORMATS a file's name asks for; RecordingError if none."""
     form = path.suffix.lstrip('.').lower()
     if form not in FORMATS:
         raise RecordingError(f'{path}: the name has to end in one of '

@@ -109,21 +109,13 @@ class RunRecorder:
             self._told.put((unit, record))
 
     def idle(self) -> None:
-        """
-        Make safe what was written, when no step comes for a while.
-
-        Raises RecordingError: the disk is full, or the bag cannot be written.
-        """
+        """Make safe what was written, when no step comes for a while; errors as of `step`."""
         self._catch_up()
         if self._bag is not None and not self._bag.closed:
             self._bag.flush()
 
     def close(self) -> None:
-        """
-        Complete the bag.
-
-        Raises RecordingError: the disk is full, or the bag cannot be written.
-        """
+        """Complete the bag; errors as of `step`."""
         self._catch_up()
         if self._bag is not None and not self._bag.closed:
             self._bag.close()

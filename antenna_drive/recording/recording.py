@@ -157,11 +157,7 @@ class Recording:
     # -- looking at it ------------------------------------------------------------------------
 
     def __getitem__(self, name: str) -> Channel:
-        """
-        Return one signal.
-
-        Raises RecordingError: there is no such signal; the message names the nearest one.
-        """
+        """Return one signal; RecordingError names the nearest one if it is not there."""
         try:
             return self.channels[name]
         except KeyError:
@@ -199,11 +195,7 @@ class Recording:
     # -- cutting ------------------------------------------------------------------------------
 
     def select(self, names: Sequence[str]) -> Recording:
-        """
-        Return the recording with these signals only, in this order.
-
-        Raises RecordingError: there is no such signal.
-        """
+        """Return these signals only, in this order; RecordingError if one is not there."""
         return replace(self, channels={name: self[name] for name in names})
 
     def between(self, start_s: float = -math.inf, end_s: float = math.inf) -> Recording:

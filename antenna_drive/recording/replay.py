@@ -46,11 +46,7 @@ class CommandUnit(Unit):
     outputs: ClassVar[tuple[Signal, ...]] = _OUTPUTS
 
     def __init__(self, recording: Recording) -> None:
-        """
-        Take the rate command of a recording, and the external torque if it has one.
-
-        Raises RecordingError: the recording holds no command.
-        """
+        """Take a recording's rate command and, if there, torque; RecordingError if none."""
         super().__init__(wiring.TEST_SIGNAL)
         if COMMAND not in recording or not len(recording[COMMAND]):
             raise RecordingError(f'{COMMAND}: not in this recording, there is nothing to replay')

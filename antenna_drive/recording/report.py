@@ -7,9 +7,8 @@ from typing import Any
 
 from antenna_drive import __version__
 from antenna_drive.pages import render
-from antenna_drive.recording.amperes import real_amperes
 from antenna_drive.recording.figures import MotorStatistics, Statistics, statistics
-from antenna_drive.recording.panels import Panel, panels_of
+from antenna_drive.recording.panels import Panel, panels_of, real_amperes
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import sheet_tree
 from simgap.report.curves import Panel as PlottedPanel

@@ -191,11 +191,7 @@ class TestSheet:
 
 
 def parse_sheet(tree: object) -> TestSheet:
-    """
-    Check the plain data of a test sheet.
-
-    Raises ParameterError: an entry is unknown or not allowed; the message names the key.
-    """
+    """Check the plain data of a test sheet; ParameterError names a key that is not allowed."""
     sheet: TestSheet = _parse('', tree, (TestSheet,))
     return sheet
 
@@ -269,12 +265,7 @@ def dump_sheet(sheet: TestSheet) -> str:
 
 
 def load_sheet(path: Path) -> TestSheet:
-    """
-    Read a test sheet from its file.
-
-    Raises ParameterError: the file cannot be read or an entry is not allowed; the message names
-    the file, the key and what is allowed.
-    """
+    """Read a test sheet; ParameterError names file, key and what is allowed."""
     tree = read_yaml(path)
     try:
         return parse_sheet({} if tree is None else tree)

@@ -7,21 +7,30 @@ A look takes longer than a second of testing. The next one begins when it has en
 share of new data is there, so looks come at even distances on a logarithmic scale of time. The
 process lives on between looks, which saves its start. A look does not begin where the one before
 has ended: it says what `antenna-drive diagnose` says of the same tests.
+
+The next test for such a verdict takes minutes in the same process. It is designed when somebody
+asks for it. The watch goes on, whatever one or the other fails of.
 """
 
 from collections.abc import Callable, Collection, Mapping
-from concurrent.futures import Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future
 from typing import Any
 
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.readings import RATE_COMMAND
 from antenna_drive.recording.recording import Recording
-from antenna_drive.twin.outcome import outcome
+from antenna_drive.recording.sheet import dump_sheet, parse_sheet
 from antenna_drive.twin.sequential import Answer, decided, Look, Rule
+from simgap.errors import one_line, UserError
 
 # The first look [s of testing], and how much more there has to be for the next one. A test that
 # is shorter than the first look has not shown much, and does not count as one.
 FIRST_S, GROWTH = 15.0, 1.3
+# Length of a next test [s].
+DURATION_S = 30.0
+# What designs it: from the entry `planning` of a verdict, for a configuration.
+Design = Callable[[Mapping[str, Any], Drive], dict[str, Any]]
+_LONGEST_FAULT = 300
 
 
 def diagnosed(recordings: Mapping[str, Recording], drive: Drive) -> dict[str, Any]:
@@ -151,3 +160,91 @@ def _length(test: Recording) -> float:
         return 0.0
     time = test[RATE_COMMAND].time_ns
     return float(time[-1] - time[0]) / 1e9
+
+
+def outcome(future: Future[dict[str, Any]]) -> tuple[dict[str, Any] | None, str]:
+    """Return what a task has found, or None and why it failed; BrokenExecutor if it was ended."""
+    try:
+        return future.result(), ''
+    except BrokenExecutor:
+        raise
+    except Exception as error:  # noqa: B902 (a fault of the task must not end the twin)
+        return None, one_line(error, _LONGEST_FAULT)
+
+
+def designed(planning: Mapping[str, Any], drive: Drive) -> dict[str, Any]:
+    """
+    Return the test that tells the answers of a verdict apart, within the limits of the drive.
+
+    planning : entry of the verdict's JSON
+    drive : the configuration
+
+    Returns say: lines of text; test: a test sheet as plain data, None if no test helps; sheet: the
+    same as YAML, '' for none.
+
+    Raises UserError: the verdict is of another configuration.
+    """
+    from antenna_drive.diagnosis.allowed_tests import AntennaTests
+    from antenna_drive.diagnosis.drive_limits import DriveLimits
+    from simgap.next_test.design import objective_for, TestDesign
+    from simgap.next_test.proposal import as_data, lines
+    from simgap.next_test.rivals import Findings
+    findings = Findings.of_data(planning)
+    space = AntennaTests(parse_sheet(planning['sheet']), drive, DriveLimits.of_drive(drive),
+                         DURATION_S)
+    try:
+        found = TestDesign(space, findings, objective_for(findings), threads=1).run()
+    except KeyError as error:
+        raise UserError(f'{error.args[0]}: this configuration knows no such effect') from error
+    data = as_data(found, space)
+    return {'say': [line.strip() for line in lines(data)], 'test': data['test'],
+            'sheet': dump_sheet(found.tests[0].test) if found.tests else ''}
+
+
+class NextTest:
+    """
+    The design of a next test: asked for, under way, there.
+
+    executor : that designs, after what it has to do already
+    drive : the configuration
+    design : what it does, a function of a module
+
+    fault : why there is none although it was asked for; '' if that is not so
+    """
+
+    def __init__(self, executor: Executor, drive: Drive, design: Design = designed) -> None:
+        """Begin with none."""
+        self._executor, self._drive, self._design = executor, drive, design
+        self._running: Future[dict[str, Any]] | None = None
+        self._seconds = 0.0
+        self._found: dict[str, Any] = {}
+        self.fault = ''
+
+    @property
+    def under_way(self) -> bool:
+        """Return whether one is being designed."""
+        return self._running is not None
+
+    def begin(self, planning: Mapping[str, Any], seconds: float) -> None:
+        """Design one for a verdict after so much testing [s]; what was found before is gone."""
+        self._found, self.fault, self._seconds = {}, '', seconds
+        self._running = self._executor.submit(self._design, planning, self._drive)
+
+    def take(self) -> bool:
+        """
+        Take what was found; return whether a design has ended.
+
+        Raises BrokenExecutor: its process was ended.
+        """
+        if self._running is None or not self._running.done():
+            return False
+        future, self._running = self._running, None
+        found, self.fault = outcome(future)
+        self._found = found or {}
+        return True
+
+    def message(self) -> dict[str, Any]:
+        """Return what there is to say, as plain data for JSON."""
+        return {'under_way': self.under_way, 'after_s': self._seconds, 'fault': self.fault,
+                'say': self._found.get('say', []), 'test': self._found.get('test'),
+                'sheet': self._found.get('sheet', '')}

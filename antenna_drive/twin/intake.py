@@ -5,11 +5,12 @@ What comes from a real drive, as it comes: rubbish is counted by name, the rest 
 
 A sample is a signal, a time stamp and a number. What is no finite number, or beyond anything that
 the drive can do, is left out. So is a stamp that is not later than the one before. Where the time
-jumps, the samples before and after it do not belong together: a new stretch begins.
+jumps, the samples before and after it do not belong together: a new stretch begins. Where nothing
+comes, or too much of it is rubbish, `InputFaults` says so.
 """
 
 from array import array
-from collections import Counter
+from collections import Counter, deque
 import math
 
 from antenna_drive.emulator.unit import FloatArray
@@ -26,6 +27,9 @@ _MOST = {RATE_COMMAND: 0.1, **{reading.signal: reading.sensor.most for reading i
 LATE_S = 1.0
 # Without a command for longer than this, nobody knows what the drive did [s].
 HOLE_S = 0.5
+# Input is bad if more than this share of a signal's samples of the last blocks was rubbish.
+_RUBBISH_SHARE = 0.02
+_RUBBISH_BLOCKS = 10
 
 
 class Intake:
@@ -156,3 +160,49 @@ def _fault(name: str, value: float) -> str:
 def known(name: str) -> bool:
     """Return whether a twin has a use for a signal."""
     return name in _MOST
+
+
+class InputFaults:
+    """
+    Watches the counts of an intake.
+
+    stale : whether no sample has come for so long that the real drive has stopped
+    """
+
+    def __init__(self, intake: Intake, stale_s: float) -> None:
+        """Watch an intake; without new samples for `stale_s`, the real drive has stopped [s]."""
+        self._intake, self._stale_s = intake, stale_s
+        self._last_put: tuple[int, float] = (0, -math.inf)
+        self._before: deque[tuple[dict[str, int], dict[str, int]]] = deque(
+            maxlen=_RUBBISH_BLOCKS)
+        self.stale = False
+
+    def look(self, now_s: float) -> None:
+        """Look whether samples come, by the time of any steady clock [s]."""
+        count = sum(self._intake.accepted.values())
+        if count != self._last_put[0]:
+            self._last_put = (count, now_s)
+        self.stale = bool(count) and now_s - self._last_put[1] > self._stale_s
+
+    def end_block(self) -> None:
+        """Note the counts at the end of a block."""
+        self._before.append((self._rubbish(), dict(self._intake.accepted)))
+
+    def _rubbish(self) -> dict[str, int]:
+        counts: dict[str, int] = {}
+        for (name, _), count in self._intake.rubbish.items():
+            counts[name] = counts.get(name, 0) + count
+        return counts
+
+    def found(self) -> dict[str, str]:
+        """Return the signals of which too much was rubbish lately, and what it was."""
+        found: dict[str, str] = {}
+        if self._before:
+            before, accepted = self._before[0]
+            for name, count in self._rubbish().items():
+                new = count - before.get(name, 0)
+                good = self._intake.accepted[name] - accepted.get(name, 0)
+                if new > max(_RUBBISH_SHARE * good, 3):
+                    kinds = [kind for key, kind in self._intake.rubbish if key == name]
+                    found[name] = f'{new} samples {" or ".join(kinds)}'
+        return found

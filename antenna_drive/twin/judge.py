@@ -1,19 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a drive is as far from its twin as in its quiet record, block after block."""
+"""Whether a drive is as far from the course of its twin as in its quiet record, by blocks."""
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import math
 
 from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.readings import SIGNALS
 from antenna_drive.recording.recording import unit_of
 from antenna_drive.twin.baseline import (
-    Baseline, BLOCK_S, block_scores, DRIFT_S, interpolated, motion_of, names_of_charts, regressors,
-    residual_of, SCORES, shift_of, SignalBlock, standard_scores, TWO_SIDED, WashOut,
+    Baseline, BLOCK_S, block_scores, DRIFT_S, ENCODER, interpolated, motion_of, names_of_charts,
+    regressors, residual_of, SCORES, shift_of, SignalBlock, standard_scores, TWO_SIDED, WashOut,
 )
-from antenna_drive.twin.course import Course
 from antenna_drive.twin.cusum import Charts, limit_of_rate
 import numpy as np
 from simgap.logs.channel import NANOSECONDS
@@ -46,6 +45,32 @@ class Gap:
         """Return a line for people."""
         return (f'{self.name}: {self.rms:.3g} {self.unit} instead of {self.usual:.3g} '
                 f'{self.unit}, {self.score} {self.sigma:+.1f} sigma')
+
+
+@dataclass
+class Course:
+    """The twin's course on an even grid, with the encoder behind its high-pass."""
+
+    time: FloatArray = field(default_factory=lambda: np.zeros(0))
+    raw: FloatArray = field(default_factory=lambda: np.zeros((0, len(SIGNALS))))
+    washed: FloatArray = field(default_factory=lambda: np.zeros((0, len(SIGNALS))))
+    command: FloatArray = field(default_factory=lambda: np.zeros(0))
+    wash_out: WashOut = field(default_factory=WashOut)
+
+    def add(self, time: FloatArray, raw: FloatArray, command: FloatArray, step_s: float) -> None:
+        """Take rows of the grid: time [s], the channels, and the command."""
+        washed = raw.copy()
+        washed[:, ENCODER] = self.wash_out(raw[:, ENCODER], step_s)
+        self.time = np.append(self.time, time)
+        self.raw = np.concatenate([self.raw, raw])
+        self.washed = np.concatenate([self.washed, washed])
+        self.command = np.append(self.command, command)
+
+    def drop_before(self, time: float) -> None:
+        """Forget the rows before a time [s]."""
+        first = int(np.searchsorted(self.time, time))
+        self.time, self.command = self.time[first:], self.command[first:]
+        self.raw, self.washed = self.raw[first:], self.washed[first:]
 
 
 class BlockJudge:

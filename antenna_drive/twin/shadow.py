@@ -75,18 +75,14 @@ class Shadow:
         self._step_s = step_s
         self._stamps = np.zeros(0, np.int64)
         self._values = np.zeros(0)
-        self._start_ns: int | None = None
+        # the time stamp at which the drive began [ns]; None before the first command
+        self.start_ns: int | None = None
         self.names = self._emulator.names
 
     def restart(self) -> None:
         """Forget the command; the drive begins at rest with the next one."""
-        self._start_ns = None
+        self.start_ns = None
         self._stamps, self._values = np.zeros(0, np.int64), np.zeros(0)
-
-    @property
-    def start_ns(self) -> int | None:
-        """Return the time stamp at which the drive began [ns]; None before the first command."""
-        return self._start_ns
 
     @property
     def spacing_s(self) -> float:
@@ -109,16 +105,16 @@ class Shadow:
         nothing = np.zeros(0, np.int64), np.zeros((0, len(self.names), 2))
         if self._stamps.size <= AHEAD:
             return nothing
-        if self._start_ns is None:
-            self._start_ns = int(self._stamps[0])
+        if self.start_ns is None:
+            self.start_ns = int(self._stamps[0])
             self._command.begin(np.array([self._values[0], 0.0]), 0)
             self._emulator.restart()
         done = self._emulator.k
-        end = int((self._stamps[-AHEAD] - self._start_ns) / NANOSECONDS / self._step_s)
+        end = int((self._stamps[-AHEAD] - self.start_ns) / NANOSECONDS / self._step_s)
         if end <= done:
             return nothing
         channel = Channel('rad/s', self._stamps, self._values)
-        grid = self._start_ns + nanoseconds(np.arange(done + 1, end + 1) * self._step_s)
+        grid = self.start_ns + nanoseconds(np.arange(done + 1, end + 1) * self._step_s)
         self._command.lay(command_table(channel, grid), done + 1)
         kept = [self._advance_to(stop) for stop in sorted(
             {*(k for k in self._changes if done < k < end), end})]

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from antenna_drive.readings import RATE_COMMAND, SIGNALS
-from antenna_drive.recording.import_map import parse_map
+from antenna_drive.recording.files import parse_map
 from antenna_drive.twin.intake import known
 from simgap.inputs.plain_yaml import read_yaml
 from simgap.inputs.schema import ParameterError
@@ -98,12 +98,7 @@ def own_topics(real: str = '') -> TopicMap:
 
 
 def load_topics(path: str | Path) -> TopicMap:
-    """
-    Read a map of topics.
-
-    Raises ParameterError: the file cannot be read, or an entry is not allowed; one line names the
-    file, the key and what is allowed.
-    """
+    """Read a map of topics; ParameterError names the file, the key and what is allowed."""
     tree: Any = read_yaml(Path(path))
     try:
         if not isinstance(tree, dict):

@@ -18,10 +18,8 @@ from antenna_drive.readings import of, RATE_COMMAND, SIGNALS, TACHOMETER
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import TestSheet
 from antenna_drive.twin.baseline import Baseline, BLOCK_S, ENCODER, interpolated, WashOut
-from antenna_drive.twin.course import Course
-from antenna_drive.twin.input_faults import InputFaults
-from antenna_drive.twin.intake import Intake
-from antenna_drive.twin.judge import BEHIND_S, BlockJudge, Gap, Pending
+from antenna_drive.twin.intake import InputFaults, Intake
+from antenna_drive.twin.judge import BEHIND_S, BlockJudge, Course, Gap, Pending
 from antenna_drive.twin.quiet_record import learn, Track
 from antenna_drive.twin.shadow import Shadow, under_test
 import numpy as np

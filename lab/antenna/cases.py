@@ -6,8 +6,6 @@ The cases of a trial: the effects of each antenna, drawn once and recorded.
 A case follows entirely from its truth, noise included, and can be made again at any time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 import dataclasses
 from typing import Any, TypeVar

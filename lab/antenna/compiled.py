@@ -7,8 +7,6 @@ numba's own cache checks only the file of the outermost function and would miss 
 equation in another file. The cache folder's name is therefore a hash of this package's sources.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import hashlib
 import os

@@ -7,8 +7,6 @@ Friction is warmer or colder from recording to recording, a wind blows, a filter
 the logger, and each sensor and part has a little of the faults that the catalogue knows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 import math
 from typing import Any

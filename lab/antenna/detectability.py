@@ -9,8 +9,6 @@ first-order fit in which a ridge keeps each of them near its prior. Run
 `python -m lab.antenna.detectability` for the table of lab/notebook/trial.md.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 import copy

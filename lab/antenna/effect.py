@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A defect of the real antenna: its range of sizes, and how it changes a machine."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import math

@@ -8,8 +8,6 @@ The smallest sizes are just detectable in the standard test programme through no
 the rate loop; errors of current, encoder and bias affect the recording only.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import math
 

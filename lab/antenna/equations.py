@@ -8,8 +8,6 @@ equations are smooth. `margin` is positive for each switch as long as its state 
 and equation numbers are the article's; the equations are those of the reference model.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

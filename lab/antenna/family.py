@@ -7,8 +7,6 @@ Family b has other forms of effects, outsiders and programmes. Family c has thos
 every day and every logger bring (`days`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 

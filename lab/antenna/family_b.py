@@ -8,8 +8,6 @@ lab/notebook/history.md lists each use. Effects have the names, numbers and rang
 Those in LAWS act by another law, the others are changes of a constant and have only one.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 import math
 from typing import Any

@@ -8,8 +8,6 @@ recorder, delays of its channels, a clock that is off, noise of another level an
 sheet says, spikes and missing rows. lab/notebook/trial.md has the table of their sizes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 import math

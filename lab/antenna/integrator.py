@@ -9,8 +9,6 @@ thrown there and the integration restarts. Sources: Dormand and Prince, J. Comp.
 (1980) 19; Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.5 and II.6.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from lab.antenna.compiled import compiled, inner

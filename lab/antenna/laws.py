@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The laws of single parts of the real antenna, compiled: teeth, friction, loads and delays."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -6,8 +6,6 @@ One antenna as records, described in machine.yaml: all constants and imperfectio
 An imperfection is absent at zero; only effects set one.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -6,8 +6,6 @@ Effects outside the catalogue, which a diagnosis must answer with 'unknown'.
 Even at its smallest size each leaves a gap that the tolerances cannot explain.
 """
 
-from __future__ import annotations
-
 from lab.antenna.effect import defects, Parameters
 from lab.antenna.machine import DROPOUTS, Records
 from lab.antenna.table import read_table

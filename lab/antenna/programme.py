@@ -9,8 +9,6 @@ filters and delay. The three are recorded at different elevations, which separat
 wind. Amplitudes and periods vary from case to case; the kinds of recording do not.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -8,8 +8,6 @@ The real antenna: from a machine and a test sheet to the true signals.
     history = simulate(machine, sheet, times)
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 import math
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The recorder: true signals with noise, quantisation and clock jitter."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import math
 

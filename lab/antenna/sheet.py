@@ -7,8 +7,6 @@ The YAML has the diagnosis' input format. Phases of a square or triangle are in 
 a multisine in radians; a sine of phase zero starts at zero.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 import math

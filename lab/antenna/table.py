@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tables of this program: YAML files beside the modules that read them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rate command and the bias source of a test, for the compiled equations."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -8,8 +8,6 @@ of any other kind; no diagnosis gets it. The shapes of square, triangle, multisi
 those of `programme`. Steps, tracking and slews are straight lines between knots.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple

@@ -12,8 +12,6 @@ python -m lab.bench.bare_node UNIT FILE LAST KIND --ros-args ...
 KIND is `python` for a loop in Python, `compiled` for that of `bare_loop`.
 """
 
-from __future__ import annotations
-
 import signal
 import sys
 from typing import Any

@@ -7,8 +7,6 @@ A task is a group of variants as plain numbers, and its result is statistics alo
 process or machine can run it. `main` runs one task and prints its peak memory.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass

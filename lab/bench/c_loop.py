@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The emulator's loop in plain C, compiled by the machine's own compiler: the limit."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import ctypes

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Wall time and memory of one diagnosis, from recordings of the independent antenna."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 import tempfile

@@ -11,8 +11,6 @@ States: command voltage; of each motor integral, lagged demand, current, angle, 
 torque share x_3, x_2, x_F; hub angle and rate; angle and rate of each of three modes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import math
 from typing import Any

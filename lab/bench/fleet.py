@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The diagnosis of several machines by one worker of a cluster, and by two."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 import tempfile

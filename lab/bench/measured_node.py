@@ -6,8 +6,6 @@ One of the drive's nodes, unchanged except that it records the times of its step
 python -m lab.bench.measured_node UNIT FILE LAST --ros-args ...
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import importlib
 import sys

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Interleaved measurements, so that other load on the machine affects all of them equally."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 import gc
 import os

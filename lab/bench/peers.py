@@ -9,8 +9,6 @@ the bodies. For the others the rate decides between stick and slip, within a thr
 swept like the tolerance.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial

@@ -8,8 +8,6 @@ a share of that signal's rms, at 200 Hz. Two runs are equally accurate when both
 same level; each side then uses the fastest of its settings that does.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace

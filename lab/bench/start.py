@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Times that a user waits for: the import, the first step, the demo."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import os
 from pathlib import Path

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How much of the machine's time its host gave to others, while something was measured."""
 
-from __future__ import annotations
-
 from pathlib import Path
 import time
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The groups of the benchmark, run one after another, and their figures as a table."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 import importlib

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The exchange between five processes: the drive's and the bare ones, in alternating runs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

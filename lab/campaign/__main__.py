@@ -6,8 +6,6 @@ Do one trial in this process: PART NAME SEED OPTIONS (JSON), the outcome goes to
 Each trial has a process of its own, so that one that hangs, leaks or dies spoils no other.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict
 import json
 from pathlib import Path

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Conditions that a drive meets in the field: no disk, a wrong clock, suspension, crowds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 import os

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Publish invented and nearly right frames at 1 kHz beside a running drive."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 import random
 import re

@@ -12,8 +12,6 @@ on all other topics. A frame of the right run and step cannot be told from a gen
 garbage is of a step that somebody may still wait for.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import random
 import signal

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Look at the drive from another network, and at what the middleware has of ROS 2 security."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 import json
 import os

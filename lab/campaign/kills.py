@@ -7,8 +7,6 @@ The others must name the one that is missing within two seconds. When it is star
 run begins without a restart of the others, and its bits are those of one process.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from pathlib import Path
 import random

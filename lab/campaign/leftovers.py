@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Processes that a trial has started and left behind."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 import os
 from pathlib import Path

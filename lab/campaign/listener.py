@@ -8,8 +8,6 @@ Listen for a drive for some seconds, and say as JSON which nodes and how many fr
 Unlike our own programs it sets nothing: who is seen is for the environment to decide.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import time

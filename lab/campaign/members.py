@@ -10,8 +10,6 @@ The recorder writes to a new folder in FOLDER at each start, as a supervisor wou
 observer takes SECONDS for each step.
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 import re

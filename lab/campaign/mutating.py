@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Damaged versions of a file: bytes changed anywhere, and plain data changed at one place."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 import copy
 import json

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Damage files of every kind that is read: a line that says what is wrong, or a result."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from itertools import islice
 import os

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page about a campaign: what was tried, what was found, and how to repeat it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 import json
 from pathlib import Path

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Kill the commands that start nodes at random moments; no process may be left."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 import os
 from pathlib import Path

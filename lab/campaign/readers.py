@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every reader of files and messages, each with files that it accepts."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 import io
 import json
@@ -22,7 +20,7 @@ from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.bag_writer import write_bag
 from antenna_drive.recording.bam import read_bam
 from antenna_drive.recording.csv_format import read_csv, write_csv
-from antenna_drive.recording.import_map import import_file, load_map
+from antenna_drive.recording.files import import_file, load_map
 from antenna_drive.recording.recording import Recording
 from antenna_drive.recording.sheet import load_sheet, parse_sheet
 from lab.campaign.mutating import as_json, as_yaml

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Run a drive at real time for long: memory, file handles, lost and late steps."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 import math
 from pathlib import Path

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Start a drive with members that join in random order; step 1000 must be reached."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 import random

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The result of a campaign: counts over all trials, and every finding with how to repeat it."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any

@@ -8,8 +8,6 @@ Each outcome is a line of OUT/outcomes.jsonl. A campaign that is started again w
 leaves out the trials that are there already.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from itertools import groupby
 import json

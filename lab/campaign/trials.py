@@ -6,8 +6,6 @@ What a trial is, what it returns, and which trials a campaign of each size has.
 A trial is repeatable from its name and the seed of the campaign. Nothing here needs ROS.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 import importlib

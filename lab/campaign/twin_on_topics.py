@@ -3,11 +3,9 @@
 """
 What the twin's node says of a simulated test that is played to it on topics, at real time.
 
-`twin.proving.watched` gives the same test to the core of the twin, without ROS 2 and faster. Here
-the player, the twin and whoever listens are processes in a ROS 2 domain of their own.
+`trials.twin_proving.watched` gives the same test to the core of the twin, faster and without ROS
+2. Here the player, the twin and whoever listens are processes in a ROS 2 domain of their own.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, ExitStack
@@ -23,10 +21,10 @@ from antenna_drive.emulator.unit import FloatArray
 from antenna_drive.lockstep.entry import choose_transport
 from antenna_drive.readings import RATE_COMMAND
 from antenna_drive.recording.csv_format import write_csv
-from antenna_drive.twin.proving import recording_of
 from antenna_drive.twin.watch import GAP
 from lab.campaign.domains import DomainClaim
 from lab.campaign.rig import Diagnostics, PATIENCE_S, Said
+from lab.trials.twin_proving import recording_of
 from simgap.logs.channel import NANOSECONDS
 from std_msgs.msg import Float64
 import yaml
@@ -43,8 +41,8 @@ def watched_on_topics(columns: Mapping[str, FloatArray], sheet: Mapping[str, Any
 
     Columns are those of the recording by name, NaN where there is no sample; `sheet` is plain
     data. `onset_s` is the end of the test if no effect is switched on. The result is that of
-    `twin.proving.watched`; its times are those at which the words came. Raise RuntimeError where
-    the twin ended before its time, or nothing came of it or of the player.
+    `trials.twin_proving.watched`; its times are those at which the words came. Raise RuntimeError
+    where the twin ended before its time, or nothing came of it or of the player.
     """
     with ExitStack() as stack:
         stack.enter_context(_own_domain())
@@ -79,7 +77,7 @@ def watched_on_topics(columns: Mapping[str, FloatArray], sheet: Mapping[str, Any
 
 def told(said: Sequence[Said], zero_s: float, zero_ns: int, onset_s: float) -> dict[str, Any]:
     """
-    Return what a twin has said until the first gap after the onset, as `twin.proving.watched`.
+    Return what a twin has said until the first gap after the onset, as `twin_proving.watched`.
 
     The test began at `zero_s` of time.monotonic() and at `zero_ns` by the stamps of its samples;
     the effect was switched on `onset_s` after that.

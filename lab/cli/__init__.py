@@ -6,8 +6,6 @@ The laboratory: sealed trials, fault campaigns and benchmarks of the diagnosis a
 It runs from a checkout and is never installed with the drive. lab/README.md says what is what.
 """
 
-from __future__ import annotations
-
 from lab import __version__
 from simgap.command.program import Command, Program
 

@@ -25,8 +25,6 @@ For example:
   lab bench --only transport --paced 480 --json -     (a quarter of an hour at most)
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 

@@ -18,8 +18,6 @@ that was interrupted. Trials that cannot be done on this machine are skipped, wi
 exit code is 0 if nothing was found and 1 if something was.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

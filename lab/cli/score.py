@@ -20,8 +20,6 @@ For example:
   lab score trial7.jsonl trial8
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 import json

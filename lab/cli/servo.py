@@ -17,12 +17,10 @@ For example:
   lab servo logs/ --without gearbox.load_dependent_friction --json -
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 
-from antenna_drive.cli.sharing import add_worker_options
+from antenna_drive.cli.options import add_worker_options
 from antenna_drive.recording.bam import read_bam
 from simgap.command.output import add_json_option, check_options, give, Progress
 from simgap.errors import UserError

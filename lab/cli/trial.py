@@ -39,19 +39,17 @@ For example:
   lab trial --machine joint --machine axis --cases 60 --seed 7 --out other7 --diagnose
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 from pathlib import Path
 import shlex
 
-from antenna_drive.cli.sharing import add_diagnosis_options, add_worker_options
+from antenna_drive.cli.options import add_diagnosis_options, add_worker_options
 from lab.antenna.family import FAMILIES
 from lab.joints.machines import MACHINES
 from lab.trials import batch, sealing
 from lab.trials.scored_cases import read_scored_of
-from simgap.command.output import check_options, Progress
+from simgap.command.output import add_json_option, check_options, Progress
 from simgap.errors import UserError
 from simgap.inputs.schema import Entry
 
@@ -90,6 +88,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--diagnose', action='store_true', help='diagnose each case as well')
     add_diagnosis_options(parser, '--config my.yaml')
     parser.add_argument('--quiet', action='store_true', help='show no progress')
+
+
+def add_batch_options(parser: argparse.ArgumentParser, of: str) -> None:
+    """Add what commands share that diagnose many cases; `of` is what `--jobs` counts."""
+    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
+                        help=f'{of} at a time (default: %(default)s here)')
+    add_diagnosis_options(parser, '--config my.yaml')
+    parser.add_argument('--quiet', action='store_true', help='show no progress')
+    add_json_option(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -29,16 +29,14 @@ For example:
   lab trial-next --kind investigate --cases 30 --seed 72 --out loops72 --jobs 8
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 import shlex
 from typing import Any
 
-from antenna_drive.cli.sharing import add_batch_options
 from lab.antenna.wild_programme import LONGEST_S, SHORTEST_S
+from lab.cli.trial import add_batch_options
 from lab.trials import batch, investigations, sealing, third_tests
 from lab.trials.further_tests import DURATION_S
 from lab.trials.third_tests import RULES

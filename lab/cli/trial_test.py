@@ -16,8 +16,6 @@ So you can try the whole loop by hand, or let it run by itself:
 The same test gives the same recording; with another --number it has another noise.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -16,13 +16,11 @@ For example:
   lab trial-without wild7 --scored wild7.jsonl
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 import shlex
 
-from antenna_drive.cli.sharing import add_batch_options
+from lab.cli.trial import add_batch_options
 from lab.trials.left_out import RISE, run_trial
 from lab.trials.scorecard import OVERCONFIDENT
 from simgap.command.output import check_options, give, Progress

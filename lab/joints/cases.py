@@ -7,8 +7,6 @@ A case follows entirely from its truth, including the noise. Each is drawn as a 
 antenna: an effect, two, none, or one that the model lacks, with imperfections that no sheet lists.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

@@ -7,8 +7,6 @@ An effect sets numbers of the mechanism (`sets`) or multiplies them by its numbe
 (`scales`). `stated` says how a verdict states its size, as in sizes.yaml.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache

@@ -7,8 +7,6 @@ The first one jumps between levels, the second goes to and fro, the third covers
 frequencies. A bus asks for positions at the rate of the recording.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 import math
 from typing import Any

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The firmware of a kind of servo, as a YAML file: ours, or one beside the logs."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 import math
 from pathlib import Path

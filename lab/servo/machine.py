@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A position-controlled servo with a pendulum as a `Machine`: logs in, predicted readings out."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 import math

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A ranking of hypotheses without a verdict, for callers that judge them in their own way."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -7,8 +7,6 @@ Stiction makes the error discontinuous with many local minima, which CMA-ES can 
 that are compared get the same number of runs and the same kinds of initial values.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -9,8 +9,6 @@ and viscous friction lacks. The diagnosed model and the six models of BAM's ladd
 to the same tests with the same number of runs, and simulated in open loop over the withheld ones.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

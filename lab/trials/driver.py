@@ -7,8 +7,6 @@ What is done with a case is an arm. Only what is missing is done. A row is kept 
 has ended, so a trial that was killed goes on where it was.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple

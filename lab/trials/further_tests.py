@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One test more on the antenna of a sealed case."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 import math
 from pathlib import Path

@@ -8,8 +8,6 @@ with the configuration as it was, `after` with the corrected one. The fraction o
 correction closes is computed here, from the recording and the noise that the truth states.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 import math
 from pathlib import Path

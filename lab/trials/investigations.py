@@ -9,8 +9,6 @@ square wave, a fast triangle and a multisine, diagnosed after one, two and three
 take 30 s. An interrupted trial goes on, see `results`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import partial
 import json

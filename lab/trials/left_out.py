@@ -8,8 +8,6 @@ with that effect left out, its entries for other places, and what becomes it at 
 range. The catalogue is then wrong on purpose, as it is for a machine whose fault nobody listed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path

@@ -11,8 +11,6 @@ square wave, a triangle or a multisine, which go on for ever. It stays healthy, 
 catalogue is switched on in the middle.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 import math

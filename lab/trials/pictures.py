@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scorecard as a picture: confusion matrix, reliability diagram, hits by size."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -7,8 +7,6 @@ What the file holds is not done again. A trial whose folder is gone therefore go
 if the file is put into a new folder.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 import json
 from pathlib import Path

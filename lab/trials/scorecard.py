@@ -6,8 +6,6 @@ The scorecard of a trial, computed from truths and verdicts alone.
 lab/notebook/trial.md defines each figure. A case without a valid verdict counts as wrong.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 import math

@@ -7,8 +7,6 @@ A wild trial takes gigabytes. This file of JSON lines takes a few kilobytes a ca
 published, and anybody can score it again. Everything else about a case follows from its seed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 import json
 import math

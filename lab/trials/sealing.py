@@ -10,8 +10,6 @@ Sealed truths: written before any recording, with salted hashes that anyone can 
 The salt prevents guessing a truth from its hash. Whoever has the truth file can check it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 import hashlib
 import json

@@ -10,8 +10,6 @@ parts, and gusts, which have no size in a verdict. Under family B, all effects o
 left out too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple

@@ -9,8 +9,6 @@ kinds of the standard programme. All are recorded on the independent antenna, an
 recordings are diagnosed. An interrupted trial goes on, see `results`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 import json

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A verdict of the diagnosis, read from its JSON and checked."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 import json

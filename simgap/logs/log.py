@@ -1,6 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The antenna_drive authors
 # SPDX-License-Identifier: Apache-2.0
-"""Logs of tests, as they come from a file or from Python, and the test that a simulation gets."""
+"""
+Logs of tests, as they come from a file or from Python, and the test that a simulation gets.
+
+A simulation takes one step from row to row, so rows that a recorder lost are put back.
+"""
 
 from array import array
 from collections.abc import Mapping, Sequence
@@ -9,6 +13,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 from simgap.errors import UserError
 from simgap.inputs.labels import parse_labels, plain_value
 from simgap.inputs.limits import SAMPLES
@@ -24,6 +29,9 @@ from simgap.machine.contract import FloatArray
 _TIME = ('time_s', 'time', 't')
 _LEAST_SAMPLES = 2
 _CONSTANT = Entry('')
+# A command is known in a gap where the rates before and after it tell the way across it up to this
+# share of its range.
+_KNOWN = 0.01
 
 
 class LogError(UserError):
@@ -220,3 +228,43 @@ def _held(values: FloatArray) -> FloatArray:
         return values
     last = np.maximum.accumulate(np.where(there, np.arange(values.size), 0))
     return np.where(np.isfinite(values[last]), values[last], values[there][0])
+
+
+def without_gaps(log: Log, commands: Sequence[str], settles_s: float = 0.0) -> Log:
+    """
+    Return a log with all its rows, for `machine(..., log=...)`.
+
+    Where rows lack at even times but for jitter, as many as fit are put in, with NaN for readings.
+    Commands are interpolated. Where one jumped or turned in a gap, nobody knows when: readings are
+    left out from the gap on until the machine has settled. Raises LogError if a column is missing.
+
+    commands : columns that are known between the rows, too, such as a reference
+    settles_s : for which readings are left out after an unknown command [s]
+    """
+    steps = np.diff(log.time)
+    counts = np.maximum(np.round(steps / np.median(steps)).astype(int), 1)
+    if np.all(counts == 1):
+        return log
+    rows = np.r_[0, np.cumsum(counts)]
+    every = np.arange(rows[-1] + 1)
+    time = np.interp(every, rows, log.time)
+    columns = {}
+    for name, values in log.columns.items():
+        columns[name] = np.full(every.size, np.nan)
+        columns[name][rows] = values
+    unknown = np.zeros(every.size, dtype=bool)
+    for name in commands:
+        values = log[name]
+        columns[name] = np.interp(every, rows, values)
+        rates = np.diff(values) / counts
+        for k in np.flatnonzero(counts > 1):
+            around = [rates[max(k - 1, 0)], rates[min(k + 1, rates.size - 1)]]
+            if abs(rates[k] - np.mean(around)) * counts[k] > _KNOWN * np.ptp(values):
+                unknown |= (time > log.time[k]) & (time <= log.time[k + 1] + settles_s)
+                continue
+            across = CubicHermiteSpline(rows[k:k + 2], values[k:k + 2], around)
+            lost = every[rows[k] + 1:rows[k + 1]]
+            columns[name][lost] = across(lost)
+    for name in columns.keys() - set(commands):
+        columns[name][unknown] = np.nan
+    return Log(log.name, time, columns, log.constants, log.labels)

@@ -12,9 +12,8 @@ from simgap.errors import UserError
 from simgap.logs.log import Log, OneTest
 from simgap.machine.check import check_machine, check_tests, idle_effects
 from simgap.machine.contract import FloatArray, Parameter
-from simgap.model.declared import Model
+from simgap.model.declared import Model, Numbers
 from simgap.model.machine import OwnMachine
-from simgap.model.named_numbers import Numbers
 from simgap.model.response import NO_RESPONSE, StepResponse, tests_of, where_it_acts
 from simgap.verdict.spoken import quantity
 

@@ -16,9 +16,8 @@ from simgap.machine.contract import (
     TimeScales,
 )
 from simgap.machine.diagram import Diagram
-from simgap.model.declared import Angle, Model, ModelError, Number, Reading
+from simgap.model.declared import Angle, Model, ModelError, Number, Numbers, Reading
 from simgap.model.effects import absent, ORDER_MARK, OwnCatalogue
-from simgap.model.named_numbers import Numbers
 
 # Samples of a test that are compared unless the model says how many per second.
 _SAMPLES = 3000

@@ -14,8 +14,7 @@ from simgap.inputs.schema import Entry, mapping_of, ParameterError, quoted
 from simgap.logs.log import OneTest
 from simgap.machine.contract import FloatArray
 from simgap.model.declaration import effect, free, known, machine, shape, size, within
-from simgap.model.declared import Model, ModelError, Number, OwnEffect, Push, Reading
-from simgap.model.named_numbers import Numbers
+from simgap.model.declared import Model, ModelError, Number, Numbers, OwnEffect, Push, Reading
 from simgap.model.simulator import Ports, Simulator
 
 _PROGRAMS = ('mujoco', 'fmu')

@@ -7,8 +7,7 @@ from __future__ import annotations
 import cmath
 import math
 
-from antenna_drive.article.linear import bias_loop, growth, stability_limit
-from antenna_drive.article.stability import growth_rate
+from antenna_drive.article.stability import bias_loop, growth, growth_rate, stability_limit
 from antenna_drive.parameters import load
 import numpy as np
 import pytest

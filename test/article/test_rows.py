@@ -13,8 +13,7 @@ from pathlib import Path
 from antenna_drive import cli
 from antenna_drive.article.contradictions import contradictions
 from antenna_drive.article.measures import Results, with_circuits
-from antenna_drive.article.published import CLAIMS
-from antenna_drive.article.rows import Row, rows
+from antenna_drive.article.published import CLAIMS, Row, rows
 from antenna_drive.calibration.problem import read_problem
 from antenna_drive.cli.article import CONFIGURATION
 from antenna_drive.parameters.files import config_dir

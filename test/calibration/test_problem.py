@@ -7,8 +7,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from antenna_drive.calibration.configuration import configuration
 from antenna_drive.calibration.problem import CalibrationProblem, Free, read_problem, Target
+from antenna_drive.calibration.report import configuration
 from antenna_drive.parameters import load, ParameterError
 from antenna_drive.parameters.files import config_dir
 from hypothesis import given, strategies as st

@@ -12,9 +12,8 @@ import sys
 from typing import Any
 
 from antenna_drive.cli import main
-from antenna_drive.configuring.derived import derived, kappa
+from antenna_drive.configuring.derived import derived, kappa, locked_rotor_frequency, mode_scale
 from antenna_drive.configuring.proof import checks
-from antenna_drive.configuring.resonance import locked_rotor_frequency, mode_scale
 from antenna_drive.configuring.sheet import ask, FIGURES, read_sheet, Sheet, written
 from antenna_drive.configuring.written import configuration
 from antenna_drive.parameters import load

@@ -8,8 +8,8 @@ from antenna_drive.article.experiments import experiments
 from antenna_drive.article.measures import article_measures, Results, with_circuits
 from antenna_drive.emulator.run import simulate
 from antenna_drive.emulator.wiring import OUTPUTS, TEST_SIGNAL
+from antenna_drive.live.experiment_buttons import claims_of, Obtained
 from antenna_drive.live.history import History
-from antenna_drive.live.obtained import claims_of, Obtained
 from antenna_drive.parameters import load
 import numpy as np
 import pytest

@@ -19,9 +19,10 @@ from antenna_drive.lockstep import compiled_loop
 from antenna_drive.lockstep.compiled_unit import CompiledForm, FORMS
 from antenna_drive.lockstep.conductor import Conductor, SLACK
 from antenna_drive.lockstep.exchange import Exchange
-from antenna_drive.lockstep.guest import Guest
 from antenna_drive.lockstep.inbox import DEPTH, Inbox, Refusal
-from antenna_drive.lockstep.member import DECEIVED_STANDSTILL_S, Member, MEMORY, STANDSTILL_S
+from antenna_drive.lockstep.member import (
+    DECEIVED_STANDSTILL_S, Guest, Member, MEMORY, STANDSTILL_S,
+)
 from hypothesis import example, given, settings, strategies as st
 from memory_channel import MemoryChannel
 import numpy as np

@@ -9,13 +9,13 @@ import subprocess
 import sys
 from typing import Any
 
-from antenna_drive.lockstep import realtime
+from antenna_drive.lockstep import placement
 import pytest
 from simgap.errors import UserError
 
 # Threads that are there when the class changes have it, and those that they start have not.
 PROGRAM = """
-from antenna_drive.lockstep.realtime import schedule_first_in_first_out
+from antenna_drive.lockstep.placement import schedule_first_in_first_out
 import os, threading
 end = threading.Event()
 there = threading.Thread(target=end.wait)
@@ -52,7 +52,7 @@ def test_who_may_not_is_told_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None
 
     monkeypatch.setattr(os, 'sched_setscheduler', refuse)
     with pytest.raises(UserError, match='^realtime.priority: 50 is not allowed.*rtprio'):
-        realtime.schedule_first_in_first_out(50)
+        placement.schedule_first_in_first_out(50)
 
 
 @pytest.mark.skipif(not sys.platform.startswith('linux'), reason='no /proc/self/status')
@@ -61,7 +61,7 @@ def test_memory_is_locked_or_refused(limit: int | None) -> None:
     """Under a limit of one byte the system refuses, unless the user may lock any amount."""
     code = ('import resource, sys\n'
             'from simgap.errors import UserError\n'
-            'from antenna_drive.lockstep.realtime import lock_memory\n'
+            'from antenna_drive.lockstep.placement import lock_memory\n'
             f'limit = {limit}\n'
             'if limit: resource.setrlimit(resource.RLIMIT_MEMLOCK, (limit, limit))\n'
             'try:\n'

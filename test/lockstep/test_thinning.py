@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from antenna_drive.lockstep.thinning import Thinned, Thinning
+from antenna_drive.lockstep.following import Thinned, Thinning
 from hypothesis import given, strategies as st
 import numpy as np
 

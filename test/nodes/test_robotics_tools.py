@@ -25,7 +25,7 @@ pytest.importorskip('rclpy', reason='rclpy is not installed: no drive to look at
 pytest.importorskip('tornado', reason='tornado is not installed: no client')
 pytest.importorskip('foxglove', reason='foxglove-sdk is not installed')
 
-from antenna_drive.lockstep.thinning import Thinned  # noqa: E402, I100
+from antenna_drive.lockstep.following import Thinned  # noqa: E402, I100
 from antenna_drive.nodes.joint_states_node import axis_state, motor_states  # noqa: E402
 from drive_watch import Watch  # noqa: E402
 from live_command import LiveCommand  # noqa: E402

@@ -17,8 +17,8 @@ import pytest
 pytest.importorskip('rclpy', reason='rclpy is not installed: no processes to test')
 
 from antenna_drive.lockstep.leaving import leave  # noqa: E402, I100
-from antenna_drive.lockstep.namesakes import namesake  # noqa: E402
 from antenna_drive.lockstep.processes import DriveProcesses  # noqa: E402
+from antenna_drive.lockstep.starting import namesake  # noqa: E402
 from drive_watch import Watch  # noqa: E402
 from rclpy.context import Context  # noqa: E402
 from rclpy.node import Node  # noqa: E402

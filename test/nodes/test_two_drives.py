@@ -68,7 +68,7 @@ class Recording:
 
 
 def _drive(circuit: str) -> Drive:
-    from antenna_drive.cli.settings import parse_settings
+    from antenna_drive.cli.options import parse_settings
     from antenna_drive.emulator.units import overridden
     return overridden(load(circuit), parse_settings(SAW_TOOTH))
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import re
 from typing import Any
 
-from antenna_drive.cli.settings import parse_settings
+from antenna_drive.cli.options import parse_settings
 from antenna_drive.parameters import load, ParameterError
 from antenna_drive.parameters.loading import find
 from antenna_drive.parameters.records import place_of, record_of

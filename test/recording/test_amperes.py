@@ -13,8 +13,8 @@ from antenna_drive.emulator.wiring import OUTPUTS
 from antenna_drive.parameters import load
 from antenna_drive.parameters.sets import values
 from antenna_drive.readings import READINGS
-from antenna_drive.recording.amperes import with_real_amperes
 from antenna_drive.recording.csv_format import read_csv, write_csv
+from antenna_drive.recording.panels import with_real_amperes
 from antenna_drive.recording.recording import Recording
 import numpy as np
 import pytest

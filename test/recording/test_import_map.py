@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from antenna_drive.recording.import_map import import_file, load_map, parse_map
+from antenna_drive.recording.files import import_file, load_map, parse_map
 from antenna_drive.recording.recording import Recording
 import pytest
 from simgap.inputs.schema import ParameterError

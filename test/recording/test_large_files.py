@@ -12,7 +12,7 @@ import tracemalloc
 
 from antenna_drive.readings import FIELD_COLUMNS
 from antenna_drive.recording.csv_format import read_csv
-from antenna_drive.recording.import_map import import_file, load_map
+from antenna_drive.recording.files import import_file, load_map
 import numpy as np
 import pytest
 from simgap.command.output import reading

@@ -14,7 +14,7 @@ from antenna_drive.limits import BAG, BAG_RECORD, LIMITS
 from antenna_drive.recording.bag import MESSAGE_DEFINITION, MESSAGE_TYPE
 from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.csv_format import read_csv
-from antenna_drive.recording.import_map import import_file, load_map
+from antenna_drive.recording.files import import_file, load_map
 import lz4.frame
 from mcap.records import Chunk
 from mcap.writer import CompressionType, Writer

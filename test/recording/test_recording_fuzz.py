@@ -19,7 +19,7 @@ import warnings
 from antenna_drive.recording.bag_reader import read_bag
 from antenna_drive.recording.bag_writer import write_bag
 from antenna_drive.recording.csv_format import read_csv, write_csv
-from antenna_drive.recording.import_map import import_file, load_map
+from antenna_drive.recording.files import import_file, load_map
 from antenna_drive.recording.sheet import load_sheet
 from hypothesis import given, HealthCheck, settings, strategies as st
 from lab.campaign.mutating import mutations, POISON

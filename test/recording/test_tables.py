@@ -12,8 +12,7 @@ from typing import Any
 import warnings
 
 from antenna_drive.cli import main
-from antenna_drive.recording.files import read_recording
-from antenna_drive.recording.import_map import import_file, parse_map
+from antenna_drive.recording.files import import_file, parse_map, read_recording
 from antenna_drive.recording.recording import Recording
 from hypothesis import given, HealthCheck, settings, strategies as st
 import numpy as np

@@ -9,7 +9,7 @@ from typing import Any
 
 from antenna_drive.parameters.loading import load
 from antenna_drive.parameters.sets import Drive
-from antenna_drive.twin.proposing import NextTest
+from antenna_drive.twin.growing import NextTest
 from later import Later
 from simgap.errors import UserError
 

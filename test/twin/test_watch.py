@@ -14,10 +14,10 @@ from antenna_drive.readings import FIELD_COLUMNS
 from antenna_drive.recording.sheet import parse_sheet
 from antenna_drive.twin import watch
 from antenna_drive.twin.baseline import Baseline
-from antenna_drive.twin.proving import played
 from antenna_drive.twin.watch import Twin, TwinSettings
 from lab.antenna.effects import CATALOGUE
 from lab.trials import onset
+from lab.trials.twin_proving import played
 import numpy as np
 import pytest
 
