@@ -23,7 +23,7 @@ from antenna_drive.lockstep.conductor import Conductor, SLACK
 from antenna_drive.lockstep.delays import empty_counts
 from antenna_drive.lockstep.frame import HEADER, READING_PREFIX, SENDER
 from antenna_drive.lockstep.inbox import DEPTH, Frame
-from antenna_drive.lockstep.member import Member
+from antenna_drive.lockstep.member import BRIEF_WAIT_S, Member
 from antenna_drive.lockstep.pace import Pace
 from antenna_drive.physics.arrays import IntArray
 from antenna_drive.physics.compiling import generated
@@ -31,9 +31,6 @@ import numpy as np
 
 # After this the loop returns, so that Python can answer signals [s].
 LIMIT_S = 0.1
-
-# A wait for a single peer [s]; after it, whatever may come ends a wait.
-BRIEF_WAIT_S = 0.02
 
 # A last step that no run comes to.
 _NEVER = 2**62

@@ -16,10 +16,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from antenna_drive.lockstep.frame import all_finite, HEADER, LARGEST_RUN, NO_RUN, SENDER
+from antenna_drive.lockstep.inbox import Frame
 from antenna_drive.physics.arrays import FloatArray
 import numpy as np
-
-Frame = tuple[float, ...]
 
 # Units are a few steps apart at most; more incomplete steps than this are not genuine.
 _DEPTH = 4096

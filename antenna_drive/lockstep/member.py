@@ -22,6 +22,8 @@ import numpy as np
 
 # How many of its frames each node remembers.
 MEMORY = 1000
+# A wait for a single peer [s]; after it, whatever may come ends a wait.
+BRIEF_WAIT_S = 0.02
 
 # A run that goes on makes a step within this [s]; else another may take its place. The second
 # holds where somebody has spoken falsely in a peer's name in the last MEMORY steps: a node that
@@ -177,7 +179,10 @@ class Member:
                 self._deceived_at = self.step
                 self.inbox.refuse(self.conductor, Refusal.WRONG_RUN)
             elif stands_still or self.run == NO_RUN or self.fault:
-                return self._begin_announced(self._announced)
+                frame, self._announced = self._announced, None
+                outputs = self._begin(frame[0], frame[2])
+                self.inbox.offer(self.conductor, frame)
+                return outputs
         if self.run == NO_RUN or self.fault:
             return None
         return None if self.inbox.missing() else self._advance()
@@ -203,12 +208,6 @@ class Member:
         self.inbox.resume(step)
         self.step = step
         self._checked(outputs)
-
-    def _begin_announced(self, frame: Frame) -> FloatArray | None:
-        self._announced = None
-        outputs = self._begin(frame[0], frame[2])
-        self.inbox.offer(self.conductor, frame)
-        return outputs
 
     def message(self) -> bytes:
         """Return the serialised message of the step last put out."""

@@ -210,7 +210,7 @@ class DriveNode:
         try:
             # What is there now stays: the collector need not look through all of it again.
             gc.freeze()
-            self._hello()
+            self._link.publish(self._member.hello())
             say_ready(self._node, f'{", ".join(self._member.missing())} to begin a run')
             while not self._stop:
                 if self._exchange is not None and self._exchanged(self._exchange):
@@ -271,9 +271,6 @@ class DriveNode:
             f'status {exchange.status}')
         if reason == compiled_loop.PUBLISH_FAILED and not self._member.fault:
             self._link.publish(self._member.message())
-
-    def _hello(self) -> None:
-        self._link.publish(self._member.hello())
 
     def _go_on(self) -> FloatArray | None:
         if self.tuning.pending:
@@ -355,7 +352,7 @@ class DriveNode:
         if isinstance(member, Conductor) and member.ended and not self._said_end:
             self._said_end = True
             self._report.ended()
-            self._hello()
+            self._link.publish(self._member.hello())
         if self._services is not None:
             self._services.tell_news()
         ready = self._link.wait(member.wanted(), timeout)

@@ -13,9 +13,8 @@ from contextlib import suppress
 from typing import Any
 
 from antenna_drive.limits import FRAME
-from antenna_drive.lockstep.exchange import BRIEF_WAIT_S
 from antenna_drive.lockstep.frame import FrameLayout, read_foreign
-from antenna_drive.lockstep.member import Member, MEMORY
+from antenna_drive.lockstep.member import BRIEF_WAIT_S, Member, MEMORY
 from antenna_drive.physics.arrays import FloatArray
 import numpy as np
 from rclpy.callback_groups import CallbackGroup
@@ -91,7 +90,7 @@ class FrameLink:
         taken = take_message(Float64MultiArray, True)
         if taken is None:
             return None
-        message: bytes = taken[0]  # type: ignore[assignment]
+        message: bytes = taken[0]
         frame = decode(message)
         return read_message(message) if frame is None else frame
 
@@ -106,7 +105,7 @@ class FrameLink:
         prefix, size = layout.prefix, len(layout.prefix) + 8 * layout.length
         numbers = []
         while (taken := handle.take_message(Float64MultiArray, True)) is not None:
-            message: bytes = taken[0]  # type: ignore[assignment]
+            message: bytes = taken[0]
             if len(message) == size and message.startswith(prefix):
                 numbers.append(message[len(prefix):])
         if not numbers:
