@@ -18,6 +18,7 @@ from simgap.logs.mapped import read_mapped
 DRIVE = KnownSignals('the drive', {name: unit_of(name).removeprefix('article ')
                                    for name in signal_names()}, FIELD_COLUMNS)
 
+
 def read_recording(path: str | Path, *, partial: bool = False) -> Recording:
     """
     Read a rosbag2 folder, or a file .mcap, .mcap.zstd or .csv.
