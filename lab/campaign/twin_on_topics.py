@@ -3,7 +3,7 @@
 """
 What the twin's node says of a simulated test that is played to it on topics, at real time.
 
-`trials.twin_proving.watched` gives the same test to the core of the twin, faster and without ROS
+`campaign.twin_proving.watched` gives the same test to the core of the twin, faster and without ROS
 2. Here the player, the twin and whoever listens are processes in a ROS 2 domain of their own.
 """
 
@@ -24,7 +24,7 @@ from antenna_drive.recording.csv_format import write_csv
 from antenna_drive.twin.watch import GAP
 from lab.campaign.domains import DomainClaim
 from lab.campaign.rig import Diagnostics, PATIENCE_S, Said
-from lab.trials.twin_proving import recording_of
+from lab.campaign.twin_proving import recording_of
 from simgap.logs.channel import NANOSECONDS
 from std_msgs.msg import Float64
 import yaml
@@ -41,7 +41,7 @@ def watched_on_topics(columns: Mapping[str, FloatArray], sheet: Mapping[str, Any
 
     Columns are those of the recording by name, NaN where there is no sample; `sheet` is plain
     data. `onset_s` is the end of the test if no effect is switched on. The result is that of
-    `trials.twin_proving.watched`; its times are those at which the words came. Raise RuntimeError
+    `twin_proving.watched`; its times are those at which the words came. Raise RuntimeError
     where the twin ended before its time, or nothing came of it or of the player.
     """
     with ExitStack() as stack:

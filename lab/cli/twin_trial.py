@@ -139,7 +139,7 @@ def _watched(columns: Mapping[str, FloatArray], sheet: Mapping[str, Any], onset_
     if settings.get('topics'):
         from lab.campaign.twin_on_topics import watched_on_topics
         return watched_on_topics(columns, sheet, onset_s, settings['alarms_per_day'])
-    from lab.trials.twin_proving import watched
+    from lab.campaign.twin_proving import watched
     from antenna_drive.twin.watch import TwinSettings
     return watched(columns, sheet, onset_s,
                    TwinSettings(alarms_per_day=settings['alarms_per_day']))
@@ -147,7 +147,7 @@ def _watched(columns: Mapping[str, FloatArray], sheet: Mapping[str, Any], onset_
 
 def _grown(truth: dict[str, Any]) -> dict[str, Any]:
     """Return the verdicts on a case as its recordings grow, and when the rule stopped."""
-    from lab.trials.twin_proving import grown, recording_of
+    from lab.campaign.twin_proving import grown, recording_of
     tests = [recording_of(cases.make_recording(truth, k), truth['sheets'][k]) for k in range(3)]
     stopped, looks = grown(tests, [RECORDED_S] * len(tests), LOOKS_S)
     return {'stopped_s': stopped, 'looks': [

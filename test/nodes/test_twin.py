@@ -22,8 +22,8 @@ from antenna_drive.lockstep.leaving import leave  # noqa: E402
 from antenna_drive.recording.csv_format import write_csv  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from lab.antenna.effects import CATALOGUE  # noqa: E402
+from lab.campaign.twin_proving import recording_of  # noqa: E402
 from lab.trials import onset  # noqa: E402
-from lab.trials.twin_proving import recording_of  # noqa: E402
 import numpy as np  # noqa: E402
 import rclpy  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402

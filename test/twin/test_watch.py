@@ -16,8 +16,8 @@ from antenna_drive.twin import watch
 from antenna_drive.twin.baseline import Baseline
 from antenna_drive.twin.watch import Twin, TwinSettings
 from lab.antenna.effects import CATALOGUE
+from lab.campaign.twin_proving import played
 from lab.trials import onset
-from lab.trials.twin_proving import played
 import numpy as np
 import pytest
 

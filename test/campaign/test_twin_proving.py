@@ -10,8 +10,8 @@ from typing import Any
 from antenna_drive.parameters.sets import Drive
 from antenna_drive.readings import RATE_COMMAND
 from antenna_drive.recording.recording import Recording
+from lab.campaign import twin_proving as proving
 from lab.cli.twin_trial import of_verdicts
-from lab.trials import twin_proving as proving
 import numpy as np
 import pytest
 from simgap.logs.channel import make_channel
