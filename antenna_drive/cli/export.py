@@ -19,7 +19,7 @@ such as 'motor_1/real_current [real A]' for each.
 import argparse
 from pathlib import Path
 
-from antenna_drive.cli.options import add_recording_options, read, refuse_none
+from antenna_drive.cli.reading import add_recording_options, read, refuse_none
 from antenna_drive.recording.csv_format import write_csv
 from antenna_drive.recording.panels import chosen, with_real_amperes
 from simgap.errors import UserError

@@ -23,7 +23,7 @@ Whatever cannot be read is refused with its line and column, and then nothing is
 import argparse
 from pathlib import Path
 
-from antenna_drive.cli.options import refuse_none
+from antenna_drive.cli.reading import refuse_none
 from antenna_drive.recording.bag_writer import write_bag
 from antenna_drive.recording.csv_format import read_csv
 from antenna_drive.recording.files import import_file, load_map

@@ -13,7 +13,7 @@ with real ones on the right where the configuration tells how many they are.
 import argparse
 from pathlib import Path
 
-from antenna_drive.cli.options import add_recording_options, read
+from antenna_drive.cli.reading import add_recording_options, read
 from antenna_drive.recording.picture import draw, picture_format
 from simgap.command.output import replaced
 

@@ -15,7 +15,8 @@ own.
 import argparse
 from pathlib import Path
 
-from antenna_drive.cli.options import add_config_option, add_recording_options, read
+from antenna_drive.cli.options import add_config_option
+from antenna_drive.cli.reading import add_recording_options, read
 from antenna_drive.recording.atomic import refuse_existing
 from antenna_drive.recording.bag_writer import write_bag
 from antenna_drive.recording.replay import distances, twin

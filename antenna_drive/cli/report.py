@@ -14,7 +14,7 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-from antenna_drive.cli.options import add_recording_options, read
+from antenna_drive.cli.reading import add_recording_options, read
 from antenna_drive.recording.figures import statistics
 from antenna_drive.recording.report import page
 from simgap.command.output import add_json_option, replaced, write_json

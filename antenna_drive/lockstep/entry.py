@@ -138,28 +138,7 @@ def _run(default_name: str, make: MakeUnit, args: Sequence[str] | None,
 
     def act(arguments: list[str]) -> int:
         with ros_node(default_name, arguments, "config:=\"['old_circuit']\"") as node:
-            from antenna_drive.emulator.wiring import find
-            from antenna_drive.lockstep.node import DriveNode
-            from antenna_drive.lockstep.node_parameters import OWN_PARAMETERS
-            from antenna_drive.lockstep.ros_parameters import Overrides
-            from antenna_drive.lockstep.starting import told_while_compiling
-            overrides = Overrides(node)
-            config = [name for name in overrides.names('config', ()) if name != 'reference']
-            given = {name: value for name, value in overrides.rest().items()
-                     if name not in OWN_PARAMETERS}
-            wired_as = ''.join(overrides.names('wiring', [wiring]))
-            wired = find(wired_as)
-            # the settings that a sheet stands for are parameters; its own name is none
-            overrides.names(SHEET, ())
-            with told_while_compiling(node):
-                unit = make(node.get_name(), wired, config, given)
-                limits = {setting: limit_of(wired.load(*config))
-                          for setting, limit_of in fed_by_topic.items()}
-                drive_node = DriveNode(node, unit, overrides, config, limits, wired_as,
-                                       wired.outputs, read_sheet)
-            ending.by(drive_node.stop)
-            if not ending.asked:
-                drive_node.spin()
+            _spin(node, make, fed_by_topic, wiring, ending, read_sheet)
         # The node has left the graph. What the interpreter and the compiler would still tidy up
         # takes seconds on a busy machine, and a node must be gone within two.
         sys.stdout.flush()
@@ -252,6 +231,33 @@ def stopped_by_signals() -> Event:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, frame: start_new_thread(stop.set, ()))
     return stop
+
+
+def _spin(node: Node, make: MakeUnit, fed_by_topic: Mapping[str, LimitOf], wiring: str,
+          ending: _Ending, read_sheet: ReadSheet | None) -> None:
+    from antenna_drive.emulator.wiring import find
+    from antenna_drive.lockstep.node import DriveNode
+    from antenna_drive.lockstep.node_parameters import OWN_PARAMETERS
+    from antenna_drive.lockstep.ros_parameters import Overrides
+    from antenna_drive.lockstep.starting import told_while_compiling
+
+    overrides = Overrides(node)
+    config = [name for name in overrides.names('config', ()) if name != 'reference']
+    given = {name: value for name, value in overrides.rest().items()
+             if name not in OWN_PARAMETERS}
+    wiring = ''.join(overrides.names('wiring', [wiring]))
+    wired = find(wiring)
+    # the settings that a sheet stands for are parameters; its own name is none
+    overrides.names(SHEET, ())
+    with told_while_compiling(node):
+        unit = make(node.get_name(), wired, config, given)
+        limits = {setting: limit_of(wired.load(*config))
+                  for setting, limit_of in fed_by_topic.items()}
+        drive_node = DriveNode(node, unit, overrides, config, limits, wiring, wired.outputs,
+                               read_sheet)
+    ending.by(drive_node.stop)
+    if not ending.asked:
+        drive_node.spin()
 
 
 def choose_transport(environment: dict[str, str] | os._Environ[str]) -> None:

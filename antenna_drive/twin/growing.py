@@ -9,7 +9,7 @@ process lives on between looks, which saves its start. A look does not begin whe
 has ended: it says what `antenna-drive diagnose` says of the same tests.
 
 The next test for such a verdict takes minutes in the same process. It is designed when somebody
-asks for it. The watch goes on, whatever one or the other fails of.
+asks for it. Whatever fails in that process, the watch goes on.
 """
 
 from collections.abc import Callable, Collection, Mapping

@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: 2026 The antenna_drive authors
+# SPDX-License-Identifier: Apache-2.0
+"""How every command reads a recording: its options, and warnings in one line."""
+
+import argparse
+from collections.abc import Iterable
+import math
+from pathlib import Path
+
+from antenna_drive.recording.bam import read_bam
+from antenna_drive.recording.files import read_recording
+from antenna_drive.recording.recording import Recording
+from simgap.command.output import reading
+from simgap.errors import UserError
+from simgap.logs.channel import Channel
+
+
+def add_recording_options(parser: argparse.ArgumentParser, span: bool = True) -> None:
+    """Add the recording to read, `--partial`, and `--from` and `--to` to read a part."""
+    parser.add_argument('recording', metavar='RECORDING',
+                        help='a bag (folder or .mcap), a .csv, or a servo log (.json)')
+    parser.add_argument('--partial', action='store_true',
+                        help='take what can be read of a bag that was cut off, and say how far')
+    if span:
+        parser.add_argument('--from', dest='start', type=float, default=-math.inf, metavar='S',
+                            help='leave out what was before this time [s]')
+        parser.add_argument('--to', dest='end', type=float, default=math.inf, metavar='S',
+                            help='leave out this time [s] and what came after')
+
+
+def refuse_none(name: object, channels: Iterable[Channel]) -> None:
+    """Raise UserError if there is no sample to go on with."""
+    if not any(map(len, channels)):
+        raise UserError(f'{name}: no sample to draw or to write; take a recording with at least '
+                        'one row, and --from and --to, if they are given, within it')
+
+
+def read(args: argparse.Namespace) -> Recording:
+    """Read the recording that the options name; UserError says what is wrong with it."""
+    with reading():
+        # a servo's log belongs to its machine, which the room of recordings does not know
+        recording = (read_bam(args.recording) if Path(args.recording).suffix == '.json'
+                     else read_recording(args.recording, partial=args.partial))
+    if 'start' in args and (args.start > -math.inf or args.end < math.inf):
+        recording = recording.between(args.start, args.end)
+    refuse_none(args.recording, recording.channels.values())
+    return recording
