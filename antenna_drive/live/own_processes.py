@@ -69,7 +69,7 @@ class OwnDrive:
         """End the processes; takes up to five seconds."""
         processes, self._processes = self._processes, None
         if processes is not None:
-            processes.__exit__()
+            processes.close()
 
 
 class RecorderProcess:
@@ -111,10 +111,11 @@ class RecorderProcess:
         if path.exists():
             raise UserError(f'{path}: exists already, choose another name')
         self.folder.mkdir(parents=True, exist_ok=True)
-        self._processes = DriveProcesses(
+        own = DriveProcesses(
             {_RECORDER: {'out': str(path)}}, namespace=self._namespace, order=[_RECORDER],
             commands={_RECORDER: [sys.executable, '-m', 'antenna_drive.nodes.recorder']})
-        self._processes.start()
+        own.start()
+        self._processes = own
         self.path, self.said = path, ''
         return path
 
@@ -127,7 +128,7 @@ class RecorderProcess:
             own.stop(patience_s=_PATIENCE_S)
             lines = own.log(_RECORDER).strip().splitlines()
             self.said = lines[-1].rpartition(']: ')[2] if lines else ''
-            own.__exit__()
+            own.close()
             self._processes = None
 
     def size(self) -> int:

@@ -145,6 +145,10 @@ class DriveProcesses:
 
     def __exit__(self, *error: object) -> None:
         """End all processes."""
+        self.close()
+
+    def close(self) -> None:
+        """End all processes that still run, and forget what they have printed."""
         self.stop()
         for log in self._logs.values():
             log.close()
